@@ -1,0 +1,45 @@
+"""cdtool: how fast, how surely and at which force does a machine notice that it has hit something?
+
+What a command does, a notebook does in one line:
+
+    cdtool.read("run.csv", "machine.toml")                              -> Recording
+    cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
+    cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
+    cdtool.benchmark("benchmark.toml")                                  -> Benchmark
+    cdtool.info("run.csv", machine="machine.toml")                      -> Info
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cdtool.version import __version__
+
+if TYPE_CHECKING:
+    from cdtool.workflows.benchmark import benchmark
+    from cdtool.workflows.detection import detect
+    from cdtool.workflows.information import info
+    from cdtool.workflows.learning import learn_signature
+    from cdtool.workflows.runs import read_log as read
+
+_API = {
+    "read": "cdtool.workflows.runs:read_log",
+    "learn_signature": "cdtool.workflows.learning:learn_signature",
+    "detect": "cdtool.workflows.detection:detect",
+    "benchmark": "cdtool.workflows.benchmark:benchmark",
+    "info": "cdtool.workflows.information:info",
+}
+
+__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _API:
+        raise AttributeError(f"module 'cdtool' has no attribute '{name}'")
+    module, _, attribute = _API[name].partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_API])

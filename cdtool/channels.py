@@ -1,0 +1,215 @@
+"""Which column or topic of a log is which channel, in which unit: the machine file's [channels]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.errors import nearest
+from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER
+from cdtool.tables import Table
+from cdtool.units import unit
+
+# From these a scale leads to a channel's own unit (N m per A, say).
+_RAW_UNITS = ("A", "V", "1", "count")
+_CLOCKS = ("log", "publish", "header")
+
+AcceptedUnits = Callable[[str], tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Duty:
+    """Motor torque from the applied voltage where no current is measured (thesis 6.2.2, a DC equivalent circuit).
+
+    tau = k_t (u - k_e omega) / R with u = duty * supply voltage (or the voltage itself); units V, ohm, V s/rad, N m/A.
+    """
+
+    supply_voltage: float
+    resistance: float
+    back_emf_constant: float
+    torque_constant: float
+
+
+@dataclass(frozen=True)
+class ChannelSource:
+    """Where one channel comes from, and how its numbers become SI: value * factor [unit]."""
+
+    channel: str
+    columns: tuple[str | int, ...] = ()
+    topic: str = ""
+    field: str = ""
+    factor: tuple[float, ...] = (1.0,)
+    unit: str = "1"
+    time_offset: float = 0.0
+    valid_range: tuple[float, float] | None = None
+    duty: Duty | None = None
+
+    @property
+    def described(self) -> str:
+        """How the machine file names it, for messages."""
+        if self.topic:
+            return f"{self.topic} {self.field}"
+        return ", ".join(str(column) for column in self.columns)
+
+
+@dataclass(frozen=True)
+class TimeSource:
+    """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks."""
+
+    column: str | int | None = None
+    factor: float = 1.0
+    rate: float | None = None
+    clock: Literal["log", "publish", "header"] = "log"
+
+
+@dataclass(frozen=True)
+class ChannelMap:
+    """All channels of a log; `topics` tells the MCAP map from the map of columns."""
+
+    time: TimeSource
+    sources: tuple[ChannelSource, ...]
+    joints: tuple[str, ...]
+    topics: bool = False
+    speed_low_pass: float = 50.0
+
+    def __contains__(self, channel: str) -> bool:
+        return any(source.channel == channel for source in self.sources)
+
+
+def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUnits, topics: bool) -> ChannelMap:
+    """The map in `[channels]` (columns) or `[channels.mcap]` (topics); `accepted` gives a channel's SI units."""
+    time = _time_source(table, topics)
+    low_pass = table.number("speed_low_pass_hz", 50.0, above=0.0)
+    sources = []
+    for name in table.values:
+        if name in ("time", "speed_low_pass_hz") or (name == "mcap" and not topics):
+            table.raw(name)
+            continue
+        if name not in CHANNELS:
+            raise table.fault(name, "unknown channel", nearest(name, ["time", *CHANNELS]))
+        sources.append(_source(table.table(name), name, joints, accepted(name), topics))
+    return ChannelMap(time, tuple(sources), joints, topics, low_pass)
+
+
+def _time_source(table: Table, topics: bool) -> TimeSource:
+    if topics:
+        part = table.table("time")
+        clock = part.choice("clock", _CLOCKS, "log")
+        part.finish()
+        return TimeSource(clock=clock)  # type: ignore[arg-type]
+    if not table.values or set(table.values) == {"mcap"}:
+        return TimeSource()
+    part = table.table("time", required=True)
+    if "rate_hz" in part:
+        rate = part.number("rate_hz", above=0.0)
+        part.finish()
+        return TimeSource(rate=rate)
+    column = _column(part, part.raw("column"), "column")
+    name = part.text("unit", "")
+    if not name:
+        raise part.fault("unit", "is missing", "s, ms, us, ns or min")
+    found = unit(name, part.key("unit"))
+    if found.si != "s":
+        raise part.fault("unit", f"'{name}' is not a unit of time", "s, ms, us, ns or min")
+    part.finish()
+    return TimeSource(column=column, factor=found.factor)
+
+
+def _source(
+    table: Table, channel: str, joints: tuple[str, ...], accepted: tuple[str, ...], topics: bool
+) -> ChannelSource:
+    count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(joints)
+    columns: tuple[str | int, ...] = ()
+    topic = field = ""
+    if topics:
+        topic, field = table.text("topic"), table.text("field")
+    else:
+        given = table.raw("columns")
+        if given is not None and "column" in table:
+            raise table.fault("columns", "stands beside 'column'", "keep one of the two")
+        listed = given if isinstance(given, list) else [table.raw("column")]
+        columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
+        if len(columns) != count:
+            raise table.fault("columns", f"names {len(columns)} columns", f"{count} are needed: one a joint")
+    kind = table.choice("kind", ("measured", "duty"), "measured")
+    duty = _duty(table, channel) if kind == "duty" else None
+    si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
+    source = ChannelSource(
+        channel=channel,
+        columns=columns,
+        topic=topic,
+        field=field,
+        factor=factor,
+        unit=si,
+        time_offset=table.number("time_offset", 0.0),
+        valid_range=_valid_range(table),
+        duty=duty,
+    )
+    table.finish()
+    return source
+
+
+def _unit_factor(
+    table: Table, channel: str, accepted: tuple[str, ...], count: int, topics: bool, duty: Duty | None
+) -> tuple[str, tuple[float, ...]]:
+    scale = table.numbers("scale", count, 1.0)
+    if any(item == 0.0 for item in scale):
+        raise table.fault("scale", "is 0", "a factor other than 0, e.g. N m per A")
+    if channel in ("label", "trigger"):
+        table.raw("unit")
+        return "1", scale
+    name = table.text("unit", "")
+    if not name:
+        if not topics or duty is not None:
+            raise table.fault("unit", "is missing", f"the unit that the log holds, e.g. {accepted[0]}")
+        name = accepted[0]
+    found = unit(name, table.key("unit"))
+    factor = tuple(found.factor * item for item in scale)
+    if duty is not None:
+        if found.si not in ("1", "V"):
+            raise table.fault("unit", f"is '{name}'", "kind = 'duty' takes %, 1 or V")
+        return found.si, factor
+    if found.si in accepted:
+        return found.si, factor
+    if found.si in _RAW_UNITS:
+        if "scale" not in table.values:
+            raise table.fault("scale", f"is missing for unit '{name}'", f"give the {accepted[0]} per {found.si}")
+        return accepted[0], factor
+    raise table.fault(
+        "unit",
+        f"'{name}' does not measure {channel} here",
+        f"units of {' or '.join(accepted)}, or {', '.join(_RAW_UNITS)} with a scale",
+    )
+
+
+def _duty(table: Table, channel: str) -> Duty:
+    if channel != "torque":
+        raise table.fault("kind", "'duty' serves the torque channel only", "remove it")
+    return Duty(
+        supply_voltage=table.number("supply_voltage", 1.0, above=0.0),
+        resistance=table.number("resistance", above=0.0),
+        back_emf_constant=table.number("back_emf_constant", minimum=0.0),
+        torque_constant=table.number("torque_constant", above=0.0),
+    )
+
+
+def _valid_range(table: Table) -> tuple[float, float] | None:
+    value = table.raw("saturation")
+    if value is None:
+        return None
+    if isinstance(value, list) and len(value) == 2 and all(isinstance(item, int | float) for item in value):
+        low, high = float(value[0]), float(value[1])
+        if math.isfinite(low) and math.isfinite(high) and low < high:
+            return low, high
+    raise table.fault("saturation", f"is {value!r}", "[lowest, highest] reading of the sensor, in the log's unit")
+
+
+def _column(table: Table, value: object, key: str) -> str | int:
+    if isinstance(value, str) and value:
+        return value
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+        return value
+    problem = "is missing" if value is None else f"is {value!r}"
+    raise table.fault(key, problem, "a column's name, or its number counted from 0")

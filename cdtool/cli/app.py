@@ -1,0 +1,66 @@
+"""The app: one command a file, and the one place where a known error becomes one line and an exit status."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.benchmark import benchmark
+from cdtool.cli.detect import detect
+from cdtool.cli.info import info
+from cdtool.cli.learn_signature import learn_signature
+from cdtool.cli.list_known import list_known
+from cdtool.cli.simulate import simulate
+from cdtool.errors import CdtoolError, ExitStatus
+
+app = typer.Typer(
+    name="cdtool",
+    help="How fast, how surely and at which force does a machine notice that it has hit something?",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+)
+app.command("info")(info)
+app.command("learn-signature")(learn_signature)
+app.command("detect")(detect)
+app.command("benchmark")(benchmark)
+app.add_typer(simulate, name="simulate")
+app.command("list")(list_known)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from cdtool.version import __version__
+
+        typer.echo(f"cdtool {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and end.", callback=_show_version, is_eager=True)
+    ] = False,
+) -> None:
+    """How fast, how surely and at which force does a machine notice that it has hit something?
+
+    Exit status: 0 done, 1 a limit is broken, 2 wrong usage or nothing usable, 3 done but some data was left out.
+    """
+
+
+def main() -> None:
+    """Run the app; a known error ends with one line on stderr and status 2."""
+    try:
+        app()
+    except CdtoolError as fault:
+        from cdtool.cli.console import print_error
+
+        print_error(fault)
+        sys.exit(ExitStatus.UNUSABLE)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
+        sys.exit(ExitStatus.OK)
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,172 @@
+"""`cdtool detect`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdtool.cli.console import leave, number, plain, print_error, print_json, print_skipped, progress, table
+from cdtool.cli.options import DebounceOption, JsonOption, MachineOption, OperationsOption
+from cdtool.errors import CdtoolError, ExitStatus, UsageError
+from cdtool.evaluation.results import Skipped
+
+if TYPE_CHECKING:
+    from cdtool.pipeline import Detection
+    from cdtool.workflows.detection import Detected
+
+
+def detect(
+    logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
+    machine: MachineOption,
+    signature: Annotated[
+        Path | None, typer.Option("--signature", "-s", help="Signature file from cdtool learn-signature.")
+    ] = None,
+    limit: Annotated[
+        str, typer.Option("--limit", help="Instead: |signal| below this; one value, or one a joint, as 40,inf,40.")
+    ] = "",
+    detector: Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")] = None,
+    operations: OperationsOption = "whole",
+    debounce: DebounceOption = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run one detector over logs and show its alarms.
+
+    Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
+    """
+    from cdtool.machine_file import read_machine_file
+    from cdtool.workflows.detection import detect as run
+
+    machine_file = read_machine_file(machine)
+    limits = _limits(limit)
+    plot_names = _plot_names(plot, logs)
+    done: list[tuple[Path, Detected]] = []
+    skipped: list[Skipped] = []
+    with progress("detecting") as advance:
+        for i, log in enumerate(logs, 1):
+            try:
+                found = run(
+                    log,
+                    machine_file,
+                    signature=signature,
+                    detector=detector,
+                    limit=limits,
+                    operations=operations,
+                    debounce=debounce,
+                )
+                done.append((log, found))
+                if plot_names:
+                    from cdtool.report.detection_plot import plot_detected
+
+                    plot_detected(found, plot_names[log])
+            except CdtoolError as fault:
+                if len(logs) == 1:
+                    raise
+                skipped.append(Skipped(str(log), str(fault)))
+            if advance:
+                advance(i, len(logs))
+    if not done:
+        for item in skipped:
+            print_error(CdtoolError(item.reason))
+        raise typer.Exit(ExitStatus.UNUSABLE)
+    print_skipped(skipped)
+    if as_json:
+        print_json([_as_json(log, detection, found) for log, found in done for detection in found.detections])
+    else:
+        _show([(detection, found) for _, found in done for detection in found.detections])
+    for log, _ in done:
+        if log in plot_names and not as_json:
+            typer.echo(f"plot written to {plain(plot_names[log])}")
+    leave(skipped)
+
+
+def _limits(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(",")) if text else ()
+    except ValueError:
+        raise UsageError(f"--limit is '{text}'", "numbers separated by commas, inf for a joint not watched") from None
+
+
+def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
+    from cdtool.report.figures import SUFFIXES
+
+    if plot is None:
+        return {}
+    if len(logs) == 1 and not plot.is_dir():
+        if plot.suffix.lower() not in SUFFIXES:
+            raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")
+        return {logs[0]: plot}
+    if plot.suffix:
+        raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
+    plot.mkdir(parents=True, exist_ok=True)
+    return {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
+
+
+def _show(rows: list[tuple[Detection, Detected]]) -> None:
+    from cdtool.evaluation.matching import match
+
+    cells = []
+    for detection, found in rows:
+        inside = [c for c in found.contacts if _inside(detection, c.start)]
+        matching = match(detection.verdict.alarms, inside, detection.statistic)
+        latency = {id(item.alarm): item.latency for item in matching.matches if item.alarm}
+        joints = detection.operation.recording.joints
+        if not detection.verdict.alarms:
+            why = detection.verdict.reason
+            cells.append((detection.operation.name, detection.verdict.outcome, "-", "-", "-", "-", "-", why))
+        for alarm in detection.verdict.alarms:
+            late = 1e3 * latency[id(alarm)] if id(alarm) in latency else None
+            cells.append(
+                (
+                    detection.operation.name,
+                    "alarm",
+                    f"{alarm.time:.3f}",
+                    joints[alarm.joint],
+                    number(alarm.statistic, 4),
+                    number(alarm.limit, 4),
+                    number(late, 3),
+                    "",
+                )
+            )
+    unit = rows[0][0].statistic.unit
+    columns = [("recording", "left"), ("verdict", "left"), ("time s", "right"), ("joint", "left")]
+    columns += [(f"signal {unit}", "right"), ("limit", "right"), ("latency ms", "right"), ("why", "left")]
+    table(columns, cells, title=rows[0][0].detector)
+
+
+def _as_json(log: Path, detection: Detection, found: Detected) -> dict[str, Any]:
+    joints = detection.operation.recording.joints
+    return {
+        "log": str(log),
+        "operation": detection.operation.name,
+        "detector": detection.detector,
+        "unit": detection.statistic.unit,
+        "verdict": detection.verdict.outcome,
+        "reason": detection.verdict.reason or None,
+        "alarms": [
+            {
+                "time_s": alarm.time,
+                "joint": joints[alarm.joint],
+                "side": alarm.side,
+                "statistic": alarm.statistic,
+                "limit": alarm.limit,
+            }
+            for alarm in detection.verdict.alarms
+        ],
+        "contacts": [
+            {"onset_s": contact.start, "onset_uncertainty_s": contact.uncertainty, "peak_force_n": contact.peak_force}
+            for contact in found.contacts
+            if _inside(detection, contact.start)
+        ],
+        "not_judged": detection.statistic.shares(),
+        "findings": [str(item) for item in found.recording.findings],
+    }
+
+
+def _inside(detection: Detection, time: float) -> bool:
+    recording = detection.operation.recording
+    return recording.start <= time <= recording.end

@@ -1,0 +1,72 @@
+"""`cdtool info`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.cli.console import number, plain, print_error, print_json, table
+from cdtool.cli.options import JsonOption
+from cdtool.errors import CdtoolError, ExitStatus
+
+if TYPE_CHECKING:
+    from cdtool.workflows.information import Info
+
+
+def info(
+    logs: Annotated[list[Path], typer.Argument(help="Recordings: CSV, MCAP or MAT.", metavar="LOG...")],
+    machine: Annotated[
+        Path | None, typer.Option("--machine", "-m", help="Machine file: map the channels and check them.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a log's channels, units, rates, duration, gaps, and everything that is odd.
+
+    Example: cdtool info sample_logs/gate/stiff/01.csv --machine sample_logs/gate/machine.toml
+    """
+    from cdtool.workflows.information import info as survey
+
+    done: list[Info] = []
+    failed = 0
+    for log in logs:
+        try:
+            done.append(survey(log, machine=machine))
+        except CdtoolError as fault:
+            print_error(fault)
+            failed += 1
+    if as_json:
+        print_json([asdict(item) for item in done])
+    else:
+        for item in done:
+            _show(item)
+    if failed:
+        raise typer.Exit(ExitStatus.INCOMPLETE if done else ExitStatus.UNUSABLE)
+
+
+def _show(item: Info) -> None:
+    details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
+    typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
+    columns = [("channel", "left"), ("unit", "left")]
+    columns += [(name, "right") for name in ("samples", "missing", "rate Hz", "start s", "length s", "min", "max")]
+    rows = [
+        (
+            channel.name,
+            channel.unit,
+            channel.samples,
+            channel.missing or "-",
+            number(channel.rate_hz, 5),
+            number(channel.start_s, 7),
+            number(channel.duration_s, 6),
+            number(channel.minimum, 5),
+            number(channel.maximum, 5),
+        )
+        for channel in item.channels
+    ]
+    table(columns, rows)
+    for finding in item.findings:
+        typer.echo(f"{finding.severity}: {plain(finding)}")
+    if not item.findings:
+        typer.echo("nothing odd found")

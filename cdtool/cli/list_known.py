@@ -1,0 +1,69 @@
+"""`cdtool list`."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Annotated, Any
+
+import typer
+
+from cdtool.cli.console import number, print_json, table
+from cdtool.cli.options import JsonOption
+from cdtool.errors import UsageError, nearest
+
+_KINDS = ("detectors", "thresholds", "machines", "formats")
+
+
+def list_known(
+    kind: Annotated[str, typer.Argument(help="detectors, thresholds, machines or formats.", metavar="KIND")],
+    as_json: JsonOption = False,
+) -> None:
+    """List what cdtool knows: detectors with their gains, thresholds, machines, formats; plug-ins too.
+
+    Example: cdtool list detectors --json
+    """
+    if kind not in _KINDS:
+        raise UsageError(f"unknown kind '{kind}'", nearest(kind, _KINDS))
+    entries = [_entry(kind, name) for name in _registry(kind).names(plugins=True)]
+    if as_json:
+        print_json(entries)
+        return
+    if kind == "detectors":
+        _show_detectors(entries)
+        return
+    table([("name", "left"), ("what it is", "left")], [(entry["name"], entry["summary"]) for entry in entries])
+
+
+def _registry(kind: str) -> Any:
+    from cdtool.detectors import DETECTORS
+    from cdtool.formats import FORMATS
+    from cdtool.machines import MACHINES
+    from cdtool.thresholds import THRESHOLDS
+
+    return {"detectors": DETECTORS, "thresholds": THRESHOLDS, "machines": MACHINES, "formats": FORMATS}[kind]
+
+
+def _entry(kind: str, name: str) -> dict[str, Any]:
+    loaded = _registry(kind).load(name)
+    entry: dict[str, Any] = {"name": name, "summary": (loaded.__doc__ or "").strip().split("\n")[0]}
+    if kind == "detectors":
+        entry |= {"short_name": loaded.short_name, "title": loaded.title, "needs": list(loaded.needs)}
+        entry["gains"] = [{"name": item.name, "default": item.default, **item.metadata} for item in fields(loaded)]
+    elif kind == "formats":
+        entry["suffixes"] = list(loaded.suffixes)
+    elif is_dataclass(loaded):
+        entry["settings"] = [
+            {"name": item.name, "default": None if item.default is MISSING else item.default} for item in fields(loaded)
+        ]
+    return entry
+
+
+def _show_detectors(entries: list[dict[str, Any]]) -> None:
+    rows = []
+    for entry in entries:
+        gains = entry["gains"] or [{"name": "-", "default": None, "unit": "", "meaning": ""}]
+        for i, gain in enumerate(gains):
+            head = (f"{entry['name']} ({entry['short_name']})", ", ".join(entry["needs"])) if i == 0 else ("", "")
+            rows.append((*head, gain["name"], number(gain["default"], 4), gain["unit"], gain["meaning"]))
+    columns = [("detector", "left"), ("needs", "left"), ("gain", "left"), ("default", "right"), ("unit", "left")]
+    table([*columns, ("meaning", "left")], rows)

@@ -1,0 +1,88 @@
+"""What a detector says of a recording: Signal, Band, Alarm, Verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.recording import BoolArray, FloatArray
+
+StatusArray = npt.NDArray[np.uint8]
+
+
+class Status(IntEnum):
+    """Why a sample of a collision detection signal can or cannot be judged."""
+
+    VALID = 0
+    START_UP = 1
+    NOT_APPLICABLE = 2
+    GAP = 3
+    NO_LIMIT = 4
+
+
+REASONS: Mapping[int, str] = {
+    Status.START_UP: "start-up",
+    Status.NOT_APPLICABLE: "not applicable",
+    Status.GAP: "missing samples",
+    Status.NO_LIMIT: "no limit known here",
+}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Collision detection signal: `time` (n,) s, `values` and `status` (n, J), `unit`.
+
+    `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive
+    always opposes the motion.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    status: StatusArray
+    unit: str
+    signed: bool = True
+
+    @property
+    def valid(self) -> BoolArray:
+        """(n, J), True where the value may be judged."""
+        valid: BoolArray = self.status == Status.VALID
+        return valid
+
+    def shares(self) -> dict[str, float]:
+        """Share of the samples for each reason not to judge, over all joints."""
+        size = max(self.status.size, 1)
+        counts = {text: int(np.count_nonzero(self.status == code)) for code, text in REASONS.items()}
+        return {text: count / size for text, count in counts.items() if count}
+
+
+@dataclass(frozen=True)
+class Band:
+    """Lower and upper limit of a statistic, both (n, J); infinite = not limited, NaN = no limit known."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """The statistic left its band: time [s] of the sample whose processing raised the alarm, debounce included."""
+
+    time: float
+    joint: int
+    side: Literal["above", "below"]
+    statistic: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Three answers: alarm, no alarm, or not assessable with the reason."""
+
+    outcome: Literal["alarm", "no alarm", "not assessable"]
+    alarms: tuple[Alarm, ...] = ()
+    reason: str = ""

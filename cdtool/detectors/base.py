@@ -1,0 +1,179 @@
+"""What every detector is, and what several share: gains with units, held samples, the momentum observer's recursion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from cdtool.clock import previous_value
+from cdtool.detection import Signal, StatusArray
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.kernels import kernel
+from cdtool.recording import BoolArray, FloatArray, Recording
+
+
+class Detector(Protocol):
+    """The contract: a frozen dataclass of gains, the channels it needs, a unit, and `signal(recording, machine)`.
+
+    `signal` is causal: its output up to sample k does not change when the samples after k do. It never reads the load
+    cell or a label.
+    """
+
+    name: ClassVar[str]
+    short_name: ClassVar[str]
+    title: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]]
+    signed: ClassVar[bool]
+
+    def unit(self, machine: Any) -> str:
+        """Unit of the signal for that machine."""
+        ...
+
+    def signal(self, recording: Recording, machine: Any) -> Signal:
+        """The collision detection signal of a recording on the load side; raises RecordingError."""
+        ...
+
+
+def gain(default: float, unit: str, meaning: str) -> Any:
+    """A gain of a detector: its default, unit and meaning stand here and nowhere else."""
+    return field(default=default, metadata={"unit": unit, "meaning": meaning})
+
+
+def require_positive(detector: object, *names: str) -> None:
+    """Raise ConfigurationError, naming the gain, where one is not a finite number above zero."""
+    for name in names:
+        value = getattr(detector, name)
+        if not (np.isfinite(value) and value > 0.0):
+            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed")
+
+
+def require_channels(detector: Detector, recording: Recording) -> None:
+    """Raise RecordingError, naming the channel, where one that the detector needs is absent."""
+    for channel in detector.needs:
+        if channel not in recording:
+            raise RecordingError(
+                f"{recording.name}: {detector.name} needs the channel '{channel}'",
+                f"map it in [channels] of the machine file; mapped here: {', '.join(recording.channels) or 'none'}",
+            )
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Torque and speed on the speed's clock: `torque` and `speed` (n, J) with the last value held where one is missing.
+
+    `missing` (n, J) tells where the torque or the speed has no sample; `speed_missing` the speed alone.
+    """
+
+    time: FloatArray
+    torque: FloatArray
+    speed: FloatArray
+    missing: BoolArray
+    speed_missing: BoolArray
+
+
+def drive_on_speed_clock(recording: Recording) -> Drive:
+    """Torque by previous value on the clock of the speed (a torque is held between its samples, never interpolated)."""
+    speed = recording["speed"]
+    torque = previous_value(recording["torque"], speed.time)
+    torque_missing = ~np.isfinite(torque)
+    speed_missing = ~np.isfinite(speed.values)
+    return Drive(
+        speed.time,
+        hold_last(torque, torque_missing),
+        hold_last(speed.values, speed_missing),
+        torque_missing | speed_missing,
+        speed_missing,
+    )
+
+
+def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
+    """The last present value held where one is missing (0 before the first)."""
+    if not missing.any():
+        return values
+    rows = np.where(missing, -1, np.arange(len(values))[:, np.newaxis])
+    last = np.maximum.accumulate(rows, axis=0)
+    held = np.take_along_axis(values, np.maximum(last, 0), axis=0)
+    result: FloatArray = np.where(last < 0, 0.0, held)
+    return result
+
+
+def observe_momentum(
+    drive: Drive, net_force: FloatArray, momentum: FloatArray, bandwidth: float, ready: FloatArray
+) -> tuple[FloatArray, StatusArray]:
+    """Residual and status (n, J) of the generalized momentum observer (thesis 2.18-2.19 corrected).
+
+    res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
+    constant force and any T_k. `ready` (J,) is the time from which the residual may be judged.
+    """
+    residual = np.zeros(net_force.shape)
+    status = np.zeros(net_force.shape, dtype=np.uint8)
+    for j in range(net_force.shape[1]):
+        _observe(
+            drive.time,
+            np.ascontiguousarray(net_force[:, j]),
+            np.ascontiguousarray(momentum[:, j]),
+            np.ascontiguousarray(drive.missing[:, j]),
+            np.ascontiguousarray(drive.speed_missing[:, j]),
+            bandwidth,
+            ready[j],
+            residual[:, j],
+            status[:, j],
+        )
+    return residual, status
+
+
+@kernel(
+    "void(Array(float64, 1, 'C', readonly=True), float64[::1], float64[::1], b1[::1], b1[::1], "
+    "float64, float64, float64[:], uint8[:])"
+)
+def _observe(
+    time: FloatArray,
+    net_force: FloatArray,
+    momentum: FloatArray,
+    missing: BoolArray,
+    speed_missing: BoolArray,
+    bandwidth: float,
+    ready: float,
+    residual: FloatArray,
+    status: StatusArray,
+) -> None:
+    settle = 3.0 / bandwidth
+    started = False
+    value = 0.0
+    impulse = 0.0
+    elapsed = 0.0
+    last_momentum = 0.0
+    for k in range(len(time)):
+        if started:
+            step = time[k] - time[k - 1]
+            impulse += 0.5 * (net_force[k] + net_force[k - 1]) * step
+            elapsed += step
+        if speed_missing[k]:
+            # p is unknown: the impulse goes on, the residual waits for the next speed.
+            residual[k] = value
+            status[k] = 3
+            continue
+        if not started:
+            started = True
+            ready = max(ready, time[k] + settle)
+        elif elapsed > settle:
+            value = 0.0
+            ready = time[k] + settle
+        else:
+            x = bandwidth * elapsed
+            if x < 0.02:
+                # 1 - exp(-x) to the last bit, without the call of exp.
+                weight = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0)))))
+            else:
+                weight = 1.0 - np.exp(-x)
+            value += weight * ((impulse - (momentum[k] - last_momentum)) / elapsed - value)
+        last_momentum = momentum[k]
+        impulse = 0.0
+        elapsed = 0.0
+        residual[k] = value
+        if missing[k]:
+            status[k] = 3
+        elif time[k] < ready:
+            status[k] = 1

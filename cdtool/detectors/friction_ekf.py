@@ -1,0 +1,145 @@
+"""Friction-estimating extended Kalman filter (FEEKF): a contact seen as a sudden virtual friction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cdtool.detection import Signal, StatusArray
+from cdtool.detectors.base import drive_on_speed_clock, gain, require_channels, require_positive
+from cdtool.detectors.friction_ekf_kernel import run_filter
+from cdtool.recording import FloatArray, Recording
+
+# The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
+_INITIAL_DRIFT_TIME = 10.0
+# An accelerometer that has been silent for longer than this leaves the estimate without its fast input [s].
+_ACCELERATION_HOLD = 0.05
+# A speed that falls below the minimum for no longer than this is a glitch, not a stop: no new start-up [s].
+_GLITCH = 0.02
+
+
+@dataclass(frozen=True)
+class FrictionEkf:
+    """Virtual viscous friction d from m a = F - d v, state x = (d, a, v), measured (a, v) (thesis 5.5-5.8 corrected).
+
+    Needs: torque, speed, acceleration. Unit: N s/m (linear) or N m s/rad (rotary), positive where something opposes the
+    motion. Load-side units, sequential scalar updates in Joseph form, no matrix inverse. Not applicable below
+    `minimum_speed`: there the friction cannot be observed; after re-entry it is starting up until the integral of its
+    bandwidth over time reaches 3. Its bandwidth falls in proportion to the speed. After the speed changes sign the
+    estimate's sign is wrong: only the first crossing counts.
+    """
+
+    sigma_acceleration: float = gain(0.1, "m/s2", "noise of the accelerometer, structure included (standard deviation)")
+    sigma_speed: float = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
+    friction_drift: float = gain(220.0, "N s/m per sqrt(s)", "how fast the friction may change: the square is q_d")
+    drift_acceleration: float = gain(9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)")
+    drift_speed: float = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)")
+    minimum_speed: float = gain(0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed")
+
+    name: ClassVar[str] = "friction_ekf"
+    short_name: ClassVar[str] = "feekf"
+    title: ClassVar[str] = "Friction-estimating EKF"
+    needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
+    signed: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        require_positive(
+            self,
+            "sigma_acceleration",
+            "sigma_speed",
+            "friction_drift",
+            "drift_acceleration",
+            "drift_speed",
+            "minimum_speed",
+        )
+
+    def unit(self, machine: Any) -> str:
+        """N s/m or N m s/rad."""
+        return f"{machine.force_unit} s/{machine.load_units['position']}"
+
+    def signal(self, recording: Recording, machine: Any) -> Signal:
+        """Virtual friction (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        require_channels(self, recording)
+        machine.require_inertia(self.name)
+        drive = drive_on_speed_clock(recording)
+        acceleration = recording["acceleration"]
+        # The virtual friction stands for all viscous friction; what else the machine file knows is taken off.
+        force = machine.drive_force_minus_known(drive.torque, drive.speed, np.zeros_like(drive.speed))
+        measured = np.where(drive.speed_missing, np.nan, drive.speed)
+        missing = drive.missing
+        friction = np.zeros(force.shape)
+        status = np.zeros(force.shape, dtype=np.uint8)
+        for j, axis in enumerate(machine.axes):
+            friction[:, j], status[:, j] = self.estimate(
+                drive.time,
+                np.ascontiguousarray(force[:, j]),
+                np.ascontiguousarray(measured[:, j]),
+                np.ascontiguousarray(missing[:, j]).view(np.uint8),
+                acceleration.time,
+                np.ascontiguousarray(acceleration.values[:, j]),
+                axis.inertia,
+                axis.viscous,
+            )
+        return Signal(drive.time, friction, status, self.unit(machine), self.signed)
+
+    def estimate(
+        self,
+        time: FloatArray,
+        force: FloatArray,
+        speed: FloatArray,
+        missing: StatusArray,
+        acceleration_time: FloatArray,
+        acceleration: FloatArray,
+        inertia: float,
+        viscous: float,
+    ) -> tuple[FloatArray, StatusArray]:
+        """One joint: friction (n,) and status (n,); every accelerometer sample is used once, at its own time."""
+        friction = np.zeros(len(time))
+        status = np.zeros(len(time), dtype=np.uint8)
+        run_filter(
+            time,
+            force,
+            speed,
+            missing,
+            acceleration_time,
+            acceleration,
+            inertia,
+            viscous,
+            self.friction_drift**2,
+            self.drift_acceleration**2,
+            self.drift_speed**2,
+            self.sigma_acceleration**2,
+            self.sigma_speed**2,
+            self.friction_drift**2 * _INITIAL_DRIFT_TIME,
+            self.minimum_speed,
+            _ACCELERATION_HOLD,
+            _GLITCH,
+            friction,
+            status,
+        )
+        return friction, status
+
+    def steady_state(self, inertia: float, speed: float, friction: float, period: float) -> tuple[FloatArray, float]:
+        """Estimator poles [rad/s], slowest first, and predicted variance of d in the steady state at a constant speed.
+
+        From the discrete algebraic Riccati equation with F, Q and R frozen; raises nothing for speed > 0.
+        """
+        from scipy.linalg import solve_discrete_are
+
+        transition = np.array(
+            [[1.0, 0.0, 0.0], [-speed / inertia, 0.0, -friction / inertia], [0.0, period, 1.0]],
+            dtype=np.float64,
+        )
+        observation = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        process = np.diag([self.friction_drift**2 * period, self.drift_acceleration**2, self.drift_speed**2])
+        noise = np.diag([self.sigma_acceleration**2, self.sigma_speed**2])
+        covariance = solve_discrete_are(transition.T, observation.T, process, noise)
+        innovation = observation @ covariance @ observation.T + noise
+        kalman_gain = covariance @ observation.T @ np.linalg.inv(innovation)
+        closed = (np.eye(3) - kalman_gain @ observation) @ transition
+        eigenvalues = np.linalg.eigvals(closed)
+        poles = np.sort(np.abs(np.log(np.maximum(np.abs(eigenvalues), math.exp(-700.0)) + 0j)) / period)
+        return np.asarray(poles.real, dtype=np.float64), float(covariance[0, 0])

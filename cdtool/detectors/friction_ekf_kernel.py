@@ -1,0 +1,204 @@
+"""The friction-estimating EKF's compiled recursion: three states, scalars unrolled.
+
+State (d, a, v), load side. Predict, all from the old state: d, (F - d v) / m, v + T a. The transition's Jacobian is
+[[1, 0, 0], [-v/m, 0, -d/m], [0, T, 1]]. The covariance is carried as its upper triangle (p11, p12, p13, p22, p23, p33),
+so that it stays symmetric; each measurement is a scalar update in Joseph form, which stays right for the gain that is
+forced to zero where the friction cannot be observed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.detection import StatusArray
+from cdtool.kernels import kernel
+from cdtool.recording import FloatArray
+
+Covariance = tuple[float, float, float, float, float, float]
+
+_SIX = "UniTuple(float64, 6)"
+
+
+@kernel(f"{_SIX}({_SIX}, float64, float64, float64, float64, float64, float64)")
+def predict_covariance(
+    p: Covariance, f21: float, f23: float, step: float, q_d: float, q_a: float, q_v: float
+) -> Covariance:
+    """F P F' + Q with F = [[1, 0, 0], [f21, 0, f23], [0, step, 1]], Q = diag(q_d, q_a, q_v)."""
+    p11, p12, p13, p22, p23, p33 = p
+    row_a1 = f21 * p11 + f23 * p13
+    row_a3 = f21 * p13 + f23 * p33
+    row_v2 = step * p22 + p23
+    row_v3 = step * p23 + p33
+    return (
+        p11 + q_d,
+        row_a1,
+        step * p12 + p13,
+        f21 * row_a1 + f23 * row_a3 + q_a,
+        f21 * (step * p12 + p13) + f23 * row_v3,
+        step * row_v2 + row_v3 + q_v,
+    )
+
+
+@kernel(f"{_SIX}({_SIX}, float64, float64, float64, float64)")
+def update_second(p: Covariance, k1: float, k2: float, k3: float, noise: float) -> Covariance:
+    """Joseph form (I - k e2') P (I - k e2')' + k R k' for a measurement of the second state."""
+    p11, p12, p13, p22, p23, p33 = p
+    m12 = p12 - k1 * p22
+    m22 = p22 - k2 * p22
+    m32 = p23 - k3 * p22
+    return (
+        p11 - k1 * p12 - m12 * k1 + noise * k1 * k1,
+        m12 - m12 * k2 + noise * k1 * k2,
+        p13 - k1 * p23 - m12 * k3 + noise * k1 * k3,
+        m22 - m22 * k2 + noise * k2 * k2,
+        p23 - k2 * p23 - m22 * k3 + noise * k2 * k3,
+        p33 - k3 * p23 - m32 * k3 + noise * k3 * k3,
+    )
+
+
+@kernel(f"{_SIX}({_SIX}, float64, float64, float64, float64)")
+def update_third(p: Covariance, k1: float, k2: float, k3: float, noise: float) -> Covariance:
+    """Joseph form (I - k e3') P (I - k e3')' + k R k' for a measurement of the third state."""
+    p11, p12, p13, p22, p23, p33 = p
+    m13 = p13 - k1 * p33
+    m23 = p23 - k2 * p33
+    m33 = p33 - k3 * p33
+    return (
+        p11 - k1 * p13 - m13 * k1 + noise * k1 * k1,
+        p12 - k1 * p23 - m13 * k2 + noise * k1 * k2,
+        m13 - m13 * k3 + noise * k1 * k3,
+        p22 - k2 * p23 - m23 * k2 + noise * k2 * k2,
+        m23 - m23 * k3 + noise * k2 * k3,
+        m33 - m33 * k3 + noise * k3 * k3,
+    )
+
+
+_READ = "Array(float64, 1, 'C', readonly=True)"
+
+
+@kernel(
+    f"void({_READ}, {_READ}, {_READ}, Array(uint8, 1, 'C', readonly=True), {_READ}, {_READ}, "
+    f"{', '.join(['float64'] * 11)}, float64[::1], uint8[::1])"
+)
+def run_filter(
+    time: FloatArray,
+    force: FloatArray,
+    speed: FloatArray,
+    missing: StatusArray,
+    acceleration_time: FloatArray,
+    acceleration: FloatArray,
+    inertia: float,
+    viscous: float,
+    q_d: float,
+    q_a: float,
+    q_v: float,
+    r_a: float,
+    r_v: float,
+    initial_variance: float,
+    minimum_speed: float,
+    acceleration_hold: float,
+    glitch: float,
+    friction: FloatArray,
+    status: StatusArray,
+) -> None:
+    """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
+
+    `speed` and `acceleration` may hold NaN (no sample), `force` may not; `missing`: force or speed is missing.
+    """
+    samples = len(acceleration)
+    next_sample = 0
+    started = False
+    p: Covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    d = viscous
+    a = 0.0
+    v = 0.0
+    now = 0.0
+    last_speed_time = 0.0
+    last_acceleration_time = -np.inf
+    held_force = 0.0
+    applicable = False
+    settled = 0.0
+    last_applicable = -np.inf
+    inverse_inertia = 1.0 / inertia
+    bandwidth_scale = np.sqrt(q_d / (r_a + q_a)) * inverse_inertia
+    for k in range(len(time)):
+        seen = np.isfinite(speed[k])
+        if started and time[k] - last_speed_time > 1.0:
+            started = False  # a long gap: nothing of the old state is worth keeping
+        if not started:
+            while next_sample < samples and acceleration_time[next_sample] <= time[k]:
+                if np.isfinite(acceleration[next_sample]):
+                    a = acceleration[next_sample]
+                    last_acceleration_time = acceleration_time[next_sample]
+                next_sample += 1
+            if not seen or missing[k]:
+                status[k] = 3
+                friction[k] = d
+                continue
+            started = True
+            d = viscous
+            v = speed[k]
+            p = (initial_variance, 0.0, 0.0, r_a, 0.0, r_v)
+            settled = 0.0
+            last_applicable = -np.inf
+            applicable = abs(v) >= minimum_speed
+            now = time[k]
+            last_speed_time = now
+            held_force = force[k]
+            friction[k] = d
+            status[k] = 1 if applicable else 2
+            continue
+        while True:
+            # The next event: an accelerometer sample of its own time, else the speed's time.
+            own_sample = next_sample < samples and acceleration_time[next_sample] <= time[k]
+            until = acceleration_time[next_sample] if own_sample else time[k]
+            step = until - now
+            if step > 0.0:
+                drift = q_d * step if applicable else 0.0
+                p = predict_covariance(p, -v * inverse_inertia, -d * inverse_inertia, step, drift, q_a, q_v)
+                old_a = a
+                a = (held_force - d * v) * inverse_inertia
+                v += step * old_a
+                now = until
+            if not own_sample:
+                break
+            sample = acceleration[next_sample]
+            if np.isfinite(sample) and step >= 0.0:
+                spread = 1.0 / (p[3] + r_a)
+                k1 = p[1] * spread if applicable else 0.0
+                k2 = p[3] * spread
+                k3 = p[4] * spread
+                surprise = sample - a
+                d += k1 * surprise
+                a += k2 * surprise
+                v += k3 * surprise
+                p = update_second(p, k1, k2, k3, r_a)
+                last_acceleration_time = until
+            next_sample += 1
+        if seen:
+            applicable = abs(speed[k]) >= minimum_speed
+            spread = 1.0 / (p[5] + r_v)
+            k1 = p[2] * spread if applicable else 0.0
+            k2 = p[4] * spread
+            k3 = p[5] * spread
+            surprise = speed[k] - v
+            d += k1 * surprise
+            a += k2 * surprise
+            v += k3 * surprise
+            p = update_third(p, k1, k2, k3, r_v)
+            since = time[k] - last_speed_time
+            # Rough bandwidth: ready once its integral over time reaches 3.
+            if applicable:
+                settled += bandwidth_scale * abs(speed[k]) * np.sqrt(since)
+                last_applicable = time[k]
+            elif time[k] - last_applicable > glitch:
+                settled = 0.0
+            last_speed_time = time[k]
+        held_force = force[k]
+        friction[k] = d
+        if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
+            status[k] = 3
+        elif not applicable:
+            status[k] = 2
+        elif settled < 3.0:
+            status[k] = 1

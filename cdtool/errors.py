@@ -1,0 +1,60 @@
+"""Errors that a user can act on, and the exit statuses of every command.
+
+Conventions: one line that names the file, the row or key and the value, then a hint that names the next step.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class ExitStatus(IntEnum):
+    """What a command's exit status tells a pipeline."""
+
+    OK = 0
+    LIMIT_BROKEN = 1
+    UNUSABLE = 2
+    INCOMPLETE = 3
+
+
+class CdtoolError(Exception):
+    """A known fault: `message` says what is wrong and where, `hint` what to do next."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message} ({self.hint})" if self.hint else self.message
+
+
+class UsageError(CdtoolError):
+    """A command or function was called with arguments that do not fit."""
+
+
+class ConfigurationError(CdtoolError):
+    """A machine file or benchmark file is wrong; the message names the key."""
+
+
+class RecordingError(CdtoolError):
+    """A recording cannot be read, or lacks what is needed."""
+
+
+class SignatureError(CdtoolError):
+    """A signature cannot be learned, read, or does not belong to what it is applied to."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Words that help after a wrong name: the nearest known ones first, then all of them."""
+    names = sorted(known)
+    close = get_close_matches(name, names, n=2, cutoff=0.5)
+    listed = ", ".join(names) if names else "none"
+    if close:
+        return f"did you mean {' or '.join(close)}? known: {listed}"
+    return f"known: {listed}"

@@ -1,0 +1,1 @@
+"""From alarms to figures that people can trust: onset, matching, statistics, results."""

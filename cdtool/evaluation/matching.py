@@ -1,0 +1,75 @@
+"""Alarms against contacts: one pass, one to one, everything else is derived from it.
+
+Conventions: latency = time of the sample whose processing raised the alarm (debounce included) - onset. A contact
+without an alarm in [onset - its uncertainty, onset + window] is missed: its latency is censored, never dropped. It is
+not assessable where the detector's signal was valid nowhere between onset and the window's end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cdtool.detection import Alarm, Signal
+from cdtool.recording import Contact
+
+Outcome = Literal["detected", "missed", "not_assessable"]
+
+
+@dataclass(frozen=True)
+class Match:
+    """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero."""
+
+    contact: Contact
+    outcome: Outcome
+    alarm: Alarm | None = None
+    latency: float = float("nan")
+    clipped: bool = False
+
+
+@dataclass(frozen=True)
+class Matching:
+    """Every contact with its outcome, and the alarms that belong to none."""
+
+    matches: tuple[Match, ...]
+    false_alarms: tuple[Alarm, ...]
+
+
+def match(alarms: Sequence[Alarm], contacts: Sequence[Contact], statistic: Signal, window: float = 1.0) -> Matching:
+    """Match in order of time: each contact takes the first alarm in its window that no earlier contact took.
+
+    An alarm outside every window, and not while the load cell still feels a contact, is false. One before a contact is
+    counted as false and does not hide the contact's own detection.
+    """
+    taken: set[int] = set()
+    matches = []
+    for contact in sorted(contacts, key=lambda item: item.start):
+        found = None
+        for i, alarm in enumerate(alarms):
+            if i not in taken and contact.start - contact.uncertainty <= alarm.time <= contact.start + window:
+                found = i
+                break
+        if found is None:
+            outcome: Outcome = "missed" if _assessable(statistic, contact, window) else "not_assessable"
+            matches.append(Match(contact, outcome))
+            continue
+        taken.add(found)
+        latency = alarms[found].time - contact.start
+        matches.append(Match(contact, "detected", alarms[found], max(latency, 0.0), latency < 0.0))
+    false = tuple(alarm for i, alarm in enumerate(alarms) if i not in taken and not _belongs(alarm, contacts, window))
+    return Matching(tuple(matches), false)
+
+
+def _belongs(alarm: Alarm, contacts: Sequence[Contact], window: float) -> bool:
+    return any(
+        contact.start - contact.uncertainty <= alarm.time <= max(contact.start + window, contact.end)
+        for contact in contacts
+    )
+
+
+def _assessable(statistic: Signal, contact: Contact, window: float) -> bool:
+    inside = (statistic.time >= contact.start) & (statistic.time <= contact.start + window)
+    return bool(np.any(statistic.valid[inside]))

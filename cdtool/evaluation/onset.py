@@ -1,0 +1,113 @@
+"""Ground truth: when did the contact begin? The load cell's onset, with its uncertainty.
+
+Conventions: the baseline and the noise come from the samples before the contact; a contact begins where the force,
+followed back from the first of `samples` samples above the upper level, left the lower level. State the rule in every
+report: in soft impacts the cell feels the contact tens of milliseconds after touch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.recording import Contact, FloatArray, Recording
+
+# Baseline and noise: this share of the recording from its start, and at least this many samples.
+_BASELINE_SHARE = 0.1
+_BASELINE_SAMPLES = 20
+# A standard deviation from the median absolute deviation of Gaussian noise.
+_MAD = 1.4826
+
+
+@dataclass(frozen=True)
+class OnsetRule:
+    """Upper level `above` and lower level `back_to` [N over the baseline]; None: from the noise (`sigmas`, half of it).
+
+    `samples` in succession above the upper level; contacts closer than `separation` [s] are one (a rebound).
+    """
+
+    above: float | None = None
+    back_to: float | None = None
+    samples: int = 3
+    sigmas: float = 8.0
+    separation: float = 1.0
+
+    @property
+    def described(self) -> str:
+        """The rule in words, for reports."""
+        above = f"{self.above:g} N" if self.above is not None else f"{self.sigmas:g} standard deviations of the noise"
+        back = f"{self.back_to:g} N" if self.back_to is not None else "half of it"
+        return f"load cell above {above} for {self.samples} samples, followed back to {back}"
+
+
+def find_contacts(recording: Recording, rule: OnsetRule) -> list[Contact]:
+    """Contacts by the load cell, else by the label channel; raises RecordingError where both are absent."""
+    if "force" in recording:
+        return _from_force(recording, rule)
+    if "label" in recording:
+        return _from_label(recording)
+    raise RecordingError(
+        f"{recording.name}: no ground truth: neither 'force' nor 'label' is mapped",
+        "map the load cell in [channels], or use cdtool detect",
+    )
+
+
+def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
+    series = recording["force"]
+    present = np.isfinite(series.values[:, 0])
+    time, force = series.time[present], series.values[present, 0]
+    if len(force) < rule.samples + 2:
+        return []
+    first = max(_BASELINE_SAMPLES, int(_BASELINE_SHARE * len(force)))
+    baseline = float(np.median(force[:first]))
+    noise = _MAD * float(np.median(np.abs(force[:first] - baseline)))
+    above = rule.above if rule.above is not None else max(rule.sigmas * noise, 1e-9)
+    back_to = min(rule.back_to if rule.back_to is not None else 0.5 * above, above)
+    over = np.abs(force - baseline)
+    high = over > above
+    run = high.copy()
+    for lag in range(1, rule.samples):
+        run[:-lag] &= high[lag:]
+        run[-lag:] = False
+    contacts: list[Contact] = []
+    starts = np.flatnonzero(run)
+    low = np.flatnonzero(over <= back_to)
+    searched = -np.inf
+    for k in starts:
+        if time[k] <= searched:
+            continue
+        before = low[np.searchsorted(low, k) - 1] if len(low) and low[0] < k else -1
+        onset = before + 1
+        end = _end_of_contact(time, over, int(k), back_to, rule.separation)
+        half_sample = 0.5 * float(np.median(np.diff(time)))
+        contacts.append(
+            Contact(
+                start=float(time[onset]),
+                end=float(time[end]),
+                uncertainty=half_sample + float(time[k] - time[onset]),
+                peak_force=float(np.max(over[onset : end + 1])),
+                found_by="load cell",
+            )
+        )
+        searched = float(time[end]) + rule.separation
+    return contacts
+
+
+def _end_of_contact(time: FloatArray, over: FloatArray, start: int, back_to: float, separation: float) -> int:
+    """The last sample above the lower level before the force stays below it for `separation` seconds."""
+    pressed = np.flatnonzero(over[start:] > back_to) + start
+    pauses = np.flatnonzero(np.diff(time[pressed]) > separation)
+    return int(pressed[pauses[0]] if len(pauses) else pressed[-1])
+
+
+def _from_label(recording: Recording) -> list[Contact]:
+    series = recording["label"]
+    touched = (np.nan_to_num(series.values[:, 0]) > 0.5).astype(int)
+    edges = np.diff(np.concatenate(([0], touched, [0])))
+    half_sample = 0.5 * series.period
+    return [
+        Contact(float(series.time[a]), float(series.time[b - 1]), half_sample, found_by="label")
+        for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    ]

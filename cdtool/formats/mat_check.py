@@ -1,0 +1,90 @@
+"""Is a .mat file (version 5 to 7) whole? scipy's reader ends the process, without an error, at some damaged ones.
+
+The file's elements are walked: each must lie within the one that holds it, and the numbers of an array must be of a
+known kind and as many as its dimensions say. https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from pathlib import Path
+
+from cdtool.errors import RecordingError
+
+MAGIC = b"MATLAB 5.0 MAT-file"
+_HEADER = 128
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBER_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
+_NUMERIC_CLASSES = range(6, 16)
+_COMPLEX = 1 << 11
+
+
+def check_whole(path: Path) -> None:
+    """Raises RecordingError, with the byte, if the file is cut off or damaged."""
+    content = path.read_bytes()
+    if not content.startswith(MAGIC) or len(content) < _HEADER:
+        raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with: save(name, ..., '-v7')")
+    order = ">" if content[126:128] == b"MI" else "<"
+    at = _HEADER
+    while at < len(content):
+        try:
+            kind, start, size = _tag(content, at, order)
+            element = content[start : start + size]
+            if kind == _COMPRESSED:
+                kind, element = _inflated(element, order)
+            if kind == _MATRIX:
+                _check_array(element, order)
+        except (ValueError, struct.error, zlib.error) as fault:
+            raise RecordingError(
+                f"{path}: damaged at byte {at}: {fault}", "copy the file anew or save it again"
+            ) from fault
+        at = start + size
+
+
+def _tag(content: bytes, at: int, order: str) -> tuple[int, int, int]:
+    """Kind, start and size of the element at a byte; raises ValueError where it does not lie in the content."""
+    kind, size = struct.unpack_from(f"{order}II", content, at)
+    start = at + 8
+    if kind >> 16:  # a small element: kind and size in two bytes each, the data in the other four
+        kind, size, start = kind & 0xFFFF, kind >> 16, at + 4
+        if size > 4:
+            raise ValueError(f"a small element claims {size} bytes")
+    if start + size > len(content):
+        raise ValueError(f"an element claims {size} bytes where {len(content) - start} are left")
+    return kind, start, size
+
+
+def _inflated(packed: bytes, order: str) -> tuple[int, bytes]:
+    # Never more than the element says of itself: its size is known from its first bytes.
+    stream = zlib.decompressobj()
+    kind, size = struct.unpack(f"{order}II", stream.decompress(packed, 8))
+    content = stream.decompress(stream.unconsumed_tail, size) if size else b""
+    if len(content) < size:
+        raise ValueError(f"an element claims {size} bytes and holds {len(content)}")
+    return kind, content
+
+
+def _check_array(content: bytes, order: str) -> None:
+    kind, at, size = _tag(content, 0, order)
+    if kind != 6 or size != 8:
+        raise ValueError("an array without its flags")
+    flags = struct.unpack_from(f"{order}I", content, at)[0]
+    if flags & 0xFF not in _NUMERIC_CLASSES:
+        return  # never read
+    kind, at, size = _tag(content, 16, order)
+    if kind != 5 or size % 4:
+        raise ValueError("an array without its dimensions")
+    count = math.prod(struct.unpack_from(f"{order}{size // 4}i", content, at))
+    _, at, size = _tag(content, _padded(at + size), order)
+    for _ in range(2 if flags & _COMPLEX else 1):
+        kind, at, size = _tag(content, _padded(at + size), order)
+        if kind not in _NUMBER_SIZES:
+            raise ValueError(f"an array holds numbers of an unknown kind ({kind})")
+        if size != count * _NUMBER_SIZES[kind]:
+            raise ValueError(f"an array of {count} numbers holds {size} bytes")
+
+
+def _padded(at: int) -> int:
+    return -(-at // 8) * 8

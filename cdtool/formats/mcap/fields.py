@@ -1,0 +1,151 @@
+"""The field language: `data`, `wrench.force.z`, `position[0]`, `position[:]`, `position[shoulder_joint]`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from cdtool.errors import RecordingError, nearest
+
+_STEP = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>[^\[\]]*)\])?")
+_LONGEST_ARRAY = 16
+
+Value = float | list[float] | None
+
+
+class FieldMissingError(Exception):
+    """The message has no such field; `known` are those that it has at this place."""
+
+    def __init__(self, problem: str, known: Sequence[str] = ()) -> None:
+        super().__init__(problem)
+        self.problem = problem
+        self.known = tuple(known)
+
+
+@dataclass(frozen=True)
+class Field:
+    """A parsed field; `of(message)` gives a number, a list, NaN for an empty array, None for a joint not in there."""
+
+    text: str
+    steps: tuple[tuple[str, str | None], ...]
+
+    def of(self, message: Any) -> Value:
+        """Its value in one message; raises FieldMissingError."""
+        value = message
+        for name, index in self.steps:
+            parent = value
+            value = _member(parent, name)
+            if index is None:
+                continue
+            if not _is_array(value):
+                raise FieldMissingError(f"'{name}' is not an array", [name])
+            if index == ":":
+                return [_number(item, self.text) for item in value]
+            if index.isdigit():
+                if len(value) == 0:
+                    return math.nan
+                if int(index) >= len(value):
+                    raise FieldMissingError(
+                        f"'{name}' has {len(value)} elements", [f"{name}[0] to {name}[{len(value) - 1}]"]
+                    )
+                value = value[int(index)]
+                continue
+            names = list(_member(parent, "name"))
+            if index not in names:
+                return None
+            place = names.index(index)
+            if place >= len(value):
+                return math.nan
+            value = value[place]
+        if _is_array(value):
+            raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
+        return _number(value, self.text)
+
+
+def parse_field(text: str, where: str) -> Field:
+    """A field of the machine file; raises RecordingError where it cannot be understood."""
+    steps = []
+    for part in re.split(r"\.(?![^\[]*\])", text):
+        match = _STEP.fullmatch(part)
+        if match is None or match["index"] == "":
+            raise RecordingError(
+                f"{where}: field '{text}' cannot be understood",
+                "e.g. data, wrench.force.z, position[0], position[:] or position[joint_name]",
+            )
+        steps.append((match["name"], match["index"]))
+    return Field(text, tuple(steps))
+
+
+def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[float]]:
+    """Every numeric field of a message but the header's stamp; arrays of up to 16 numbers as `name[:]`."""
+    found: dict[str, float | list[float]] = {}
+    for name in _member_names(message):
+        value = _member(message, name)
+        full = f"{prefix}{name}"
+        if full == "header.stamp":
+            continue
+        if _is_array(value):
+            if len(value) <= _LONGEST_ARRAY and all(_is_number(item) for item in value):
+                found[f"{full}[:]"] = [float(item) for item in value]
+        elif _is_number(value):
+            found[full] = float(value)
+        elif _member_names(value):
+            found.update(numeric_fields(value, f"{full}."))
+    return found
+
+
+def header_stamp(message: Any) -> int | None:
+    """The header's time stamp [ns], None where the message has none."""
+    try:
+        stamp = _member(_member(message, "header"), "stamp")
+    except FieldMissingError:
+        return None
+    for seconds, nanoseconds in (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs")):
+        names = _member_names(stamp)
+        if seconds in names and nanoseconds in names:
+            return int(_member(stamp, seconds)) * 10**9 + int(_member(stamp, nanoseconds))
+    return None
+
+
+def missing(where: str, text: str, fault: FieldMissingError) -> RecordingError:
+    """The error for a field that is not there, with the nearest known ones."""
+    return RecordingError(f"{where}: no field '{text}': {fault.problem}", nearest(text, fault.known))
+
+
+def _member(value: Any, name: str) -> Any:
+    if isinstance(value, dict):
+        if name in value:
+            return value[name]
+    elif name in _member_names(value):
+        return getattr(value, name)
+    known = _member_names(value)
+    raise FieldMissingError(f"there is no '{name}'", known)
+
+
+def _member_names(value: Any) -> Sequence[str]:
+    if isinstance(value, dict):
+        return [str(name) for name in value]
+    # The ROS 2 decoder makes a class for each message type, its fields being its slots.
+    if isinstance(value, SimpleNamespace):
+        return tuple(getattr(type(value), "__slots__", ())) or tuple(vars(value))
+    return ()
+
+
+def _is_array(value: Any) -> bool:
+    return hasattr(value, "__len__") and hasattr(value, "__getitem__") and not isinstance(value, str | dict)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)
+
+
+def _number(value: Any, text: str) -> float:
+    if value is None:  # JSON's null
+        return math.nan
+    if not _is_number(value):
+        raise FieldMissingError(f"'{text}' holds {str(value)[:40]!r}, not a number")
+    return float(value)

@@ -1,0 +1,89 @@
+"""machine.toml -> a machine, a channel map for columns and one for topics, and gains.
+
+Every error names the file, the key, the value and what is allowed. See docs/machine-file.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from cdtool.channels import ChannelMap, read_channel_map
+from cdtool.errors import ConfigurationError, nearest
+from cdtool.registry import Registry
+from cdtool.tables import Table, read_toml
+
+
+@dataclass(frozen=True)
+class MachineFile:
+    """A validated machine file: the machine, where its channels are, and gains that differ from the defaults."""
+
+    path: Path
+    machine: Any
+    columns: ChannelMap
+    topics: ChannelMap
+    gains: Mapping[str, Mapping[str, float]]
+    digest: str
+
+    def detector(self, name: str) -> Any:
+        """The detector of that (full or short) name with this file's gains."""
+        registry = _registry("cdtool.detectors", "DETECTORS")
+        full = registry.canonical(name)
+        return registry.load(full)(**self.gains.get(full, {}))
+
+
+def read_machine_file(path: str | Path) -> MachineFile:
+    """Read and check a machine file; raises ConfigurationError."""
+    file = Path(path)
+    values = read_toml(file)
+    root = Table(values, str(file))
+    table = root.table("machine", required=True)
+    machines = _registry("cdtool.machines", "MACHINES")
+    kind = table.choice("type", machines.names(plugins=True))
+    machine = machines.load(kind).from_table(table)
+    table.finish()
+    channels = root.table("channels")
+    columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
+    topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
+    gains = _read_gains(root.table("detectors"))
+    root.finish()
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+    return MachineFile(file, machine, columns, topics, gains, digest)
+
+
+def fingerprint(machine: Any) -> str:
+    """A hash of a machine's parameters: a signature belongs to exactly these."""
+    text = json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _read_gains(table: Table) -> dict[str, dict[str, float]]:
+    registry = _registry("cdtool.detectors", "DETECTORS")
+    gains: dict[str, dict[str, float]] = {}
+    for name in table.values:
+        known = {**{full: full for full in registry.names(plugins=True)}, **registry.short_names}
+        if name not in known:
+            raise table.fault(name, "unknown detector", nearest(name, known))
+        part = table.table(name)
+        allowed = [item.name for item in fields(registry.load(name))]
+        for key in part.values:
+            if key not in allowed:
+                raise part.fault(key, "unknown gain", nearest(key, allowed))
+        given = {key: part.number(key) for key in part.values}
+        try:
+            registry.load(name)(**given)
+        except ConfigurationError as fault:
+            raise ConfigurationError(f"{table.key(name)}: {fault.message}", fault.hint) from fault
+        gains[known[name]] = given
+    return gains
+
+
+def _registry(module: str, name: str) -> Registry:
+    # By name: this file lies below the folders whose classes it builds.
+    registry: Registry = getattr(import_module(module), name)
+    return registry

@@ -1,0 +1,13 @@
+"""What is known of a machine: inertia, friction, transmission. One file a type, named as in machine.toml."""
+
+from __future__ import annotations
+
+from cdtool.registry import Registry
+
+MACHINES = Registry(
+    kind="machine",
+    table={
+        "linear_axis": "cdtool.machines.linear_axis:LinearAxis",
+        "rotary_axis": "cdtool.machines.rotary_axis:RotaryAxis",
+    },
+)

@@ -1,0 +1,105 @@
+"""Cutting a recording into operations (strokes), by motion or by a trigger, classed by direction and speed.
+
+An operation keeps the recording's own time. Cutting and classing look at the whole recording: they say which signature
+belongs to a stroke, and nothing before an alarm depends on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.errors import RecordingError, UsageError, nearest
+from cdtool.motion import MotionClass, leading_joint, motion_class
+from cdtool.recording import BoolArray, Recording
+
+HOW_TO_CUT = ("whole", "motion", "trigger")
+
+# Share of the peak speed below which the axis counts as resting.
+_REST_SHARE = 0.05
+# A rest or a motion shorter than this [s] is a pause in a stroke, or no stroke.
+_SHORTEST_REST = 0.2
+_SHORTEST_MOTION = 0.2
+# How much of the rest before and after a stroke belongs to it [s]: detectors start up there.
+_MARGIN = 0.5
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One stroke: its part of the recording (named recording#n where cut), its class and n (0: the whole recording)."""
+
+    recording: Recording
+    motion: MotionClass
+    number: int = 0
+
+    @property
+    def name(self) -> str:
+        """The operation's name."""
+        return self.recording.name
+
+
+def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
+    """The operations of a recording: the whole of it, its motions, or its trigger's high phases.
+
+    Raises UsageError for an unknown way to cut, RecordingError where the recording lacks what it needs or holds none.
+    """
+    if how not in HOW_TO_CUT:
+        raise UsageError(f"unknown way to cut operations '{how}'", nearest(how, HOW_TO_CUT))
+    if how == "whole":
+        return [Operation(recording, motion_class(recording))]
+    spans = _motion_spans(recording) if how == "motion" else _trigger_spans(recording)
+    if not spans:
+        raise RecordingError(
+            f"{recording.name}: no operation found by {how}", "see cdtool info, or use --operations whole"
+        )
+    operations = []
+    for number, (start, end) in enumerate(spans, 1):
+        part = replace(recording.between(start, end), name=f"{recording.name}#{number}")
+        operations.append(Operation(part, motion_class(part), number))
+    return operations
+
+
+def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
+    series = recording["reference_speed" if "reference_speed" in recording else "speed"]
+    joint = leading_joint(series)
+    speed = np.nan_to_num(series.values[:, joint])
+    if not len(speed):
+        return []
+    rest = _REST_SHARE * float(np.percentile(np.abs(speed), 99.0))
+    sign = np.where(np.abs(speed) <= rest, 0, np.sign(speed)).astype(int)
+    strokes: list[list[float]] = []
+    direction = 0
+    for first, last in _runs(sign):
+        if sign[first] == 0:
+            continue
+        start, end = float(series.time[first]), float(series.time[last])
+        if strokes and direction == sign[first] and start - strokes[-1][1] < _SHORTEST_REST:
+            strokes[-1][1] = end
+        else:
+            strokes.append([start, end])
+            direction = int(sign[first])
+    strokes = [stroke for stroke in strokes if stroke[1] - stroke[0] >= _SHORTEST_MOTION]
+    return _with_margins(strokes, recording)
+
+
+def _trigger_spans(recording: Recording) -> list[tuple[float, float]]:
+    series = recording["trigger"]
+    high: BoolArray = np.nan_to_num(series.values[:, 0]) > 0.5
+    return [(float(series.time[a]), float(series.time[b])) for a, b in _runs(high.astype(int)) if high[a]]
+
+
+def _runs(values: np.ndarray[tuple[int], np.dtype[np.int_]]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(values)) + 1
+    starts = [0, *edges.tolist()]
+    ends = [*(edges - 1).tolist(), len(values) - 1]
+    return list(zip(starts, ends, strict=True))
+
+
+def _with_margins(strokes: list[list[float]], recording: Recording) -> list[tuple[float, float]]:
+    spans = []
+    for i, (start, end) in enumerate(strokes):
+        before = recording.start if i == 0 else 0.5 * (strokes[i - 1][1] + start)
+        after = recording.end if i == len(strokes) - 1 else 0.5 * (end + strokes[i + 1][0])
+        spans.append((max(before, start - _MARGIN), min(after, end + _MARGIN)))
+    return spans

@@ -1,0 +1,85 @@
+"""One operation through detector, threshold and activation. No files, no printing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.detection import Band, Signal, Status, Verdict
+from cdtool.detectors.base import Detector
+from cdtool.operations import Operation
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.signature import SPEED_TOLERANCE, FittedSignature
+
+
+@dataclass(frozen=True)
+class Detection:
+    """What a detector and its threshold say of one operation, with all that led there."""
+
+    operation: Operation
+    detector: str
+    statistic: Signal
+    band: Band
+    verdict: Verdict
+
+    @property
+    def assessed_seconds(self) -> float:
+        """For how long the operation was watched [s]: the time of the valid samples of its best-watched joint."""
+        if len(self.statistic.time) < 2:
+            return 0.0
+        period = float(np.median(np.diff(self.statistic.time)))
+        return period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
+
+
+def run_detector(operation: Operation, machine: Any, detector: Detector) -> Signal:
+    """The detector's signal of an operation; ground truth is taken away before it looks."""
+    return detector.signal(operation.recording.without_ground_truth(), machine)
+
+
+def detect_operation(
+    operation: Operation,
+    machine: Any,
+    detector: Detector,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+) -> Detection:
+    """Run the detector and hold it against the threshold of the operation's class.
+
+    Of several signatures the one of the operation's direction and speed serves; where none does, the verdict is "not
+    assessable". Raises RecordingError where the recording lacks a channel that the detector needs.
+    """
+    signal = run_detector(operation, machine, detector)
+    threshold, refused = choose_threshold(operation, thresholds)
+    if threshold is None:
+        nothing = np.full(signal.values.shape, np.nan)
+        status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
+        statistic = Signal(signal.time, signal.values, status, signal.unit, signal.signed)
+        verdict = Verdict("not assessable", reason=refused)
+        return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
+    statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
+    alarms = activation.alarms(statistic, band)
+    if alarms:
+        verdict = Verdict("alarm", alarms)
+    elif not statistic.valid.any():
+        shares = statistic.shares()
+        reason = ", ".join(f"{text} {100 * share:.0f} %" for text, share in shares.items()) or "no samples"
+        verdict = Verdict("not assessable", reason=reason)
+    else:
+        verdict = Verdict("no alarm")
+    return Detection(operation, detector.name, statistic, band, verdict)
+
+
+def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:
+    """The threshold that applies to an operation, or None and why."""
+    learned = [item for item in thresholds if isinstance(item, FittedSignature)]
+    if len(learned) < len(thresholds):
+        return next(item for item in thresholds if not isinstance(item, FittedSignature)), ""
+    for item in learned:
+        if item.motion.matches(operation.motion, SPEED_TOLERANCE):
+            return item, ""
+    known = " and ".join(item.motion.described for item in learned) or "nothing"
+    return None, f"no signature for its class: runs {operation.motion.described}, learned {known}"

@@ -1,0 +1,26 @@
+"""Text that came from files or users, made harmless for terminals, figures and reports."""
+
+from __future__ import annotations
+
+import unicodedata
+
+# Control, format (direction marks), surrogate and private characters, line and paragraph separators.
+_ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
+_NONCHARACTERS = frozenset("\ufffe\uffff")
+
+
+def plain(text: object) -> str:
+    """Text without control characters or direction marks that a terminal or a page would obey; "?" in their place."""
+    return "".join("?" if _is_active(character) else character for character in str(text))
+
+
+def shorten(text: str, length: int) -> str:
+    """The text, or its beginning and end with an ellipsis between them where it is longer than `length`."""
+    if len(text) <= length:
+        return text
+    tail = (length - 1) // 2
+    return f"{text[: length - 1 - tail]}…{text[len(text) - tail :]}"
+
+
+def _is_active(character: str) -> bool:
+    return character in _NONCHARACTERS or unicodedata.category(character) in _ACTIVE

@@ -1,0 +1,158 @@
+"""What was measured: Series, Recording, Contact. Frozen, SI, every channel with its own time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import RecordingError, nearest
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+MEASURED = ("torque", "speed", "position", "acceleration")
+REFERENCES = ("reference_position", "reference_speed", "reference_torque")
+GROUND_TRUTH = ("force", "label")
+TRIGGER = ("trigger",)
+CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd about a file or a channel: what, where, how often; `severity` tells note from warning."""
+
+    message: str
+    channel: str = ""
+    severity: Literal["note", "warning"] = "warning"
+
+    def __str__(self) -> str:
+        return f"{self.channel}: {self.message}" if self.channel else self.message
+
+
+@dataclass(frozen=True)
+class Series:
+    """One channel: `time` (n,) s strictly increasing, `values` (n, J) float64 in `unit`; NaN = no sample.
+
+    Raises RecordingError where the shapes do not fit or the time does not increase.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    unit: str
+
+    def __post_init__(self) -> None:
+        time = _frozen(self.time)
+        values = np.asarray(self.values, dtype=np.float64)
+        if values.ndim == 1:
+            values = values[:, np.newaxis]
+        if time.ndim != 1 or values.ndim != 2 or len(values) != len(time):
+            raise RecordingError(f"time has shape {time.shape}, values {values.shape}: (n,) and (n, J) are needed")
+        if not np.all(np.isfinite(time)) or (len(time) > 1 and not np.all(time[1:] > time[:-1])):
+            raise RecordingError("time does not strictly increase", "clean it with cdtool.clock.clean_time")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", _frozen(values))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def joint_count(self) -> int:
+        """J, the number of joints."""
+        return int(self.values.shape[1])
+
+    @property
+    def period(self) -> float:
+        """Median sample period [s]; NaN below two samples."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else float("nan")
+
+    def between(self, start: float, end: float) -> Series:
+        """The samples with start <= time <= end [s]."""
+        first = int(np.searchsorted(self.time, start, side="left"))
+        last = int(np.searchsorted(self.time, end, side="right"))
+        return replace(self, time=self.time[first:last], values=self.values[first:last])
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One log: its channels as Series, referred to the load side, each at its own rate.
+
+    `origin` is what has to be added to every time to get the source's own clock [s] (0 unless that is an epoch).
+    A channel that is absent is absent, never zeros.
+    """
+
+    name: str
+    source: str
+    joints: tuple[str, ...]
+    channels: Mapping[str, Series]
+    origin: float = 0.0
+    findings: tuple[Finding, ...] = ()
+    digest: str = ""
+
+    def __post_init__(self) -> None:
+        for name, series in self.channels.items():
+            if name not in CHANNELS:
+                raise RecordingError(f"{self.name}: unknown channel '{name}'", nearest(name, CHANNELS))
+            expected = (1,) if name in (*GROUND_TRUTH, *TRIGGER) else (len(self.joints),)
+            if series.joint_count not in expected:
+                raise RecordingError(
+                    f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
+                    "give one column a joint in [channels], in the order of machine.joints",
+                )
+
+    def __contains__(self, channel: str) -> bool:
+        return channel in self.channels
+
+    def __getitem__(self, channel: str) -> Series:
+        try:
+            return self.channels[channel]
+        except KeyError:
+            raise RecordingError(
+                f"{self.name}: no channel '{channel}'",
+                f"map it in [channels] of the machine file; mapped here: {', '.join(self.channels) or 'none'}",
+            ) from None
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample of any channel [s]."""
+        return min((float(s.time[0]) for s in self.channels.values() if len(s)), default=float("nan"))
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample of any channel [s]."""
+        return max((float(s.time[-1]) for s in self.channels.values() if len(s)), default=float("nan"))
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first sample to the last."""
+        return self.end - self.start
+
+    def between(self, start: float, end: float) -> Recording:
+        """The same recording, cut to start <= time <= end [s]; channels left without a sample are absent."""
+        parts = {name: series.between(start, end) for name, series in self.channels.items()}
+        return replace(self, channels={name: series for name, series in parts.items() if len(series)})
+
+    def without_ground_truth(self) -> Recording:
+        """What a detector or threshold may see: no load cell, no label."""
+        seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}
+        return replace(self, channels=seen)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A true impact: onset and end [s], the onset's uncertainty [s], its peak force [N] and how it was found."""
+
+    start: float
+    end: float
+    uncertainty: float
+    peak_force: float = float("nan")
+    found_by: str = "load cell"
+
+
+def _frozen(values: npt.ArrayLike) -> FloatArray:
+    array = np.ascontiguousarray(values, dtype=np.float64).view()
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,106 @@
+"""Figures without global state: object API, backend by suffix, plain text, the same bytes for the same input."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cdtool.errors import UsageError
+from cdtool.plain_text import plain, shorten
+from cdtool.report.files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+_DPI = 120
+_BACKENDS = {
+    ".png": "matplotlib.backends.backend_agg",
+    ".svg": "matplotlib.backends.backend_svg",
+    ".pdf": "matplotlib.backends.backend_pdf",
+}
+# A date, or the version of a library, would make other bytes of the same figure.
+_METADATA: dict[str, dict[str, Any]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
+    ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "cdtool", "Producer": None},
+}
+_STYLE: dict[str, object] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cdtool",
+    "pdf.fonttype": 42,
+    "text.parse_math": False,
+    "text.usetex": False,
+    "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "axes.linewidth": 0.7,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "hatch.linewidth": 0.6,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.05,
+}
+# Settings that are no appearance: a backend is never chosen here, and asking for some warns.
+_NOT_STYLE = ("backend", "interactive", "toolbar", "timezone", "tk.", "webagg.", "keymap.", "docstring.", "savefig.dir")
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """matplotlib's defaults and this project's style for a while, whatever the user's matplotlibrc says."""
+    import matplotlib
+
+    defaults: Any = matplotlib.rcParamsDefault
+    settings: Any = {key: defaults[key] for key in defaults if not key.startswith(_NOT_STYLE)} | _STYLE
+    with matplotlib.rc_context(settings), warnings.catch_warnings():
+        # A glyph that the font lacks is drawn as a box: nothing that a user could act on.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
+        warnings.filterwarnings("ignore", message="Matplotlib currently does not support", category=UserWarning)
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of that size [inch] that arranges itself; to be used within `drawing()`."""
+    from matplotlib.figure import Figure as NewFigure
+
+    return NewFigure(figsize=(width, height), dpi=_DPI, layout="constrained")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as its suffix says; raises UsageError for an unknown suffix, CdtoolError where it cannot."""
+    from importlib import import_module
+
+    from matplotlib.text import Text
+
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UsageError(f"{plain(path)} is no name for a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+    canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)
+    kind = suffix[1:]
+    with drawing():
+        write_whole(path, lambda stream: getattr(canvas, f"print_{kind}")(stream, metadata=_METADATA[suffix]))
+
+
+def label(text: object, length: int = 40) -> str:
+    """Text from a file as a figure shows it: plain and at most `length` characters."""
+    return shorten(plain(text), length)
+
+
+def unit_label(unit: str) -> str:
+    """A unit as it is written in print."""
+    return label({"m/s2": "m/s²", "rad/s2": "rad/s²", "1": "–"}.get(unit, unit), 16)

@@ -1,0 +1,177 @@
+"""The signature file: versioned JSON, checked against machine and detector, written atomically, updated under a lock."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import SignatureError, UsageError
+from cdtool.machine_file import fingerprint
+from cdtool.thresholds.signature import FittedSignature
+from cdtool.version import __version__
+
+SCHEMA_VERSION = 1
+_KIND = "cdtool signature"
+_LOCK_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class LearnedRun:
+    """A run that a signature was learned from: its name, the SHA-256 of its file, and which operation of it."""
+
+    name: str
+    sha256: str
+    operation: int = 0
+
+
+@dataclass(frozen=True)
+class SignatureFile:
+    """Signatures of one machine and one detector with its gains: one for each class of motion.
+
+    `first` keeps the signatures as first learned; `current` is what counts.
+    """
+
+    machine: str
+    machine_fingerprint: str
+    detector: str
+    gains: Mapping[str, float]
+    unit: str
+    joints: tuple[str, ...]
+    debounce: int | None
+    current: tuple[FittedSignature, ...]
+    first: tuple[FittedSignature, ...]
+    runs: tuple[LearnedRun, ...]
+    source: str = ""
+
+    def check(self, machine: Any, detector: Any) -> None:
+        """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
+        where = self.source or "signature"
+        if detector.name != self.detector:
+            raise SignatureError(f"{where}: learned with {self.detector}, not {detector.name}", "learn one for it")
+        if fingerprint(machine) != self.machine_fingerprint:
+            raise SignatureError(
+                f"{where}: learned on another machine ('{self.machine}', other parameters than '{machine.name}')",
+                "learn a signature with this machine file",
+            )
+        gains = asdict(detector)
+        for name, value in gains.items():
+            if self.gains.get(name) != value:
+                raise SignatureError(
+                    f"{where}: learned with {name} = {self.gains.get(name)}, the machine file has {value}",
+                    "learn again, or restore the gain in [detectors]",
+                )
+
+
+def write_signature(path: str | Path, signature: SignatureFile) -> None:
+    """Write atomically: a temporary file, fsync, rename, fsync of the folder. Raises SignatureError."""
+    file = Path(path)
+    text = json.dumps(_to_json(signature), allow_nan=False)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{file.name}.", suffix=".tmp", dir=file.parent)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                stream.write(text)
+                stream.flush()
+                os.fsync(stream.fileno())
+            Path(name).chmod(0o644)
+            Path(name).replace(file)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+        _sync_folder(file.parent)
+    except OSError as fault:
+        raise SignatureError(
+            f"{file}: cannot be written: {fault.strerror or fault}", "check folder and space"
+        ) from fault
+
+
+def read_signature(path: str | Path) -> SignatureFile:
+    """Read and check a signature file; raises SignatureError."""
+    file = Path(path)
+    try:
+        values = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SignatureError(f"{file}: no such file", "make it with cdtool learn-signature") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as fault:
+        raise SignatureError(
+            f"{file}: not a signature file: {fault}", "make one with cdtool learn-signature"
+        ) from fault
+    if not isinstance(values, dict) or values.get("kind") != _KIND:
+        raise SignatureError(f"{file}: not a signature file", "make one with cdtool learn-signature")
+    if values.get("schema_version") != SCHEMA_VERSION:
+        raise SignatureError(
+            f"{file}: schema_version is {values.get('schema_version')}, this cdtool knows {SCHEMA_VERSION}",
+            "learn it again with this version",
+        )
+    try:
+        return _from_json(values, str(file))
+    except (KeyError, TypeError, ValueError, UsageError) as fault:
+        raise SignatureError(f"{file}: damaged signature file: {fault!r}", "learn it again") from fault
+
+
+def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
+    """Read, change and write under a lock, so that no concurrent update is lost. Raises SignatureError."""
+    from filelock import FileLock, Timeout
+
+    file = Path(path)
+    try:
+        with FileLock(f"{file}.lock", timeout=_LOCK_SECONDS):
+            changed = change(read_signature(file))
+            write_signature(file, changed)
+            return changed
+    except Timeout as fault:
+        raise SignatureError(f"{file}: locked by another process", f"remove {file}.lock if none runs") from fault
+
+
+def with_run(signature: SignatureFile, index: int, updated: FittedSignature, run: LearnedRun) -> SignatureFile:
+    """The file with the class at `index` replaced and the run noted; the first signature stays."""
+    current = list(signature.current)
+    current[index] = updated
+    return replace(signature, current=tuple(current), runs=(*signature.runs, run))
+
+
+def _to_json(signature: SignatureFile) -> dict[str, Any]:
+    return {
+        "kind": _KIND,
+        "schema_version": SCHEMA_VERSION,
+        "tool_version": __version__,
+        "machine": {"name": signature.machine, "fingerprint": signature.machine_fingerprint},
+        "detector": {"name": signature.detector, "gains": dict(signature.gains)},
+        "unit": signature.unit,
+        "joints": list(signature.joints),
+        "debounce": signature.debounce,
+        "runs": [asdict(run) for run in signature.runs],
+        "current": [item.to_dict() for item in signature.current],
+        "first": [item.to_dict() for item in signature.first],
+    }
+
+
+def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
+    return SignatureFile(
+        machine=str(values["machine"]["name"]),
+        machine_fingerprint=str(values["machine"]["fingerprint"]),
+        detector=str(values["detector"]["name"]),
+        gains={str(name): float(value) for name, value in values["detector"]["gains"].items()},
+        unit=str(values["unit"]),
+        joints=tuple(values["joints"]),
+        debounce=None if values["debounce"] is None else int(values["debounce"]),
+        current=tuple(FittedSignature.from_dict(item) for item in values["current"]),
+        first=tuple(FittedSignature.from_dict(item) for item in values["first"]),
+        runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
+        source=source,
+    )
+
+
+def _sync_folder(folder: Path) -> None:
+    if not hasattr(os, "O_DIRECTORY"):
+        return  # Windows: a folder cannot be synced
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

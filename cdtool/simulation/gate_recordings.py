@@ -1,0 +1,181 @@
+"""Simulated gate runs as files, as a test bench would log them, with machine.toml, benchmark.toml and contacts.csv."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import UsageError
+from cdtool.simulation.gate_model import GateParameters, GateRun, Impact, simulate_gate_run
+from cdtool.units import UNITS
+
+# What the fictitious drive and sensors log: motor current, revolutions, an accelerometer mounted backward.
+_TORQUE_CONSTANT = 0.56  # N m/A
+_IMPACT_OF: Mapping[str, Impact] = {"free": "none", "holdout": "none", "stiff": "stiff", "soft": "soft"}
+GROUPS = tuple(_IMPACT_OF)
+# With the format "mixed" this many of each group are MCAP files.
+_MIXED_MCAP = 2
+# MCAP stamps count from a fixed instant, so that the same seed gives the same bytes.
+_EPOCH_NS = 1_700_000_000_000_000_000
+_DECIMALS = {
+    "t": "%.0f",
+    "i_motor": "%.4f",
+    "n_motor": "%.3f",
+    "phi": "%.5f",
+    "acc_x": "%.6f",
+    "load_cell": "%.5f",
+    "n_ref": "%.3f",
+    "i_ref": "%.4f",
+}
+
+
+@dataclass(frozen=True)
+class _Planned:
+    group: str
+    number: int
+    name: str
+    suffix: str
+
+
+def write_gate_recordings(
+    folder: Path,
+    counts: Mapping[str, int],
+    seed: int,
+    file_format: str = "csv",
+    progress: Callable[[int, int], None] | None = None,
+    parameters: GateParameters | None = None,
+) -> int:
+    """Write `counts` recordings of each group of GROUPS below `folder`; returns how many. Same seed, same bytes.
+
+    A run depends on seed, group and number alone, not on how many are written. `file_format` "mixed": the first two of
+    each group as MCAP, the others as CSV. Raises UsageError where nothing is to be written or the folder is not empty.
+    """
+    gate = parameters or GateParameters()
+    planned = list(_plan(counts, file_format))
+    if not planned:
+        raise UsageError("no recording is asked for", "give a number above 0 for --free, --holdout, --stiff or --soft")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
+    contacts = []
+    for done, item in enumerate(planned, 1):
+        rng = np.random.default_rng([seed, GROUPS.index(item.group), item.number])
+        run = simulate_gate_run(gate, rng, _IMPACT_OF[item.group])
+        path = folder / item.group / f"{item.name}{item.suffix}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        (_write_mcap if item.suffix == ".mcap" else _write_csv)(path, run)
+        if run.contact_start is not None:
+            contacts.append((f"{item.group}/{path.name}", f"{run.contact_start:.6f}", item.group))
+        if progress:
+            progress(done, len(planned))
+    (folder / "machine.toml").write_text(_machine_toml(gate), encoding="utf-8")
+    (folder / "benchmark.toml").write_text(_benchmark_toml(planned), encoding="utf-8")
+    with (folder / "contacts.csv").open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerows([("recording", "true_contact_s", "kind"), *contacts])
+    return len(planned)
+
+
+def _plan(counts: Mapping[str, int], file_format: str) -> Iterator[_Planned]:
+    for group in GROUPS:
+        count = counts.get(group, 0)
+        width = max(2, len(str(count)))
+        for number in range(1, count + 1):
+            as_mcap = file_format == "mcap" or (file_format == "mixed" and number <= _MIXED_MCAP)
+            yield _Planned(group, number, f"{number:0{width}d}", ".mcap" if as_mcap else ".csv")
+
+
+def _write_csv(path: Path, run: GateRun) -> None:
+    from cdtool.formats.csv import write_csv
+
+    rpm, gravity = UNITS["rpm"].factor, UNITS["g"].factor
+    columns = {
+        "t": run.time * 1e3,
+        "i_motor": run.motor_torque / _TORQUE_CONSTANT,
+        "n_motor": run.motor_speed / rpm,
+        "phi": run.motor_position,
+        "acc_x": -run.acceleration / gravity,
+        "load_cell": run.load_cell * 1e-3,
+        "n_ref": run.reference_speed / rpm,
+        "i_ref": run.reference_torque / _TORQUE_CONSTANT,
+    }
+    write_csv(path, columns, _DECIMALS)
+
+
+def _write_mcap(path: Path, run: GateRun) -> None:
+    from cdtool.formats.mcap.write import Stream, write_mcap
+
+    streams = [
+        Stream(
+            "/joint_states",
+            "sensor_msgs/msg/JointState",
+            run.time,
+            {"position[0]": run.motor_position, "velocity[0]": run.motor_speed, "effort[0]": run.motor_torque},
+        ),
+        Stream("/imu", "sensor_msgs/msg/Imu", run.time, {"linear_acceleration.x": -run.acceleration}),
+        Stream("/load_cell", "geometry_msgs/msg/WrenchStamped", run.time, {"wrench.force.x": run.load_cell}),
+        Stream(
+            "/reference",
+            "std_msgs/msg/Float64MultiArray",
+            run.time,
+            {"data[0]": run.reference_speed, "data[1]": run.reference_torque},
+        ),
+    ]
+    write_mcap(path, streams, start_ns=_EPOCH_NS)
+
+
+def _machine_toml(gate: GateParameters) -> str:
+    viscous = gate.viscous_friction * gate.transmission_ratio**2
+    return f"""# A simulated sliding gate (cdtool simulate gate): what its maker would know of it.
+[machine]
+type = "linear_axis"
+name = "gate"
+motor_inertia = {gate.motor_inertia:.4g}           # kg m2
+load_mass = {gate.leaf_mass:.6g}                 # kg
+transmission_ratio = {gate.transmission_ratio:.6g}  # m/rad: load travel per motor angle
+viscous_friction = {viscous:.5g}    # N m s/rad at the motor
+coulomb_friction = 0.0          # N m at the motor: not known, it goes into the signature
+
+[channels]                      # CSV: columns
+time = {{ column = "t", unit = "ms" }}
+torque = {{ column = "i_motor", unit = "A", scale = {_TORQUE_CONSTANT} }}  # scale: N m per A
+speed = {{ column = "n_motor", unit = "rpm" }}
+position = {{ column = "phi", unit = "rad" }}
+acceleration = {{ column = "acc_x", unit = "g", scale = -1 }}     # mounted backward
+force = {{ column = "load_cell", unit = "kN" }}                   # ground truth only
+reference_speed = {{ column = "n_ref", unit = "rpm" }}
+reference_torque = {{ column = "i_ref", unit = "A", scale = {_TORQUE_CONSTANT} }}
+
+[channels.mcap]                 # MCAP: topics, SI units
+torque = {{ topic = "/joint_states", field = "effort[0]" }}
+speed = {{ topic = "/joint_states", field = "velocity[0]" }}
+position = {{ topic = "/joint_states", field = "position[0]" }}
+acceleration = {{ topic = "/imu", field = "linear_acceleration.x", scale = -1 }}
+force = {{ topic = "/load_cell", field = "wrench.force.x" }}
+reference_speed = {{ topic = "/reference", field = "data[0]" }}
+reference_torque = {{ topic = "/reference", field = "data[1]" }}
+"""
+
+
+def _benchmark_toml(planned: list[_Planned]) -> str:
+    def logs(group: str) -> str:
+        suffixes = sorted({item.suffix for item in planned if item.group == group})
+        return ", ".join(f'"{group}/*{suffix}"' for suffix in suffixes)
+
+    groups = [group for group in GROUPS if any(item.group == group for item in planned)]
+    lines = [
+        "# Made by cdtool simulate gate. Paths are relative to this file.",
+        'machine = "machine.toml"',
+        'detectors = ["pi", "feekf", "gm", "igm", "pt"]',
+    ]
+    titles = {
+        "free": "[learn]",
+        "holdout": "[holdout]                       # impact-free, never learned from: false alarms",
+    }
+    for group in groups:
+        lines += ["", titles.get(group, f"[impacts.{group}]"), f"logs = [{logs(group)}]"]
+    lines += ["", "[onset]", "above_n = 20.0", "back_to_n = 8.0", ""]
+    return "\n".join(lines)

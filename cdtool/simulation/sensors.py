@@ -1,0 +1,113 @@
+"""Causal sensor models: what a resolver, a torque estimate and an accelerometer make of the truth.
+
+Every filter starts from zero and looks backward only, so no latency is flattered. Noise is handed in as
+standard normal samples: the caller owns the random generator.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665
+"""[m/s2]"""
+
+
+def low_pass(values: Array, time_constant: float, period: float) -> Array:
+    """First-order low-pass, exact for held input: y_k = a y_(k-1) + (1 - a) u_k.
+
+    a = exp(-period / time_constant); `time_constant` and `period` in s.
+    """
+    from scipy.signal import lfilter
+
+    keep = math.exp(-period / time_constant)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values), dtype=np.float64)
+
+
+def second_order_low_pass(values: Array, frequency: float, damping: float, period: float) -> Array:
+    """Second-order low-pass w^2 / (s^2 + 2 damping w s + w^2), w = 2 pi frequency [Hz], bilinear."""
+    from scipy.signal import lfilter
+
+    angle = 2.0 * math.pi * frequency
+    # Prewarped, so that the corner stays where it is stated.
+    rate = angle / math.tan(0.5 * angle * period)
+    square, cross = rate * rate, 2.0 * damping * angle * rate
+    numerator = angle * angle * np.array([1.0, 2.0, 1.0])
+    denominator = np.array(
+        [square + cross + angle * angle, 2.0 * (angle * angle - square), square - cross + angle * angle]
+    )
+    return np.asarray(lfilter(numerator, denominator, values), dtype=np.float64)
+
+
+def coloured_noise(white: Array, deviation: float, rate: float, period: float) -> Array:
+    """Ornstein-Uhlenbeck noise x' = -rate x + w of std `deviation`, from x = 0; `rate` in rad/s.
+
+    x_k = a x_(k-1) + deviation sqrt(1 - a^2) white_k with a = exp(-rate period): exact at the samples.
+    """
+    from scipy.signal import lfilter
+
+    keep = math.exp(-rate * period)
+    return np.asarray(lfilter([deviation * math.sqrt(1.0 - keep * keep)], [1.0, -keep], white), dtype=np.float64)
+
+
+def resonance(white: Array, deviation: float, frequency: float, damping: float, period: float) -> Array:
+    """Response y'' + 2 damping w y' + w^2 y = noise of a structural mode, of std `deviation`.
+
+    y_k = b1 y_(k-1) + b2 y_(k-2) + gain white_k has the poles of the mode; the gain is that of the stationary
+    variance (1 - b2) / ((1 + b2) ((1 - b2)^2 - b1^2)). `frequency` in Hz.
+    """
+    from scipy.signal import lfilter
+
+    angle = 2.0 * math.pi * frequency * period
+    radius = math.exp(-damping * angle)
+    first = 2.0 * radius * math.cos(angle * math.sqrt(1.0 - damping * damping))
+    second = -radius * radius
+    variance = (1.0 - second) / ((1.0 + second) * ((1.0 - second) ** 2 - first * first))
+    gain = deviation / math.sqrt(variance)
+    return np.asarray(lfilter([gain], [1.0, -first, -second], white), dtype=np.float64)
+
+
+def quantise_down(values: Array, step: float) -> Array:
+    """The next lower multiple of `step`, as a resolver counts; `step` = 0 is an ideal sensor."""
+    return np.asarray(np.floor(values / step) * step if step > 0.0 else values, dtype=np.float64)
+
+
+def resolver_speed(position: Array, step: float, frequency: float, period: float) -> Array:
+    """Speed from a resolver: quantised position, difference, two first-order low-passes of `frequency` Hz.
+
+    The first sample has no predecessor and counts as standstill. Units are those of `position` per second.
+    """
+    counted = quantise_down(position, step)
+    speed = np.diff(counted, prepend=counted[0]) / period
+    time_constant = 1.0 / (2.0 * math.pi * frequency)
+    return low_pass(low_pass(speed, time_constant, period), time_constant, period)
+
+
+def measured_torque(torque: Array, white: Array, noise: float, time_constant: float, period: float) -> Array:
+    """Torque from the motor current: a low-pass of `time_constant` s over torque + noise white."""
+    return low_pass(torque + noise * white, time_constant, period)
+
+
+def accelerometer(
+    acceleration: Array,
+    vibration: Array,
+    white: Array,
+    *,
+    noise: float,
+    bias: float,
+    frequency: float,
+    damping: float,
+    resolution: float,
+    period: float,
+) -> Array:
+    """A MEMS reading: LP2(acceleration + vibration + noise white + bias), rounded to `resolution` [m/s2].
+
+    `frequency` [Hz] and `damping` belong to the sensor's low-pass; `resolution` = 0 is unquantised.
+    """
+    sensed = acceleration + vibration + noise * white + bias
+    reading = second_order_low_pass(sensed, frequency, damping, period)
+    return np.asarray(np.rint(reading / resolution) * resolution if resolution > 0.0 else reading, dtype=np.float64)

@@ -1,0 +1,140 @@
+"""Reading a TOML table so that every error names the file, the key and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import ConfigurationError, nearest
+
+
+class Table:
+    """A table of a TOML file; what is not asked for by `finish()` is an unknown key."""
+
+    def __init__(self, values: Mapping[str, Any], where: str, prefix: str = "") -> None:
+        self.values = values
+        self.where = where
+        self.prefix = prefix
+        self._asked: list[str] = []
+
+    def key(self, name: str) -> str:
+        """File and full key, for an error message."""
+        return f"{self.where}: {self.prefix}{name}"
+
+    def fault(self, name: str, problem: str, hint: str = "") -> ConfigurationError:
+        """An error about one key."""
+        return ConfigurationError(f"{self.key(name)}: {problem}", hint)
+
+    def __contains__(self, name: str) -> bool:
+        self._note(name)
+        return name in self.values
+
+    def raw(self, name: str, default: Any = None) -> Any:
+        """The value as TOML has it."""
+        self._note(name)
+        return self.values.get(name, default)
+
+    def number(
+        self, name: str, default: float | None = None, *, minimum: float = -math.inf, above: float = -math.inf
+    ) -> float:
+        """A finite number, at least `minimum` and more than `above`; required without a default."""
+        value = self.raw(name)
+        if value is None:
+            if default is None:
+                raise self.fault(name, "is missing", f"a number{_range_text(minimum, above)} is needed")
+            return default
+        return self._checked(name, value, minimum, above)
+
+    def numbers(
+        self,
+        name: str,
+        count: int,
+        default: float | None = None,
+        *,
+        minimum: float = -math.inf,
+        above: float = -math.inf,
+    ) -> tuple[float, ...]:
+        """One number for all joints, or a list with one for each."""
+        value = self.raw(name)
+        if not isinstance(value, list):
+            return (self.number(name, default, minimum=minimum, above=above),) * count
+        if len(value) != count:
+            raise self.fault(name, f"has {len(value)} values", f"one number, or {count}: one a joint")
+        return tuple(self._checked(f"{name}[{i}]", item, minimum, above) for i, item in enumerate(value))
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """A string; required without a default."""
+        value = self.raw(name)
+        if value is None:
+            if default is None:
+                raise self.fault(name, "is missing", "a text is needed")
+            return default
+        if not isinstance(value, str):
+            raise self.fault(name, f"is {value!r}", "a text in quotes is needed")
+        return value
+
+    def choice(self, name: str, allowed: Sequence[str], default: str | None = None) -> str:
+        """One of the allowed words."""
+        value = self.text(name, default)
+        if value not in allowed:
+            raise self.fault(name, f"is '{value}'", nearest(value, allowed))
+        return value
+
+    def texts(self, name: str, default: Sequence[str] | None = None) -> tuple[str, ...]:
+        """A list of strings; one string alone is taken as a list of one."""
+        value = self.raw(name)
+        if value is None and default is not None:
+            return tuple(default)
+        if isinstance(value, str):
+            return (value,)
+        if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
+            raise self.fault(name, "is missing" if value is None else f"is {value!r}", "a list of texts is needed")
+        return tuple(value)
+
+    def table(self, name: str, required: bool = False) -> Table:
+        """A table below this one; an empty one where it is absent and not required."""
+        value = self.raw(name)
+        if value is None and not required:
+            value = {}
+        if not isinstance(value, dict):
+            problem = "is missing" if value is None else f"is {value!r}"
+            raise self.fault(name, problem, f"a table [{self.prefix}{name}] is needed")
+        return Table(value, self.where, f"{self.prefix}{name}.")
+
+    def finish(self) -> None:
+        """Raise ConfigurationError if a key is left that nobody asked for."""
+        for name in self.values:
+            if name not in self._asked:
+                raise self.fault(name, "unknown key", nearest(name, self._asked))
+
+    def _note(self, name: str) -> None:
+        if name not in self._asked:
+            self._asked.append(name)
+
+    def _checked(self, name: str, value: Any, minimum: float, above: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self.fault(name, f"is {value!r}", f"a number{_range_text(minimum, above)} is needed")
+        if value < minimum or value <= above:
+            raise self.fault(name, f"is {value}", f"a number{_range_text(minimum, above)} is needed")
+        return float(value)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file; raises ConfigurationError with the file and the line."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigurationError(f"{path}: no such file", "check the path") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault}", "a UTF-8 text file is needed") from fault
+    except tomllib.TOMLDecodeError as fault:
+        raise ConfigurationError(f"{path}: not valid TOML: {fault}", "see docs/machine-file.md") from fault
+
+
+def _range_text(minimum: float, above: float) -> str:
+    if above > -math.inf:
+        return f" above {above:g}"
+    return f" of at least {minimum:g}" if minimum > -math.inf else ""

@@ -1,0 +1,62 @@
+"""Where in its stroke an operation is, sample by sample and causally: time since motion start, travel, phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.clock import previous_value
+from cdtool.recording import BoolArray, FloatArray, Recording
+
+ALIGNMENTS = ("time_then_position", "time", "position")
+# The motion has started once this many speed samples in succession exceed the start speed.
+_CONFIRM = 3
+
+
+@dataclass(frozen=True)
+class Progress:
+    """On a signal's clock (n,): `elapsed` s since motion start, `travel` since then, `running` past acceleration.
+
+    NaN (and False) before the motion has started. Travel is a running maximum: it freezes where the axis runs backward.
+    """
+
+    elapsed: FloatArray
+    travel: FloatArray
+    running: BoolArray
+
+
+def progress(
+    recording: Recording,
+    clock: FloatArray,
+    direction: int,
+    start_speed: float,
+    running_speed: float,
+    joint: int,
+) -> Progress:
+    """Progress from measured speed and position of the leading joint; everything at or before each sample."""
+    speed = recording["speed"]
+    forward = direction * speed.values[:, joint]
+    moving = forward >= start_speed
+    for lag in range(1, _CONFIRM):
+        moving[lag:] &= forward[:-lag] >= start_speed
+    moving[: _CONFIRM - 1] = False
+    elapsed = np.full(len(clock), np.nan)
+    travel = np.full(len(clock), np.nan)
+    running = np.zeros(len(clock), dtype=bool)
+    starts = np.flatnonzero(moving)
+    if not len(starts):
+        return Progress(elapsed, travel, running)
+    start = float(speed.time[starts[0]])
+    begun = clock >= start
+    elapsed[begun] = clock[begun] - start
+    fast = np.flatnonzero((forward >= running_speed) & (speed.time >= start))
+    if len(fast):
+        running = clock >= speed.time[fast[0]]
+    position = direction * previous_value(recording["position"], clock)[:, joint]
+    along = np.where(begun, position, np.nan)
+    known = np.flatnonzero(np.isfinite(along))
+    if len(known):
+        reached = np.fmax.accumulate(np.where(np.isnan(along), -np.inf, along))
+        travel = np.where(begun & np.isfinite(reached), reached - along[known[0]], np.nan)
+    return Progress(elapsed, travel, running)

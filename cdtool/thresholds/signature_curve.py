@@ -1,0 +1,153 @@
+"""Mean and spread of many runs along one axis (time since motion start, or travel): a signature's statistics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from cdtool.detection import Signal
+from cdtool.recording import FloatArray
+from cdtool.thresholds.alignment import Progress
+
+# A grid point has a limit once this share of the runs has been there.
+_COVERAGE = 0.8
+# The spread is nowhere below this share of its median: a quantised signal may not vary at all at some points.
+_SMALLEST_SPREAD = 0.1
+
+
+@dataclass(frozen=True)
+class Curve:
+    """On the grid 0, step, 2 step, ...: `count`, `mean` and `squares` (sum of squared deviations), each (g, J).
+
+    `window` is how far neighbours are pooled to either side, in the unit of the grid.
+    """
+
+    step: float
+    window: float
+    count: FloatArray
+    mean: FloatArray
+    squares: FloatArray
+
+    @classmethod
+    def empty(cls, step: float, window: float, end: float, joints: int) -> Self:
+        """A curve without runs from 0 to `end`."""
+        shape = (math.floor(end / step) + 1, joints)
+        return cls(step, window, np.zeros(shape), np.zeros(shape), np.zeros(shape))
+
+    @property
+    def grid(self) -> FloatArray:
+        """The grid points (g,)."""
+        points: FloatArray = np.arange(len(self.count), dtype=np.float64) * self.step
+        return points
+
+    @property
+    def end(self) -> float:
+        """The last grid point that enough runs have reached."""
+        covered = np.flatnonzero((self.count >= self._enough()).all(axis=1))
+        return float(covered[-1] * self.step) if len(covered) else 0.0
+
+    def learned(self, samples: FloatArray) -> Curve:
+        """The statistics of runs resampled on the grid, (runs, g, J), NaN where a run has no valid value."""
+        present = np.isfinite(samples)
+        count = present.sum(axis=0).astype(np.float64)
+        total = np.where(present, samples, 0.0).sum(axis=0)
+        mean = np.divide(total, count, out=np.zeros_like(total), where=count > 0)
+        squares = np.where(present, (samples - mean) ** 2, 0.0).sum(axis=0)
+        return replace(self, count=count, mean=mean, squares=squares)
+
+    def updated(self, sample: FloatArray, forget: float | None) -> Curve:
+        """With one more run (g, J): Welford's update, or forgetting with an effective number of runs."""
+        present = np.isfinite(sample)
+        deviation = np.where(present, sample - self.mean, 0.0)
+        if forget is None:
+            count = self.count + present
+            mean = self.mean + np.divide(deviation, count, out=np.zeros_like(deviation), where=count > 0)
+            squares = self.squares + deviation * np.where(present, sample - mean, 0.0)
+            return replace(self, count=count, mean=mean, squares=squares)
+        known = present & (self.count >= 2)
+        weight = 1.0 / forget
+        variance = self._variance()
+        moved = (1.0 - weight) * (variance + weight * deviation**2)
+        squares = np.where(known, moved * np.maximum(self.count - 1.0, 1.0), self.squares)
+        return replace(self, mean=self.mean + np.where(known, weight * deviation, 0.0), squares=squares)
+
+    def band(self, pooled: bool) -> tuple[FloatArray, FloatArray]:
+        """Mean and spread (g, J), NaN where too few runs have been.
+
+        Pooled: the mean smoothed over the window, and the spread from the variance pooled over the window, the mean's
+        deviation from its smoothed course included. Otherwise point by point.
+        """
+        known = self.count >= self._enough()
+        mean, variance = self.mean, self._variance()
+        if pooled:
+            reach = round(self.window / self.step)
+            mean = _moving_mean(self.mean, known, reach)
+            variance = _moving_mean(variance + (self.mean - mean) ** 2, known, reach)
+        spread = np.sqrt(variance)
+        for j in range(spread.shape[1]):
+            if known[:, j].any():
+                floor = _SMALLEST_SPREAD * float(np.median(spread[known[:, j], j]))
+                spread[:, j] = np.maximum(spread[:, j], floor)
+        return np.where(known, mean, np.nan), np.where(known, spread, np.nan)
+
+    def at(self, values: FloatArray, axis: FloatArray) -> FloatArray:
+        """Values given on the grid, between grid points by a straight line; NaN outside the grid."""
+        result: FloatArray = np.interp(axis, self.grid, values, left=np.nan, right=np.nan)
+        # A limit of infinity is infinity between two grid points too, where interpolation would give NaN.
+        nearest = np.clip(np.rint(np.nan_to_num(axis) / self.step).astype(int), 0, len(values) - 1)
+        return np.where(np.isinf(values[nearest]), values[nearest], result)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        arrays = {name: getattr(self, name).tolist() for name in ("count", "mean", "squares")}
+        return {"step": self.step, "window": self.window, **arrays}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`."""
+        arrays = (np.array(values[name], dtype=np.float64) for name in ("count", "mean", "squares"))
+        return cls(float(values["step"]), float(values["window"]), *arrays)
+
+    def _enough(self) -> float:
+        return max(2.0, math.ceil(_COVERAGE * float(self.count.max(initial=0.0))))
+
+    def _variance(self) -> FloatArray:
+        return self.squares / np.maximum(self.count - 1.0, 1.0)
+
+
+def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) -> FloatArray:
+    """One run's values (g, J) on a curve's grid: the sample of the first passage of each grid point, NaN without one.
+
+    A sample, not a value between two: interpolation would average their noise and make the spread too small.
+    """
+    result = np.full((len(curve.count), signal.values.shape[1]), np.nan)
+    grid = curve.grid
+    for j in range(result.shape[1]):
+        use = np.flatnonzero(signal.valid[:, j] & np.isfinite(where.elapsed) & np.isfinite(axis))
+        if not len(use):
+            continue
+        along = axis[use]
+        passing = np.concatenate(([True], along[1:] > np.maximum.accumulate(along)[:-1]))
+        along, values = along[passing], signal.values[use, j][passing]
+        at = np.searchsorted(along, grid, side="left")
+        # Behind a stretch without valid samples the next sample is too far on to stand for the grid point.
+        reached = np.flatnonzero(at < len(along))
+        near = reached[along[at[reached]] - grid[reached] <= 2.0 * curve.step]
+        result[near, j] = values[at[near]]
+    return result
+
+
+def _moving_mean(values: FloatArray, known: Any, reach: int) -> FloatArray:
+    """Mean over the known neighbours within `reach` grid points to either side."""
+    weights = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(known, axis=0)))
+    totals = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(np.where(known, values, 0.0), axis=0)))
+    points = np.arange(len(values))
+    first, last = np.maximum(points - reach, 0), np.minimum(points + reach + 1, len(values))
+    number = weights[last] - weights[first]
+    total = totals[last] - totals[first]
+    mean: FloatArray = np.divide(total, number, out=np.zeros_like(total), where=number > 0)
+    return mean

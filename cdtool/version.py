@@ -1,0 +1,8 @@
+"""The installed version, without importing anything heavy."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+try:
+    __version__ = version("cdtool")
+except PackageNotFoundError:  # a source tree that was never installed
+    __version__ = "0+unknown"

@@ -1,0 +1,80 @@
+"""Do the accelerometer's sign and scale fit the derivative of the speed? A check, not a detector."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.recording import Finding, FloatArray, Recording
+
+# Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.
+_WINDOW = 0.2
+# Below this correlation the motion does not say enough.
+_TELLING = 0.5
+_STANDARD_GRAVITY = 9.80665
+
+
+def accelerometer_findings(recording: Recording) -> list[Finding]:
+    """Slope of the measured acceleration over the speed's derivative, joint by joint, as findings."""
+    recording = _before_contact(recording)
+    if "acceleration" not in recording or "speed" not in recording:
+        return []
+    found = []
+    for j, joint in enumerate(recording.joints):
+        expected, measured = _pairs(recording, j)
+        name = f" of {joint}" if len(recording.joints) > 1 else ""
+        found.append(_judge(expected, measured, name))
+    return found
+
+
+def _before_contact(recording: Recording) -> Recording:
+    """In a contact the elastic drive parts motor and load: only what lies before the first one can be compared."""
+    try:
+        contacts = find_contacts(recording, OnsetRule())
+    except RecordingError:
+        return recording
+    return recording.between(-np.inf, contacts[0].start) if contacts else recording
+
+
+def _judge(expected: FloatArray, measured: FloatArray, name: str) -> Finding:
+    if len(expected) < 5 or np.std(expected) == 0.0 or np.std(measured) == 0.0:
+        return Finding(f"accelerometer{name} cannot be checked: the speed hardly changes", "acceleration", "note")
+    correlation = float(np.corrcoef(expected, measured)[0, 1])
+    slope = float(np.polyfit(expected, measured, 1)[0])
+    if abs(correlation) < _TELLING:
+        text = f"accelerometer{name} cannot be checked: correlation with the speed's derivative {correlation:.2f}"
+        return Finding(text, "acceleration", "note")
+    figures = f"slope {slope:.3g}, correlation {correlation:.2f} over the speed's derivative"
+    if slope < 0.0:
+        return Finding(f"accelerometer{name} has the opposite sign ({figures}): give scale = -1", "acceleration")
+    for factor, advice in (
+        (_STANDARD_GRAVITY, "the log may hold m/s2, not g"),
+        (1 / _STANDARD_GRAVITY, "the log may hold g"),
+    ):
+        if 0.7 < slope / factor < 1.4:
+            return Finding(f"accelerometer{name} has the wrong scale ({figures}): {advice}", "acceleration")
+    if not 0.7 < slope < 1.4:
+        return Finding(f"accelerometer{name} has the wrong scale ({figures}): check unit and ratio", "acceleration")
+    return Finding(f"accelerometer{name} fits the speed ({figures})", "acceleration", "note")
+
+
+def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
+    """Over successive windows: the speed's gain / window, and the mean acceleration."""
+    speed, acceleration = recording["speed"], recording["acceleration"]
+    edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), _WINDOW)
+    if len(edges) < 3:
+        return np.empty(0), np.empty(0)
+    known = np.isfinite(speed.values[:, joint])
+    if np.count_nonzero(known) < 2:
+        return np.empty(0), np.empty(0)
+    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / _WINDOW
+    bins = np.digitize(acceleration.time, edges) - 1
+    means = np.full(len(edges) - 1, np.nan)
+    values = acceleration.values[:, joint]
+    for i in range(len(means)):
+        part = values[(bins == i) & np.isfinite(values)]
+        if len(part):
+            means[i] = part.mean()
+    good = np.isfinite(means) & np.isfinite(gained)
+    return gained[good], means[good]

@@ -1,0 +1,269 @@
+"""Many recordings, many detectors: learn, detect, match, count."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.clock import previous_value
+from cdtool.errors import CdtoolError, RecordingError, SignatureError
+from cdtool.evaluation.matching import Match, Matching, match
+from cdtool.evaluation.onset import find_contacts
+from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results, Skipped
+from cdtool.kernels import compile_loaded
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection, detect_operation, run_detector
+from cdtool.recording import Contact
+from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.version import __version__
+from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.learning import fit_signatures
+from cdtool.workflows.runs import Progress, in_order, load_operations, load_runs, shown_path, told
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One operation with every detector's detection: what a plot needs."""
+
+    group: str
+    operation: Operation
+    contacts: tuple[Contact, ...]
+    detections: tuple[Detection, ...]
+    matchings: tuple[Matching, ...]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """The results, the traces of one recording a group, and where the time went [s]."""
+
+    results: Results
+    traces: tuple[Trace, ...]
+    seconds: Mapping[str, float]
+
+
+@dataclass
+class _Scored:
+    """What one log gave."""
+
+    traces: list[Trace] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)
+    findings: list[Skipped] = field(default_factory=list)
+    digest: tuple[str, str] | None = None
+    reading: float = 0.0
+    detecting: float = 0.0
+
+
+def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Progress | None = None) -> Benchmark:
+    """Learn every detector's threshold, run them over all groups, match alarms with contacts.
+
+    A log that cannot be read or scored is left out and named in `results.skipped`. Raises ConfigurationError for a wrong
+    file, SignatureError where nothing can be learned, RecordingError where nothing could be scored.
+    """
+    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
+    machine_file = setup.machine_file
+    detectors = [machine_file.detector(name) for name in setup.detectors]
+    compile_loaded()
+    begin = perf_counter()
+    learn = load_runs(setup.learn, machine_file, setup.operations, jobs=jobs, base=setup.path.parent)
+    learned_at = perf_counter()
+    thresholds, skipped = _learn(setup, learn.operations, detectors, learn.skipped)
+    seconds = {"reading": learned_at - begin, "detecting": perf_counter() - learned_at}
+    work = [(group, path) for group in setup.groups for path in _paths(setup, group)]
+    activation = Activation(setup.debounce)
+
+    def score(item: tuple[str, Path]) -> _Scored:
+        return _score(setup, item[0], item[1], detectors, thresholds, activation)
+
+    traces: dict[str, Trace] = {}
+    contacts: list[ContactResult] = []
+    false_alarms: list[FalseAlarmResult] = []
+    exposure: dict[tuple[str, str], list[float]] = {}
+    skipped = [*learn.skipped, *skipped]
+    findings = list(learn.findings)
+    digests = {op.recording.source: op.recording.digest for op in learn.operations}
+    for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
+        skipped += scored.skipped
+        findings += scored.findings
+        if scored.digest:
+            digests[scored.digest[0]] = scored.digest[1]
+        seconds["reading"] += scored.reading
+        seconds["detecting"] += scored.detecting
+        for trace in scored.traces:
+            contacts += _contact_results(trace, group)
+            false_alarms += _false_alarm_results(trace, group)
+            for detection in trace.detections:
+                figures = exposure.setdefault((group, detection.detector), [0, 0.0, 0, 0])
+                figures[0] += 1
+                figures[1] += detection.assessed_seconds / 3600.0
+                figures[2] += detection.verdict.outcome == "not assessable"
+            if len(trace.detections) > len(traces[group].detections if group in traces else ()):
+                traces[group] = trace
+        for name in {detection.detector for trace in scored.traces for detection in trace.detections}:
+            exposure[group, name][3] += 1
+    if not exposure:
+        reason = f"; first reason: {skipped[0].recording}: {skipped[0].reason}" if skipped else ""
+        raise RecordingError(f"{setup.path}: no recording could be scored{reason}", "check with cdtool info")
+    results = Results(
+        provenance=_provenance(setup, detectors, thresholds, digests, learn.operations),
+        detectors=setup.detectors,
+        groups=setup.groups,
+        contacts=tuple(contacts),
+        false_alarms=tuple(false_alarms),
+        exposure=tuple(
+            ExposureResult(group, name, int(n[3]), int(n[0]), n[1], int(n[2])) for (group, name), n in exposure.items()
+        ),
+        skipped=tuple(skipped),
+        findings=tuple(findings),
+    )
+    return Benchmark(results, tuple(traces[group] for group in setup.groups if group in traces), seconds)
+
+
+def _learn(
+    setup: BenchmarkFile, operations: Sequence[Operation], detectors: Sequence[Any], unread: Sequence[Skipped]
+) -> tuple[dict[str, tuple[FittedThreshold, ...]], list[Skipped]]:
+    thresholds: dict[str, tuple[FittedThreshold, ...]] = {}
+    skipped: list[Skipped] = []
+    machine = setup.machine_file.machine
+    for detector in detectors:
+        if setup.threshold == "signature":
+            fitted, _, left_out = fit_signatures(operations, machine, detector, setup.signature, unread)
+            thresholds[detector.name] = fitted
+            skipped += left_out
+        else:
+            if not operations:
+                raise SignatureError(f"no run to learn {detector.name} from", "check with cdtool info")
+            pairs = [(op.recording.without_ground_truth(), run_detector(op, machine, detector)) for op in operations]
+            thresholds[detector.name] = (THRESHOLDS.load(setup.threshold)().fit(pairs),)
+    return thresholds, skipped
+
+
+def _score(
+    setup: BenchmarkFile,
+    group: str,
+    path: Path,
+    detectors: Sequence[Any],
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    activation: Activation,
+) -> _Scored:
+    scored = _Scored()
+    begin = perf_counter()
+    try:
+        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
+        contacts = [] if group == HOLDOUT else find_contacts(recording, setup.onset)
+        if group != HOLDOUT and not contacts:
+            raise RecordingError(
+                f"{path}: no contact found ({setup.onset.described})",
+                "lower [onset] above_n, or move the log to [holdout]",
+            )
+    except CdtoolError as fault:
+        scored.skipped.append(Skipped(shown_path(path, setup.path.parent), str(fault)))
+        scored.reading = perf_counter() - begin
+        return scored
+    scored.reading = perf_counter() - begin
+    scored.digest = (recording.source, recording.digest)
+    scored.findings = told(recording)
+    for operation in operations:
+        part = operation.recording
+        inside = tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
+        detections, matchings = [], []
+        for detector in detectors:
+            try:
+                detection = detect_operation(
+                    operation, setup.machine_file.machine, detector, thresholds[detector.name], activation
+                )
+            except CdtoolError as fault:
+                scored.skipped.append(Skipped(operation.name, str(fault)))
+                continue
+            detections.append(detection)
+            matchings.append(match(detection.verdict.alarms, inside, detection.statistic, setup.window))
+        scored.traces.append(Trace(group, operation, inside, tuple(detections), tuple(matchings)))
+    scored.detecting = perf_counter() - begin - scored.reading
+    return scored
+
+
+def _contact_results(trace: Trace, group: str) -> list[ContactResult]:
+    recording = trace.operation.recording
+    return [
+        ContactResult(
+            recording=recording.name,
+            group=group,
+            detector=detection.detector,
+            joint=recording.joints[found.alarm.joint] if found.alarm else None,
+            onset_s=found.contact.start,
+            onset_uncertainty_s=found.contact.uncertainty,
+            alarm_s=found.alarm.time if found.alarm else None,
+            latency_ms=1e3 * found.latency if found.alarm else None,
+            outcome=found.outcome,
+            force_at_alarm_n=_force_at_alarm(trace, found),
+            peak_force_n=found.contact.peak_force if np.isfinite(found.contact.peak_force) else None,
+            clipped=found.clipped,
+            reason=detection.verdict.reason or None if found.outcome == "not_assessable" else None,
+        )
+        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
+        for found in matching.matches
+    ]
+
+
+def _false_alarm_results(trace: Trace, group: str) -> list[FalseAlarmResult]:
+    recording = trace.operation.recording
+    return [
+        FalseAlarmResult(recording.name, group, detection.detector, recording.joints[alarm.joint], alarm.time)
+        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
+        for alarm in matching.false_alarms
+    ]
+
+
+def _force_at_alarm(trace: Trace, found: Match) -> float | None:
+    recording = trace.operation.recording
+    if found.alarm is None or "force" not in recording:
+        return None
+    force = float(previous_value(recording["force"], np.array([found.alarm.time]))[0, 0])
+    return force if np.isfinite(force) else None
+
+
+def _provenance(
+    setup: BenchmarkFile,
+    detectors: Sequence[Any],
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    digests: Mapping[str, str],
+    learned: Sequence[Operation],
+) -> dict[str, Any]:
+    base = setup.path.parent
+    return {
+        "tool": "cdtool",
+        "tool_version": __version__,
+        "benchmark_sha256": setup.digest,
+        "machine": setup.machine_file.machine.name,
+        "machine_sha256": setup.machine_file.digest,
+        "gains": {detector.name: asdict(detector) for detector in detectors},
+        "threshold": setup.threshold,
+        "signature_rule": {**asdict(setup.signature), "safety_factor": setup.signature.factor},
+        "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
+        "learned_runs": [operation.name for operation in learned],
+        "debounce_samples": setup.debounce,
+        "window_s": setup.window,
+        "onset": setup.onset.described,
+        "operations": setup.operations,
+        "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
+        "short_names": {detector.name: detector.short_name for detector in detectors},
+        "logs_sha256": {shown_path(Path(source), base): digest for source, digest in sorted(digests.items())},
+    }
+
+
+def _digest(thresholds: Sequence[FittedThreshold]) -> str:
+    import hashlib
+    import json
+
+    text = json.dumps([item.to_dict() for item in thresholds], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _paths(setup: BenchmarkFile, group: str) -> tuple[Path, ...]:
+    return setup.holdout if group == HOLDOUT else setup.impacts[group]

@@ -1,0 +1,71 @@
+"""Running one detector over one log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.activation import Activation
+from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.pipeline import Detection, detect_operation
+from cdtool.recording import Contact, Recording
+from cdtool.signature_store import read_signature
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.limit import Limit
+from cdtool.workflows.runs import load_operations
+
+
+@dataclass(frozen=True)
+class Detected:
+    """A log, what the detector says of each of its operations, and the contacts where the log has ground truth."""
+
+    recording: Recording
+    detections: tuple[Detection, ...]
+    contacts: tuple[Contact, ...]
+
+
+def detect(
+    log: str | Path,
+    machine: str | Path | MachineFile,
+    *,
+    signature: str | Path | None = None,
+    detector: str | None = None,
+    limit: Sequence[float] = (),
+    operations: str = "whole",
+    debounce: int | None = None,
+    onset: OnsetRule | None = None,
+) -> Detected:
+    """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
+
+    Raises UsageError where neither or both are given, SignatureError where the signature does not belong,
+    RecordingError where the log cannot be read.
+    """
+    if (signature is None) == (not limit):
+        raise UsageError("one threshold is needed: a signature or a limit", "give --signature FILE or --limit VALUE")
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    thresholds: tuple[FittedThreshold, ...]
+    if signature is not None:
+        stored = read_signature(signature)
+        instance = machine_file.detector(detector or stored.detector)
+        stored.check(machine_file.machine, instance)
+        thresholds = stored.current
+        debounce = stored.debounce if debounce is None else debounce
+    else:
+        if detector is None:
+            raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
+        instance = machine_file.detector(detector)
+        thresholds = (Limit.given(limit, len(machine_file.machine.joints)),)
+    activation = Activation(debounce)
+    recording, parts = load_operations(Path(log), machine_file, operations)
+    detections = tuple(detect_operation(part, machine_file.machine, instance, thresholds, activation) for part in parts)
+    return Detected(recording, detections, _contacts(recording, onset or OnsetRule()))
+
+
+def _contacts(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]:
+    try:
+        return tuple(find_contacts(recording, rule))
+    except RecordingError:
+        return ()  # without ground truth there are alarms, but no latency

@@ -1,0 +1,156 @@
+"""What is in a log: channels, units, rates, gaps and everything that is odd, all findings at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.errors import CdtoolError
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.motion import motion_class
+from cdtool.operations import operations_of
+from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.workflows.accelerometer_check import accelerometer_findings
+from cdtool.workflows.runs import read_log
+
+
+@dataclass(frozen=True)
+class ChannelInfo:
+    """One channel or column: how many samples, how fast, from where to where."""
+
+    name: str
+    unit: str
+    samples: int
+    missing: int
+    rate_hz: float | None
+    start_s: float | None
+    duration_s: float | None
+    minimum: float | None
+    maximum: float | None
+
+
+@dataclass(frozen=True)
+class Info:
+    """A log: without a machine file its columns as they stand, with one its channels on the load side."""
+
+    source: str
+    format: str
+    details: Mapping[str, str]
+    channels: tuple[ChannelInfo, ...]
+    findings: tuple[Finding, ...]
+
+
+def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
+    """Survey a log; with a machine file also map it, cut it and check the accelerometer. Raises RecordingError."""
+    from cdtool.formats.reading import survey
+
+    source = survey(Path(log))
+    if machine is None:
+        channels = [
+            _describe(name, column.unit or "", column.values, column.time) for name, column in source.columns.items()
+        ]
+        return Info(str(log), source.format, source.details, tuple(channels), source.findings)
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    recording = read_log(log, machine_file)
+    channels = [
+        _describe(_label(name, recording, j), series.unit, series.values[:, j], series.time)
+        for name, series in recording.channels.items()
+        for j in range(series.joint_count)
+    ]
+    findings = [*recording.findings, *_motion_findings(recording), *accelerometer_findings(recording)]
+    findings += _bandwidth_findings(recording, machine_file)
+    return Info(str(log), source.format, source.details, tuple(channels), tuple(dict.fromkeys(findings)))
+
+
+def _label(name: str, recording: Recording, joint: int) -> str:
+    many = recording[name].joint_count > 1
+    return f"{name} [{recording.joints[joint]}]" if many else name
+
+
+def _describe(name: str, unit: str, values: FloatArray, time: FloatArray | None) -> ChannelInfo:
+    numbers = values.astype(np.float64).ravel()
+    present = numbers[np.isfinite(numbers)]
+    steps = np.diff(time) if time is not None and len(time) > 1 else np.empty(0)
+    period = float(np.median(steps)) if len(steps) else 0.0
+    return ChannelInfo(
+        name=name,
+        unit=unit,
+        samples=len(values),
+        missing=len(numbers) - len(present),
+        rate_hz=1.0 / period if period > 0.0 else None,
+        start_s=float(time[0]) if time is not None and len(time) else None,
+        duration_s=float(time[-1] - time[0]) if time is not None and len(time) else None,
+        minimum=float(present.min()) if len(present) else None,
+        maximum=float(present.max()) if len(present) else None,
+    )
+
+
+def _motion_findings(recording: Recording) -> list[Finding]:
+    if "speed" not in recording:
+        return [Finding("neither speed nor position is mapped: no operation can be cut or classed", "speed", "note")]
+    motion = motion_class(recording)
+    if motion.direction == 0:
+        return [Finding("the axis does not move", "speed", "note")]
+    unit = recording["speed"].unit
+    try:
+        strokes = len(operations_of(recording, "motion"))
+    except CdtoolError:
+        strokes = 0
+    word = "forward" if motion.direction > 0 else "backward"
+    text = f"{strokes} strokes by motion; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
+    return [Finding(text, "speed", "note"), *_consistency(recording)]
+
+
+def _consistency(recording: Recording) -> list[Finding]:
+    """Does the mapped speed fit the derivative of the mapped position?"""
+    derived = any(
+        item.channel in ("speed", "position") and "not in the log" in item.message for item in recording.findings
+    )
+    if derived or "position" not in recording:
+        return []
+    found = []
+    speed, position = recording["speed"], recording["position"]
+    for j in range(speed.joint_count):
+        way = _travelled(speed, j)
+        seen = float(np.nanmax(position.values[:, j]) - np.nanmin(position.values[:, j]))
+        signed = (
+            float(position.values[-1, j] - position.values[0, j])
+            if np.isfinite(position.values[[0, -1], j]).all()
+            else 0.0
+        )
+        if way[1] <= 0.0 or seen <= 0.0:
+            continue
+        if not 0.8 < way[1] / seen < 1.25:
+            found.append(Finding(f"integrates to {way[1]:.4g}, the position spans {seen:.4g}: check units", "speed"))
+        elif abs(signed) > 0.5 * seen and np.sign(signed) != np.sign(way[0]):
+            found.append(Finding("has the opposite sign of the position's derivative", "speed"))
+    return found
+
+
+def _travelled(speed: Series, joint: int) -> tuple[float, float]:
+    values = np.nan_to_num(speed.values[:, joint])
+    path = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(speed.time))))
+    return float(path[-1]), float(path.max() - path.min())
+
+
+def _bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
+    """How fast the friction EKF can be on this log: its poles at the nominal speed."""
+    if not all(channel in recording for channel in ("torque", "speed", "acceleration")):
+        return []
+    detector: Any = machine_file.detector("friction_ekf")
+    motion = motion_class(recording)
+    if motion.nominal_speed < detector.minimum_speed:
+        return [
+            Finding(f"nominal speed below minimum_speed ({detector.minimum_speed:g}): not applicable", "friction_ekf")
+        ]
+    axis = machine_file.machine.axes[motion.joint]
+    force = np.nanmedian(np.abs(recording["torque"].values[:, motion.joint]))
+    friction = float(force) / motion.nominal_speed
+    poles, _ = detector.steady_state(axis.inertia, motion.nominal_speed, friction, recording["speed"].period)
+    slow, quick = float(poles[0]), float(poles[1])
+    text = f"poles at {motion.nominal_speed:.3g} {recording['speed'].unit}: {slow:.3g} and {quick:.3g} rad/s"
+    return [Finding(text, "friction_ekf", "note")]

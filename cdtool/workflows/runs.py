@@ -1,0 +1,125 @@
+"""From file names to operations: globs, reading many recordings, cutting them, naming what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
+from cdtool.evaluation.results import Skipped
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import Operation, operations_of
+from cdtool.recording import Recording
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+# Called after each piece of work with what is done and how much there is.
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The operations of some logs, what was left out, and findings worth telling."""
+
+    operations: tuple[Operation, ...]
+    skipped: tuple[Skipped, ...]
+    findings: tuple[Skipped, ...]
+
+
+def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
+    """Files that the patterns name below `base`, each once and in order; raises ConfigurationError for no match."""
+    found: dict[Path, None] = {}
+    for pattern in patterns:
+        path = base / pattern
+        matches = [path] if path.is_file() else sorted(_glob(path))
+        if not matches:
+            raise ConfigurationError(f"{key}: nothing matches '{pattern}' in {base}", "check the path")
+        found.update(dict.fromkeys(matches))
+    return list(found)
+
+
+def in_order(
+    work: Callable[[Item], Made], items: Sequence[Item], jobs: int, progress: Progress | None
+) -> Iterator[Made]:
+    """`work` of each item, in order whatever `jobs` is; kernels and parsers run without the interpreter lock."""
+    if jobs <= 1:
+        for i, item in enumerate(items, 1):
+            yield work(item)
+            if progress:
+                progress(i, len(items))
+        return
+    with ThreadPoolExecutor(jobs) as pool:
+        for i, made in enumerate(pool.map(work, items), 1):
+            yield made
+            if progress:
+                progress(i, len(items))
+
+
+def read_log(log: str | Path, machine: str | Path | MachineFile) -> Recording:
+    """A recording on the load side, through a machine file; raises CdtoolError, naming the file."""
+    from cdtool.formats.reading import read_recording
+
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    recording = read_recording(Path(log), machine_file)
+    if not recording.channels:
+        raise RecordingError(f"{log}: no channel is mapped", "write [channels] in the machine file")
+    return recording
+
+
+def load_operations(
+    path: Path, machine_file: MachineFile, how: str, base: Path | None = None
+) -> tuple[Recording, list[Operation]]:
+    """One log's recording, named by its path below `base`, and its operations; raises CdtoolError, naming the file."""
+    recording = replace(read_log(path, machine_file), name=shown_path(path, base))
+    return recording, operations_of(recording, how)
+
+
+def load_runs(
+    paths: Sequence[Path],
+    machine_file: MachineFile,
+    how: str,
+    *,
+    jobs: int = 1,
+    base: Path | None = None,
+    progress: Progress | None = None,
+) -> Runs:
+    """The operations of many logs; a log that cannot be read is left out and named, the others go on."""
+    operations: list[Operation] = []
+    skipped: list[Skipped] = []
+    findings: list[Skipped] = []
+
+    def load(path: Path) -> tuple[Recording, list[Operation]] | CdtoolError:
+        try:
+            return load_operations(path, machine_file, how, base)
+        except CdtoolError as fault:
+            return fault
+
+    for path, loaded in zip(paths, in_order(load, paths, jobs, progress), strict=True):
+        if isinstance(loaded, CdtoolError):
+            skipped.append(Skipped(shown_path(path, base), str(loaded)))
+            continue
+        recording, parts = loaded
+        operations.extend(parts)
+        findings.extend(told(recording))
+    return Runs(tuple(operations), tuple(skipped), tuple(findings))
+
+
+def shown_path(path: Path, base: Path | None = None) -> str:
+    """How results name a log: its path below `base`, else as given; with forward slashes on every system."""
+    if base is not None and path.is_relative_to(base):
+        return path.relative_to(base).as_posix()
+    return path.as_posix()
+
+
+def told(recording: Recording) -> list[Skipped]:
+    """The warnings among a recording's findings, under its name."""
+    return [Skipped(recording.name, str(item)) for item in recording.findings if item.severity == "warning"]
+
+
+def _glob(path: Path) -> Iterator[Path]:
+    root = Path(path.anchor) if path.is_absolute() else Path()
+    pattern = str(path.relative_to(root)) if path.is_absolute() else str(path)
+    return (match for match in root.glob(pattern) if match.is_file())

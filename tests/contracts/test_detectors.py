@@ -1,0 +1,202 @@
+"""What holds for every registered detector."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool.detectors
+from cdtool.detection import Status
+from cdtool.detectors import DETECTORS
+from cdtool.errors import CdtoolError, RecordingError
+from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
+
+NAMES = DETECTORS.names()
+
+
+def cut(recording: Recording, end: float) -> Recording:
+    return recording.between(-np.inf, end)
+
+
+def changed(recording: Recording, channel: str, values: np.ndarray) -> Recording:
+    series = recording[channel]
+    return replace(recording, channels={**recording.channels, channel: replace(series, values=values)})
+
+
+def test_every_file_of_the_folder_with_a_detector_is_registered():
+    folder = Path(cdtool.detectors.__file__).parent
+    helpers = {"__init__", "base", "friction_ekf_kernel"}
+    modules = {path.stem for path in folder.glob("*.py")} - helpers
+    assert modules == set(DETECTORS.table)
+    for name, target in DETECTORS.table.items():
+        assert target.split(":")[0] == f"cdtool.detectors.{name}"
+        assert DETECTORS.load(name).name == name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_a_frozen_dataclass_whose_gains_have_default_unit_and_meaning(name):
+    detector = DETECTORS.load(name)
+    assert is_dataclass(detector) and detector.__dataclass_params__.frozen
+    for item in fields(detector):
+        assert isinstance(item.default, float)
+        assert item.metadata["unit"] and item.metadata["meaning"]
+    assert detector.short_name in DETECTORS.short_names
+    assert set(detector.needs) <= set(CHANNELS) - set(GROUND_TRUTH)
+    assert detector.__doc__ and len(detector.__doc__) > 80
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ["stiff", "none"])
+def test_it_is_causal_its_output_on_a_prefix_is_the_prefix_of_its_output(name, kind, gate, simulated):
+    recording = simulated(kind, 1)
+    detector = DETECTORS.load(name)()
+    whole = detector.signal(recording, gate)
+    for end in (0.0105, 0.4, 1.2345, 3.0, 6.02, 6.1):
+        part = detector.signal(cut(recording, end), gate)
+        n = len(part.time)
+        assert n == np.searchsorted(whole.time, end, side="right")
+        np.testing.assert_array_equal(part.values, whole.values[:n])
+        np.testing.assert_array_equal(part.status, whole.status[:n])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_causal_with_channels_at_rates_of_their_own(name, gate, simulated):
+    recording = simulated("stiff", 2)
+    slower = {
+        "torque": recording["torque"].between(0.0003, 9.0),
+        "acceleration": Series(
+            recording["acceleration"].time[::3] + 0.0004, recording["acceleration"].values[::3], "m/s2"
+        ),
+    }
+    recording = replace(recording, channels={**recording.channels, **slower})
+    detector = DETECTORS.load(name)()
+    whole = detector.signal(recording, gate)
+    for end in (1.2345, 3.0001, 6.02):
+        part = detector.signal(cut(recording, end), gate)
+        n = len(part.time)
+        np.testing.assert_array_equal(part.values, whole.values[:n])
+        np.testing.assert_array_equal(part.status, whole.status[:n])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_never_reads_the_load_cell(name, gate, simulated):
+    recording = simulated("stiff", 1)
+    detector = DETECTORS.load(name)()
+    with_cell = detector.signal(recording, gate)
+    without = detector.signal(recording.without_ground_truth(), gate)
+    np.testing.assert_array_equal(with_cell.values, without.values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_time_shift_changes_nothing_but_the_time(name, gate, simulated):
+    recording = simulated("soft", 1)
+    shift = 512.0  # a power of two: the time steps keep their bits but for the last few
+    moved = replace(
+        recording,
+        channels={n: replace(s, time=s.time + shift) for n, s in recording.channels.items()},
+    )
+    detector = DETECTORS.load(name)()
+    here, there = detector.signal(recording, gate), detector.signal(moved, gate)
+    np.testing.assert_allclose(there.values, here.values, rtol=1e-6, atol=1e-6 * np.abs(here.values).max())
+    assert np.mean(there.status != here.status) < 1e-3
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("channel", ["torque", "speed", "acceleration"])
+def test_missing_samples_are_masked_and_the_estimate_recovers(name, channel, gate, simulated):
+    detector = DETECTORS.load(name)()
+    if channel not in detector.needs:
+        pytest.skip(f"{name} does not read {channel}")
+    recording = simulated("none", 3)
+    values = recording[channel].values.copy()
+    hole = slice(2500, 2700)
+    values[hole] = np.nan
+    clean = detector.signal(recording, gate)
+    holed = detector.signal(changed(recording, channel, values), gate)
+    assert np.isfinite(holed.values[holed.valid]).all()
+    inside = (holed.time >= 2.56) & (holed.time <= 2.69)
+    assert not holed.valid[inside].any()
+    assert set(np.unique(holed.status[inside])) <= {Status.GAP, Status.START_UP}
+    end = slice(5000, None)
+    assert holed.valid[end].mean() == pytest.approx(clean.valid[end].mean(), abs=0.01)
+    spread = clean.values[clean.valid].std()
+    assert np.abs(holed.values[end] - clean.values[end]).max() < 0.05 * spread
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scattered_missing_samples_leave_the_other_samples_valid(name, gate, simulated):
+    detector = DETECTORS.load(name)()
+    recording = simulated("none", 4)
+    rng = np.random.default_rng(0)
+    for channel in detector.needs:
+        values = recording[channel].values.copy()
+        values[rng.random(len(values)) < 0.05] = np.nan
+        recording = changed(recording, channel, values)
+    signal = detector.signal(recording, gate)
+    assert np.isfinite(signal.values[signal.valid]).all()
+    running = signal.time > 3.0
+    assert 0.8 < signal.valid[running].mean() < 0.97
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_all_missing_channel_is_never_valid_and_never_crashes(name, gate, simulated):
+    detector = DETECTORS.load(name)()
+    for channel in detector.needs:
+        recording = simulated("none", 3)
+        blind = changed(recording, channel, np.full_like(recording[channel].values, np.nan))
+        assert not detector.signal(blind, gate).valid.any()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_absent_channel_is_an_error_that_names_it(name, gate, simulated):
+    detector = DETECTORS.load(name)()
+    for channel in detector.needs:
+        recording = simulated("none", 3)
+        left = {n: s for n, s in recording.channels.items() if n != channel}
+        with pytest.raises(RecordingError, match=channel):
+            detector.signal(replace(recording, channels=left), gate)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("samples", [0, 1, 2])
+def test_a_recording_of_hardly_any_samples_gives_a_signal_of_that_length(name, samples, gate, simulated):
+    recording = simulated("none", 3)
+    short = {n: replace(s, time=s.time[:samples], values=s.values[:samples]) for n, s in recording.channels.items()}
+    signal = DETECTORS.load(name)().signal(replace(recording, channels=short), gate)
+    assert signal.values.shape == signal.status.shape == (samples, 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_wrong_gains_are_refused_by_name(name):
+    detector = DETECTORS.load(name)
+    for item in fields(detector):
+        with pytest.raises(CdtoolError, match=item.name):
+            detector(**{item.name: -1.0})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(name, simulated):
+    from tests.conftest import GATE, machine_of
+
+    a, b = simulated("stiff", 5), simulated("soft", 6)
+    n = min(len(a["speed"]), len(b["speed"]))
+
+    def pair(first: Recording, second: Recording, joints: tuple[str, str]) -> Recording:
+        channels = {}
+        for channel in ("torque", "speed", "position", "acceleration"):
+            values = np.hstack((first[channel].values[:n], second[channel].values[:n]))
+            channels[channel] = Series(first[channel].time[:n], values, first[channel].unit)
+        return Recording("pair", "pair", joints, channels)
+
+    machine = machine_of({**GATE, "joints": ["x", "y"]})
+    alone = machine_of(GATE)
+    detector = DETECTORS.load(name)()
+    both = detector.signal(pair(a, b, ("x", "y")), machine)
+    swapped = detector.signal(pair(b, a, ("y", "x")), machine)
+    one = detector.signal(cut(a, a["speed"].time[n - 1]), alone)
+    np.testing.assert_array_equal(both.values[:, 0], one.values[:n, 0])
+    np.testing.assert_array_equal(both.values, swapped.values[:, ::-1])
+    np.testing.assert_array_equal(both.status, swapped.status[:, ::-1])

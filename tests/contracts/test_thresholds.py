@@ -1,0 +1,88 @@
+"""What holds for every registered threshold."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool.thresholds
+from cdtool.detectors.momentum import Momentum
+from cdtool.recording import CHANNELS, GROUND_TRUTH
+from cdtool.thresholds import THRESHOLDS
+
+NAMES = THRESHOLDS.names()
+
+
+@pytest.fixture(scope="module")
+def pairs(gate, simulated):
+    recordings = [simulated("none", seed) for seed in range(10, 22)]
+    return [(recording.without_ground_truth(), Momentum().signal(recording, gate)) for recording in recordings]
+
+
+def test_every_file_of_the_folder_with_a_threshold_is_registered():
+    folder = Path(cdtool.thresholds.__file__).parent
+    helpers = {"__init__", "base", "alignment", "signature_curve"}
+    assert {path.stem for path in folder.glob("*.py")} - helpers == set(THRESHOLDS.table)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_a_frozen_dataclass_that_says_when_it_fails(name):
+    threshold = THRESHOLDS.load(name)
+    assert is_dataclass(threshold) and threshold.__dataclass_params__.frozen
+    assert threshold.name == name
+    assert "Fails" in threshold.__doc__
+    assert set(threshold.needs) <= set(CHANNELS) - set(GROUND_TRUTH)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_fitted_threshold_survives_saving_and_loading(name, pairs, gate, simulated):
+    fitted = THRESHOLDS.load(name)().fit(pairs)
+    loaded = type(fitted).from_dict(json.loads(json.dumps(fitted.to_dict(), allow_nan=False)))
+    recording = simulated("stiff", 1)
+    signal = Momentum().signal(recording, gate)
+    for ours, theirs in zip(fitted.evaluate(recording, signal), loaded.evaluate(recording, signal), strict=True):
+        for attribute in ("values", "status", "lower", "upper"):
+            if hasattr(ours, attribute):
+                np.testing.assert_array_equal(getattr(ours, attribute), getattr(theirs, attribute))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_limits_are_causal(name, pairs, gate, simulated):
+    fitted = THRESHOLDS.load(name)().fit(pairs)
+    recording = simulated("soft", 1).without_ground_truth()
+    statistic, band = fitted.evaluate(recording, Momentum().signal(recording, gate))
+    for end in (0.2, 0.75, 1.31, 4.0, 6.05):
+        part = recording.between(-np.inf, end)
+        cut_statistic, cut_band = fitted.evaluate(part, Momentum().signal(part, gate))
+        n = len(cut_statistic.time)
+        np.testing.assert_array_equal(cut_band.upper, band.upper[:n])
+        np.testing.assert_array_equal(cut_band.lower, band.lower[:n])
+        np.testing.assert_array_equal(cut_statistic.values, statistic.values[:n])
+        np.testing.assert_array_equal(cut_statistic.status, statistic.status[:n])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shapes_fit_and_a_missing_value_is_never_valid(name, pairs, gate, simulated):
+    fitted = THRESHOLDS.load(name)().fit(pairs)
+    recording = simulated("none", 3)
+    signal = Momentum().signal(recording, gate)
+    values, status = signal.values.copy(), signal.status.copy()
+    values[3000:3100], status[3000:3100] = np.nan, 3
+    holed = replace(signal, values=values, status=status)
+    statistic, band = fitted.evaluate(recording, holed)
+    assert statistic.values.shape == statistic.status.shape == band.lower.shape == band.upper.shape
+    assert not statistic.valid[3000:3100].any()
+    assert not np.isnan(band.upper[statistic.valid]).any() and not np.isnan(band.lower[statistic.valid]).any()
+    assert statistic.valid[4000:5000].all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_too_few_runs_are_refused(name, pairs):
+    from cdtool.errors import SignatureError
+
+    with pytest.raises(SignatureError, match="1"):
+        THRESHOLDS.load(name)().fit(pairs[:1])

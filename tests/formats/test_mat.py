@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mat import Mat
+from cdtool.formats.reading import read_recording, survey
+from tests.data_folder import data, needs_data
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def save(variables, name="log.mat", **options):
+        savemat(tmp_path / name, variables, **options)
+        return tmp_path / name
+
+    return save
+
+
+@pytest.mark.parametrize("shape", [(5, 1), (1, 5)])
+def test_a_vector_is_a_column_standing_or_lying(saved, shape):
+    source = Mat().columns(saved({"t": np.arange(5.0).reshape(shape)}))
+    assert source.columns["t"].values.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_matrix_is_a_column_for_each_of_its_own(saved):
+    table = np.arange(12.0).reshape(4, 3)
+    source = Mat().columns(saved({"q": table}))
+    assert list(source.columns) == ["q[0]", "q[1]", "q[2]"]
+    assert source.columns["q[2]"].values.tolist() == table[:, 2].tolist()
+
+
+def test_a_lying_matrix_is_turned_with_a_note(saved):
+    source = Mat().columns(saved({"q": np.arange(12.0).reshape(3, 4)}))
+    assert source.columns["q[0]"].values.tolist() == [0, 1, 2, 3]
+    assert "rows are taken as columns" in str(source.findings[0])
+
+
+def test_scalars_are_details_and_integers_become_float64(saved):
+    source = Mat().columns(saved({"gain": 35.15, "n": np.arange(3, dtype=np.int16)}, do_compression=True))
+    assert source.details == {"gain": "35.15"}
+    assert source.columns["n"].values.dtype == np.float64
+
+
+def test_structs_cells_and_texts_are_named_and_left_out(saved):
+    cells = np.array([["a"], [2.0]], dtype=object)
+    source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
+    told = "\n".join(map(str, source.findings))
+    for text in ("'s' is a struct", "'c' is a cell", "'w' is a char", "'z' is complex"):
+        assert text in told
+    assert list(source.columns) == ["t"]
+
+
+def test_a_v73_file_says_how_to_save_it(log):
+    path = log(
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM".ljust(388) + b"\x89HDF\r\n\x1a\n", "a.mat"
+    )
+    with pytest.raises(RecordingError, match=r"v7\.3 .*-v7"):
+        survey(path)
+
+
+def test_a_damaged_kind_of_numbers_is_an_error_not_the_end_of_the_process(saved):
+    """scipy's reader crashes the interpreter here."""
+    path = saved({"q": np.arange(50.0)})
+    whole = path.read_bytes()
+    at = whole.index(b"\x09\0\0\0\x90\x01\0\0")  # miDOUBLE, 400 bytes
+    path.write_bytes(whole[:at] + b"\x6f" + whole[at + 1 :])
+    with pytest.raises(RecordingError, match=r"damaged at byte 128: .*unknown kind \(111\)"):
+        Mat().columns(path)
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+@pytest.mark.parametrize("kept", [60, 130, 200, 900, -1])
+def test_a_cut_file_is_one_clear_error(saved, kept, compressed):
+    path = saved({"t": np.arange(500.0), "q": np.random.default_rng(0).random(500)}, do_compression=compressed)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(RecordingError, match=r"log\.mat: (damaged at byte|is not a MATLAB file)"):
+        Mat().columns(path)
+
+
+def test_a_file_without_numbers_is_refused(saved):
+    with pytest.raises(RecordingError, match="no vector or matrix"):
+        Mat().columns(saved({"w": "words"}))
+
+
+def test_a_missing_variable_is_named_with_its_channel(saved, machine):
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "v", unit = "rad/s" }\n'
+    with pytest.raises(RecordingError, match=r"no column 'v' \(channel 'speed'\).*known: t, w"):
+        Mat().columns(saved({"t": np.arange(3.0), "w": np.arange(3.0)}), machine(channels).columns)
+
+
+@needs_data("emps")
+def test_the_emps_axis_is_a_recording_in_load_coordinates(machine):
+    found = machine(
+        """
+        [channels]
+        time = { column = "t", unit = "s" }
+        torque = { column = "vir", unit = "V", scale = 35.15 }
+        position = { column = "qm", unit = "m" }
+        reference_position = { column = "qg", unit = "m" }
+        """,
+        '[machine]\ntype = "linear_axis"\nname = "emps"\ncoordinates = "load"\nload_mass = 95.1\n',
+    )
+    recording = read_recording(data("emps") / "DATA_EMPS.mat", found)
+    assert recording["torque"].unit == "N"
+    assert len(recording["position"]) == 24841
+    assert recording.duration == pytest.approx(24.84)
+    assert "speed" in recording
+    assert set(survey(data("emps") / "DATA_EMPS.mat").details) == {"gtau", "kp", "kv"}

@@ -1,0 +1,372 @@
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.errors import RecordingError, UsageError
+from cdtool.formats.mcap import Mcap
+from cdtool.formats.mcap.fields import FieldMissingError, parse_field
+from cdtool.formats.mcap.write import Stream, write_mcap
+from tests.data_folder import DATA, data, needs_data
+
+START = 1_700_000_000 * 10**9
+N = 200
+TIME = np.arange(N) / 1000
+RNG = np.random.default_rng(0)
+JOINTS = RNG.normal(size=(N, 3))
+STREAMS = [
+    Stream(
+        "/joint_states",
+        "sensor_msgs/msg/JointState",
+        TIME,
+        {"position": JOINTS, "velocity[0]": JOINTS[:, 1], "effort[0]": JOINTS[:, 2]},
+        ("base", "shoulder_joint", "elbow.joint"),
+    ),
+    Stream("/imu", "sensor_msgs/msg/Imu", TIME + 0.0005, {"linear_acceleration.x": JOINTS[:, 0]}),
+    Stream("/load_cell", "geometry_msgs/msg/WrenchStamped", TIME, {"wrench.force.z": JOINTS[:, 1]}),
+    Stream("/force", "std_msgs/msg/Float64", TIME, {"data": JOINTS[:, 2]}),
+    Stream("/reference", "std_msgs/msg/Float64MultiArray", TIME, {"data[0]": JOINTS[:, 0], "data[1]": JOINTS[:, 1]}),
+]
+
+
+def wanted(*fields, clock="log"):
+    sources = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in fields)
+    return ChannelMap(TimeSource(clock=clock), sources, ("axis",), topics=True)
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(streams=STREAMS, name="log.mcap", **options):
+        write_mcap(tmp_path / name, streams, **{"start_ns": START, **options})
+        return tmp_path / name
+
+    return write
+
+
+@pytest.fixture
+def by_hand(tmp_path):
+    """Messages of one topic: (log time, publish time, content), as JSON unless they are bytes."""
+
+    def write(
+        messages, encoding="json", schema_encoding="jsonschema", schema=b"{}", name="test_msgs/msg/Thing", **options
+    ):
+        path = tmp_path / "hand.mcap"
+        with path.open("wb") as file:
+            writer = Writer(file, **{"compression": CompressionType.NONE, **options})
+            writer.start()
+            number = writer.register_schema(name, schema_encoding, schema)
+            channel = writer.register_channel("/a", encoding, number)
+            for log_time, publish_time, content in messages:
+                payload = content if isinstance(content, bytes) else json.dumps(content).encode()
+                writer.add_message(channel, log_time, payload, publish_time)
+            writer.finish()
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+def test_what_is_written_reads_back_to_the_bit(written, encoding, compression):
+    source = Mcap().columns(written(encoding=encoding, compression=compression))
+    for name, expected in {
+        "/joint_states position[:]": JOINTS,
+        "/joint_states effort[:]": JOINTS[:, 2:],
+        "/imu linear_acceleration.x": JOINTS[:, 0],
+        "/load_cell wrench.force.z": JOINTS[:, 1],
+        "/force data": JOINTS[:, 2],
+        "/reference data[:]": JOINTS[:, :2],
+    }.items():
+        assert np.array_equal(source.columns[name].values, expected), name
+    assert np.array_equal(source.columns["/force data"].time, TIME)
+    assert np.allclose(source.columns["/imu linear_acceleration.x"].time, TIME + 0.0005, rtol=0, atol=1e-12)
+    assert source.origin == START / 1e9
+    assert not source.findings
+    assert source.details["/force"] == f"std_msgs/msg/Float64, {encoding}, {N} messages"
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+def test_the_same_streams_give_the_same_bytes(written, encoding):
+    first = written(name="1.mcap", encoding=encoding).read_bytes()
+    assert first == written(name="2.mcap", encoding=encoding).read_bytes()
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
+    fields = ["position[1]", "position[:]", "position[shoulder_joint]", "position[elbow.joint]", "effort[0]"]
+    path = written(encoding=encoding)
+    columns = Mcap().columns(path, wanted(*(("/joint_states", field) for field in fields))).columns
+    found = [columns[f"/joint_states {field}"].values for field in fields]
+    for values, expected in zip(found, [JOINTS[:, 1], JOINTS, JOINTS[:, 1], JOINTS[:, 2], JOINTS[:, 2]], strict=True):
+        assert np.array_equal(values, expected)
+    assert set(columns) == {f"/joint_states {field}" for field in fields}
+
+
+@pytest.mark.parametrize("clock", ["log", "publish", "header"])
+def test_the_clock_is_chosen_and_messages_are_sorted_by_it(by_hand, clock):
+    stamps = {"log": [10, 20, 30], "publish": [9, 7, 8], "header": [3, 1, 2]}
+    messages = [
+        (log, publish, {"header": {"stamp": {"sec": header, "nanosec": 500}}, "x": i})
+        for i, (log, publish, header) in enumerate(zip(*stamps.values(), strict=True))
+    ]
+    column = Mcap().columns(by_hand(messages), wanted(("/a", "x"), clock=clock)).columns["/a x"]
+    order = np.argsort(stamps[clock])
+    assert column.values.tolist() == order.tolist()
+    unit = 1.0 if clock == "header" else 1e-9
+    assert np.allclose(np.diff(column.time), np.diff(np.sort(stamps[clock])) * unit, rtol=1e-12)
+
+
+def test_messages_with_equal_times_keep_their_order(by_hand):
+    column = Mcap().columns(by_hand([(5, 5, {"x": i}) for i in range(4)]), wanted(("/a", "x"))).columns["/a x"]
+    assert column.values.tolist() == [0, 1, 2, 3]
+
+
+def test_nanoseconds_of_an_epoch_are_kept(by_hand):
+    path = by_hand([(START + i, START + i, {"x": i}) for i in range(4)])
+    assert Mcap().columns(path).columns["/a x"].time.tolist() == [0.0, 1e-9, 2e-9, 3e-9]
+
+
+def test_a_header_clock_without_a_header_is_a_clear_error(by_hand):
+    with pytest.raises(RecordingError, match=r"/a: a message has no header\.stamp"):
+        Mcap().columns(by_hand([(1, 1, {"x": 1})]), wanted(("/a", "x"), clock="header"))
+
+
+def test_a_survey_tells_how_late_messages_were_logged(by_hand):
+    messages = [
+        (10**9 + i * 10**6 + 3 * 10**6, 0, {"header": {"stamp": {"sec": 1, "nanosec": i * 10**6}}}) for i in range(5)
+    ]
+    (finding,) = Mcap().columns(by_hand(messages)).findings
+    assert "logged 3.000 ms (median" in str(finding)
+
+
+def test_a_missing_topic_is_named_with_its_channel_and_the_nearest(written):
+    with pytest.raises(
+        RecordingError, match=r"no message of topic '/joint_state' \(channel 'speed'\).*did you mean /joint_states"
+    ):
+        Mcap().columns(written(), wanted(("/joint_state", "position[0]")))
+
+
+@pytest.mark.parametrize(
+    ("topic", "field", "message"),
+    [
+        ("/imu", "linear_acceleration.w", "there is no 'w'.*known: x, y, z"),
+        ("/imu", "acceleration.x", "there is no 'acceleration'.*did you mean linear_acceleration"),
+        ("/joint_states", "position", r"'position' is an array.*position\[0\]"),
+        ("/joint_states", "position[3]", r"'position' has 3 elements"),
+        ("/joint_states", "position[wrist]", "no message names this joint.*known: base, elbow.joint, shoulder_joint"),
+        ("/joint_states", "position[]", "cannot be understood"),
+        ("/joint_states", "position[0", "cannot be understood"),
+        ("/joint_states", "name[0]", "not a number"),
+        ("/force", "data[0]", "'data' is not an array"),
+        ("/force", "data.x", "there is no 'x'"),
+    ],
+)
+def test_a_wrong_field_is_an_error_that_names_what_there_is(written, topic, field, message):
+    with pytest.raises(RecordingError, match=message) as fault:
+        Mcap().columns(written(), wanted((topic, field)))
+    assert topic in str(fault.value)
+
+
+def test_an_empty_array_is_nan_and_counted(by_hand):
+    path = by_hand([(i, i, {"q": [] if i == 1 else [i, 2 * i]}) for i in range(4)])
+    for field, values in {"q[:]": [[0, 0], [np.nan] * 2, [2, 4], [3, 6]], "q[1]": [0, np.nan, 4, 6]}.items():
+        source = Mcap().columns(path, wanted(("/a", field)))
+        assert np.array_equal(source.columns[f"/a {field}"].values, np.array(values), equal_nan=True)
+    assert "1 messages hold an empty array" in str(Mcap().columns(path, wanted(("/a", "q[:]"))).findings[-1])
+
+
+def test_an_array_of_varying_length_is_a_clear_error(by_hand):
+    path = by_hand([(i, i, {"q": [1.0] * (2 + i // 3)}) for i in range(4)])
+    with pytest.raises(RecordingError, match="length of field 'q\\[:\\]' varies: 2 in 3, 3 in 1"):
+        Mcap().columns(path, wanted(("/a", "q[:]")))
+    assert "arrays of 2 and 3 elements: left out" in str(Mcap().columns(path).findings[0])
+
+
+def test_messages_about_other_joints_are_left_out(by_hand):
+    messages = [(i, i, {"name": ["a" if i % 2 else "b"], "position": [i]}) for i in range(6)]
+    source = Mcap().columns(by_hand(messages), wanted(("/a", "position[a]")))
+    assert source.columns["/a position[a]"].values.tolist() == [1, 3, 5]
+    assert "3 messages name other joints" in str(source.findings[0])
+
+
+def test_json_null_is_nan_and_a_text_is_refused(by_hand):
+    path = by_hand([(0, 0, {"x": 1, "s": "up"}), (1, 1, {"x": None, "s": "up"})])
+    assert np.isnan(Mcap().columns(path, wanted(("/a", "x"))).columns["/a x"].values[1])
+    with pytest.raises(RecordingError, match="holds 'up', not a number"):
+        Mcap().columns(path, wanted(("/a", "s")))
+
+
+def test_one_broken_message_is_left_out_and_counted(by_hand):
+    path = by_hand([(0, 0, {"x": 1}), (1, 1, b"{"), (2, 2, b""), (3, 3, b"\xff\xfe"), (4, 4, b"[1]"), (5, 5, {"x": 2})])
+    for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "x")))):
+        assert source.columns["/a x"].values.tolist() == [1, 2]
+        assert "/a: 4 of 6 messages cannot be decoded: JSONDecodeError" in str(source.findings[0])
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [(b"", "starts with nothing"), (b"\0\1\0\0\1", "error"), (b"\0\7\0\0" + bytes(8), "not plain CDR")],
+)
+def test_a_cdr_message_that_is_cut_or_of_another_kind_is_never_a_value(by_hand, payload, reason):
+    path = by_hand([(0, 0, payload)], "cdr", "ros2msg", b"float64 data")
+    with pytest.raises(RecordingError, match=f"no message of /a can be decoded: .*{reason}"):
+        Mcap().columns(path, wanted(("/a", "data")))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "schema_encoding", "schema"),
+    [("protobuf", "protobuf", b"x"), ("cdr", "ros2idl", b"module a {};"), ("cdr", "ros2msg", b"not ? a definition")],
+)
+def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_wanted(
+    by_hand, encoding, schema_encoding, schema
+):
+    path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
+    source = Mcap().columns(path)
+    assert not source.columns
+    assert "1 of 1 messages cannot be decoded" in str(source.findings[0])
+    with pytest.raises(RecordingError, match="no message of /a can be decoded"):
+        Mcap().columns(path, wanted(("/a", "data")))
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+def test_a_cut_file_gives_what_lies_whole_before_the_cut(written, compression):
+    streams = [
+        Stream("/force", "std_msgs/msg/Float64", np.arange(400_000 / 8) / 1000, {"data": np.arange(400_000 / 8)})
+    ]
+    path = written(streams, compression=compression)
+    whole = path.read_bytes()
+    for share in (0.3, 0.6, 0.9, 0.999):
+        path.write_bytes(whole[: int(share * len(whole))])
+        try:
+            source = Mcap().columns(path, wanted(("/force", "data")))
+        except RecordingError as fault:
+            assert "before its first message" in fault.message
+            continue
+        values = source.columns["/force data"].values
+        assert np.array_equal(values, np.arange(len(values)))
+        assert f"only the {len(values)} messages before it were read" in str(source.findings[0])
+        assert "damaged at byte" in str(source.findings[0])
+
+
+def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
+    path = by_hand([(i, i, {"x": i}) for i in range(50)], use_chunking=False)
+    whole = path.read_bytes()
+    cut = whole.index(b'{"x": 30}') + 5  # in the middle of a message
+    path.write_bytes(whole[:cut])
+    source = Mcap().columns(path)
+    assert source.columns["/a x"].values.tolist() == list(range(30))
+    assert "only the 30 messages" in str(source.findings[0])
+    assert "no checksum" in str(source.findings[1])
+
+
+def test_no_flipped_byte_ever_gives_a_wrong_value(written):
+    """Chunks carry a CRC: whatever byte is flipped, the values that come back are the true ones, or an error."""
+    path = written([STREAMS[3]], compression="none")
+    whole = path.read_bytes()
+    true = dict(zip(TIME.tolist(), JOINTS[:, 2].tolist(), strict=True))
+    lost = 0
+    for at in range(0, len(whole), 7):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
+        try:
+            source = Mcap().columns(path, wanted(("/force", "data")))
+        except RecordingError as fault:
+            assert str(path) in fault.message
+            lost += 1
+            continue
+        column = source.columns["/force data"]
+        assert all(true[t] == v for t, v in zip(column.time.tolist(), column.values.tolist(), strict=True)), at
+        assert len(column.values) == N or source.findings, at
+    assert lost > 10
+
+
+def test_a_wrong_checksum_of_unchunked_data_is_an_error(by_hand):
+    path = by_hand([(i, i, {"x": i}) for i in range(9)], use_chunking=False, enable_data_crcs=True)
+    whole = path.read_bytes()
+    assert not Mcap().columns(path).findings
+    path.write_bytes(whole.replace(b'{"x": 5}', b'{"x": 6}'))
+    with pytest.raises(RecordingError, match="checksum of the data does not fit"):
+        Mcap().columns(path)
+
+
+def test_an_unknown_compression_is_not_taken_for_none(written):
+    path = written([STREAMS[3]], compression="lz4")
+    path.write_bytes(path.read_bytes().replace(struct.pack("<I", 3) + b"lz4", struct.pack("<I", 3) + b"lz5"))
+    with pytest.raises(RecordingError, match="unknown compression 'lz5'"):
+        Mcap().columns(path)
+
+
+def test_a_record_that_claims_more_than_the_file_holds_is_refused_without_reading_it(tmp_path):
+    path = tmp_path / "lie.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 2**40) + b"abc")
+    with pytest.raises(
+        RecordingError, match="damaged at byte 8, before its first message: a record claims 1099511627776"
+    ):
+        Mcap().columns(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" * 3, bytes(100)])
+def test_a_file_with_nothing_in_it_is_one_clear_error(tmp_path, content):
+    path = tmp_path / "none.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match="before its first message"):
+        Mcap().columns(path)
+
+
+def test_writing_refuses_what_a_message_cannot_hold(written):
+    def stream(schema="sensor_msgs/msg/Imu", **fields):
+        return Stream("/a", schema, TIME, fields)
+
+    with pytest.raises(UsageError, match=r"did you mean linear_acceleration\.x"):
+        written([Stream("/a", "sensor_msgs/msg/Imu", TIME, {"linear_aceleration.x": TIME})])
+    with pytest.raises(UsageError, match="unknown message type"):
+        written([stream("sensor_msgs/Imu")])
+    with pytest.raises(UsageError, match="3 values at 200 times"):
+        written([stream("std_msgs/msg/Float64", data=np.zeros(3))])
+    with pytest.raises(UsageError, match="number them from 0"):
+        written([Stream("/a", "sensor_msgs/msg/JointState", TIME, {"position[1]": TIME})])
+    with pytest.raises(UsageError, match="written twice"):
+        written([STREAMS[3], STREAMS[3]])
+
+
+@pytest.mark.parametrize("text", ["a b.c", "x[0].y", "a[b.c].d"])
+def test_a_field_may_step_through_arrays_of_objects(text):
+    assert parse_field(text, "here").text == text
+    message = {"a b": {"c": 1}, "x": [{"y": 2}], "a": [{"d": 3}], "name": ["b.c"]}
+    assert parse_field(text, "here").of(message) in (1.0, 2.0, 3.0)
+    with pytest.raises(FieldMissingError):
+        parse_field(text, "here").of({})
+
+
+@needs_data("mcap_samples")
+@pytest.mark.parametrize("name", sorted(path.name for path in DATA.glob("mcap_samples/*.mcap")) if DATA else ["none"])
+def test_real_files_of_other_writers_survey_without_an_error(name):
+    source = Mcap().columns(data("mcap_samples") / name)
+    assert source.details
+    if "wrong_rmw" in name:
+        assert any("message encoding 'wrong_format'" in str(finding) for finding in source.findings)
+        with pytest.raises(RecordingError, match="wrong_format"):
+            Mcap().columns(data("mcap_samples") / name, wanted(("/test_topic", "int32_value")))
+
+
+@needs_data("mcap_samples")
+@pytest.mark.parametrize(("name", "rows", "joints"), [("panda", 727, 7), ("ur10", 3441, 6)])
+def test_real_joint_states_are_read(name, rows, joints):
+    source = Mcap().columns(data("mcap_samples") / f"{name}_joint_states.mcap")
+    assert source.columns["/joint_states position[:]"].values.shape == (rows, joints)
+
+
+@needs_data("mcap_conformance")
+def test_every_conformance_file_gives_the_messages_of_its_json():
+    files = sorted((data("mcap_conformance")).glob("*/*.mcap"))
+    assert len(files) == 416
+    for path in files:
+        records = json.loads(path.with_suffix(".json").read_text())["records"]
+        expected = sum(record["type"] == "Message" for record in records)
+        source = Mcap().columns(path)
+        assert sum(int(detail.split()[-2]) for detail in source.details.values()) == expected, path.name
+        assert not any("damaged" in str(finding) for finding in source.findings), path.name

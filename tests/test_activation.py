@@ -1,0 +1,83 @@
+"""Debounce, re-arming and the handling of samples that cannot be judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.activation import Activation
+from cdtool.detection import Band, Signal
+from cdtool.errors import UsageError
+
+
+def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    codes = np.zeros(values.shape, dtype=np.uint8) if status is None else np.asarray(status, np.uint8).reshape(-1, 1)
+    time = np.arange(len(values)) * period
+    band = Band(np.full(values.shape, -1.0), np.full(values.shape, 1.0))
+    return Activation(debounce, rearm).alarms(Signal(time, values, codes, "N"), band)
+
+
+def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
+    (alarm,) = alarms([0, 0, 2, 2, 3, 2, 0])
+    assert alarm.time == pytest.approx(4e-3)
+    assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, 0)
+
+
+def test_a_value_inside_breaks_the_succession():
+    assert alarms([2, 2, 0, 2, 2, 0, 2, 2]) == ()
+
+
+def test_a_missing_sample_is_skipped_and_neither_counts_nor_breaks():
+    (alarm,) = alarms([0, 2, np.nan, 2, np.nan, 2, 0], status=[0, 0, 3, 0, 3, 0, 0])
+    assert alarm.time == pytest.approx(5e-3)
+
+
+def test_a_sample_where_the_method_does_not_apply_breaks_the_succession():
+    assert alarms([2, 2, 2, 2, 2], status=[0, 0, 2, 0, 0]) == ()
+    assert alarms([2, 2, 2, 2, 2], status=[1, 1, 1, 0, 0]) == ()
+
+
+def test_below_the_band_is_an_alarm_too():
+    (alarm,) = alarms([0, -2, -2, -2])
+    assert (alarm.side, alarm.limit) == ("below", -1.0)
+
+
+def test_it_is_armed_again_only_after_half_a_second_inside():
+    blink = [2] * 5 + [0] * 400 + [2] * 5
+    assert len(alarms(blink)) == 1
+    assert len(alarms([2] * 5 + [0] * 502 + [2] * 5)) == 2
+
+
+def test_the_default_debounce_is_nine_milliseconds_of_samples():
+    assert Activation().samples(1e-3) == 9
+    assert Activation().samples(5e-3) == 2
+    assert Activation().samples(0.04) == 1
+    assert Activation(4).samples(1e-3) == 4
+
+
+def test_a_debounce_below_one_is_refused():
+    with pytest.raises(UsageError, match="debounce"):
+        Activation(0)
+
+
+@given(st.lists(st.sampled_from([0.0, 2.0, -2.0]), max_size=60), st.integers(1, 5))
+def test_the_alarms_are_those_of_a_plain_reading_of_the_rule(values, debounce):
+    expected, count, armed, inside_since = [], 0, True, None
+    for k, value in enumerate(values):
+        out = abs(value) > 1.0
+        if armed:
+            count = count + 1 if out else 0
+            if count == debounce:
+                expected.append(k)
+                armed, inside_since = False, None
+        elif out:
+            inside_since = None
+        elif inside_since is None:
+            inside_since = k
+        elif k - inside_since >= 10:
+            armed, count = True, 0
+    found = alarms(values, debounce=debounce, rearm=10.0, period=1.0)
+    assert [round(alarm.time) for alarm in found] == expected

@@ -1,0 +1,48 @@
+"""The shape of the code: imports run downward, importing is light, files stay small."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HEAVY = ("numba", "pandas", "scipy", "matplotlib", "mcap", "typer", "rich")
+
+
+def loaded_after(statement: str) -> set[str]:
+    code = f"import sys\n{statement}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    return set(done.stdout.split())
+
+
+def test_importing_cdtool_loads_nothing_heavy():
+    assert not loaded_after("import cdtool") & {*HEAVY, "numpy"}
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["cdtool.workflows.benchmark", "cdtool.detectors.friction_ekf", "cdtool.formats.reading", "cdtool.report.outputs"],
+)
+def test_importing_a_module_loads_no_library_that_only_its_use_needs(module):
+    assert not loaded_after(f"import {module}") & set(HEAVY)
+
+
+def test_the_command_line_loads_typer_and_nothing_heavier():
+    assert not loaded_after("import cdtool.cli.app") & (set(HEAVY) - {"typer", "rich"})
+
+
+def test_imports_run_downward():
+    pytest.importorskip("importlinter")
+    from importlinter.cli import lint_imports
+
+    assert lint_imports(config_filename=str(ROOT / "pyproject.toml")) == 0
+
+
+def test_every_module_says_what_it_is_and_stays_readable():
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith('"""'), path
+        assert text.count("\n") <= 300, path

@@ -1,0 +1,101 @@
+"""Causal alignment, and what is told about time stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.clock import clean_time, differentiate, gap_findings, integrate, previous_value
+from cdtool.recording import Series
+
+
+def series(time, values, unit="m"):
+    return Series(np.asarray(time, float), np.asarray(values, float), unit)
+
+
+def test_the_previous_value_is_the_last_at_or_before_and_never_a_later_one():
+    held = previous_value(series([0.0, 1.0, 2.0], [10.0, 11.0, 12.0]), np.array([-0.1, 0.0, 0.99, 1.0, 2.5]))
+    np.testing.assert_array_equal(held[:, 0], [np.nan, 10.0, 10.0, 11.0, 12.0])
+
+
+def test_a_value_older_than_five_of_its_periods_is_missing():
+    held = previous_value(series([0.0, 1.0, 2.0], [10.0, 11.0, 12.0]), np.array([6.9, 7.1]))
+    np.testing.assert_array_equal(held[:, 0], [12.0, np.nan])
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(0.0, 10.0), min_size=1, max_size=30, unique=True), st.floats(0.0, 10.0))
+def test_what_comes_later_never_changes_the_previous_value(stamps, now):
+    time = np.sort(stamps)
+    values = np.arange(len(time), dtype=float)
+    changed = np.where(time > now, -99.0, values)
+    before, after = (previous_value(series(time, v), np.array([now])) for v in (values, changed))
+    np.testing.assert_array_equal(before, after)
+
+
+def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
+    clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2, row_name="line")
+    np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
+    np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
+    told = " ".join(str(item) for item in clean.findings)
+    assert "1 time stamps are no number (line 8)" in told
+    assert "1 time stamps run backward (line 6)" in told
+    assert "1 time stamps repeat (line 5)" in told
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(-1e3, 1e3) | st.just(float("nan")), max_size=40))
+def test_whatever_the_stamps_the_clean_ones_strictly_increase(stamps):
+    clean = clean_time(stamps)
+    assert np.all(np.diff(clean.time) > 0.0)
+    assert clean.keep.sum() == len(clean.time)
+
+
+def test_a_coarse_clock_becomes_a_causal_straight_line():
+    true = np.arange(2000) * 1e-3
+    stamps = np.floor(true / 0.01) * 0.01
+    clean = clean_time(stamps)
+    assert "coarse clock" in str(clean.findings[0])
+    assert len(clean.time) > 1980
+    later = clean.time[500:]
+    assert np.abs(np.diff(later) - 1e-3).max() < 2e-4
+    early = clean_time(stamps[:1200])
+    np.testing.assert_array_equal(early.time, clean.time[: len(early.time)])
+
+
+def test_the_derivative_of_a_ramp_is_its_slope_and_a_missing_sample_is_skipped():
+    time = np.arange(500) * 1e-3
+    position = 3.0 * time
+    position[100:110] = np.nan
+    speed = differentiate(series(time, position), 50.0, "m/s")
+    assert speed.unit == "m/s"
+    present = np.isfinite(position)
+    present[0] = False
+    np.testing.assert_allclose(speed.values[present, 0], 3.0, rtol=1e-9)
+    assert np.isnan(speed.values[100:110]).all()
+
+
+def test_the_derivative_lags_by_its_two_low_passes_and_looks_at_nothing_later():
+    time = np.arange(2000) * 1e-3
+    position = 0.5 * time**2
+    speed = differentiate(series(time, position), 50.0, "m/s").values[:, 0]
+    lag = time[1999] - speed[1999]
+    assert lag == pytest.approx(2.0 / (2.0 * np.pi * 50.0), rel=0.2)
+    cut = differentiate(series(time[:900], position[:900]), 50.0, "m/s").values[:, 0]
+    np.testing.assert_array_equal(cut, speed[:900])
+
+
+def test_the_integral_of_a_constant_speed_is_its_way():
+    way = integrate(series([0.0, 1.0, 3.0, 4.0], [2.0, 2.0, np.nan, 2.0], "m/s"), "m")
+    np.testing.assert_allclose(way.values[:, 0], [0.0, 2.0, 6.0, 8.0])
+
+
+def test_gaps_jitter_and_missing_values_are_told():
+    time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
+    values = np.zeros(200)
+    values[5] = np.nan
+    told = " ".join(str(item) for item in gap_findings(series(time, values), "speed"))
+    assert "1 gaps after 0.099 s (101 ms)" in told
+    assert "1 of 200 values are missing" in told

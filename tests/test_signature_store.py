@@ -1,0 +1,128 @@
+"""The signature file: round trip, refusals, atomic writes, concurrent updates."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cdtool.detectors.momentum import Momentum
+from cdtool.errors import SignatureError
+from cdtool.machine_file import fingerprint
+from cdtool.signature_store import (
+    LearnedRun,
+    SignatureFile,
+    read_signature,
+    update_signature,
+    write_signature,
+)
+from cdtool.thresholds.signature import Signature
+
+
+@pytest.fixture(scope="module")
+def learned(gate, simulated) -> SignatureFile:
+    recordings = [simulated("none", seed) for seed in range(10, 22)]
+    fitted = Signature(position_step=0.02, position_window=0.1).fit(
+        [(item, Momentum().signal(item, gate)) for item in recordings]
+    )
+    runs = tuple(LearnedRun(item.name, item.digest) for item in recordings)
+    return SignatureFile(
+        "gate", fingerprint(gate), "momentum", {"bandwidth": 10.0}, "N", ("gate",), None, (fitted,), (fitted,), runs
+    )
+
+
+def test_it_survives_writing_and_reading(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    loaded = read_signature(path)
+    write_signature(tmp_path / "again.json", loaded)
+    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+    assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
+    values = json.loads(path.read_text())
+    assert values["schema_version"] == 1 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+
+
+def test_another_machine_detector_or_gain_is_refused(learned, gate):
+    learned.check(gate, Momentum())
+    with pytest.raises(SignatureError, match="bandwidth = 10.0, the machine file has 12.0"):
+        learned.check(gate, Momentum(12.0))
+    with pytest.raises(SignatureError, match="another machine"):
+        learned.check(replace(gate, load_inertia=(621.0,)), Momentum())
+    from cdtool.detectors.pure_torque import PureTorque
+
+    with pytest.raises(SignatureError, match="learned with momentum"):
+        learned.check(gate, PureTorque())
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "not a signature file"),
+        ("[1, 2]", "not a signature file"),
+        ('{"kind": "other"}', "not a signature file"),
+        ('{"kind": "cdtool signature", "schema_version": 99}', "schema_version is 99"),
+        ('{"kind": "cdtool signature", "schema_version": 1}', "damaged"),
+        ("\x00\x01", "not a signature file"),
+    ],
+)
+def test_a_file_that_is_no_signature_is_one_clear_error(tmp_path, content, message):
+    path = tmp_path / "s.json"
+    path.write_text(content)
+    with pytest.raises(SignatureError, match=message):
+        read_signature(path)
+
+
+def test_a_missing_file_and_a_missing_folder_are_named(tmp_path, learned):
+    with pytest.raises(SignatureError, match="no such file"):
+        read_signature(tmp_path / "none.json")
+    with pytest.raises(SignatureError, match="cannot be written"):
+        write_signature(tmp_path / "no" / "s.json", learned)
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, learned, monkeypatch):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    old = path.read_bytes()
+    monkeypatch.setattr("cdtool.signature_store.os.fsync", lambda _: (_ for _ in ()).throw(OSError(28, "disk full")))
+    with pytest.raises(SignatureError, match="disk full"):
+        write_signature(path, replace(learned, machine="other"))
+    assert path.read_bytes() == old
+    assert [item.name for item in tmp_path.iterdir()] == ["s.json"]
+
+
+WORKER = """
+import sys
+from dataclasses import replace
+from cdtool.signature_store import LearnedRun, update_signature
+for k in range(int(sys.argv[3])):
+    run = LearnedRun(f"{sys.argv[2]}.{k}", "x")
+    update_signature(sys.argv[1], lambda file: replace(file, runs=(*file.runs, run)))
+"""
+
+
+def test_concurrent_updates_lose_no_run(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    workers = [
+        subprocess.Popen([sys.executable, "-c", WORKER, str(path), str(name), "5"], cwd=Path(__file__).parents[1])
+        for name in range(4)
+    ]
+    assert [worker.wait(120) for worker in workers] == [0] * 4
+    assert len(read_signature(path).runs) == len(learned.runs) + 20
+
+
+def test_an_update_that_fails_changes_nothing(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    old = path.read_bytes()
+
+    def change(_: SignatureFile) -> SignatureFile:
+        raise SignatureError("no")
+
+    with pytest.raises(SignatureError, match="no"):
+        update_signature(path, change)
+    assert path.read_bytes() == old

@@ -1,0 +1,168 @@
+"""The signature: what it learns, where it has a limit, how it is updated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.detection import Signal, Status
+from cdtool.errors import SignatureError, UsageError
+from cdtool.recording import Recording, Series
+from cdtool.thresholds.signature import Signature
+from cdtool.thresholds.signature_curve import Curve
+
+N = 4000
+TIME = np.arange(N) * 1e-3
+
+
+def stroke(direction: int = 1, speed: float = 0.2, start: float = 0.3) -> Recording:
+    """A clean stroke: a ramp of 0.2 m/s2 from `start` to the nominal speed."""
+    v = direction * np.clip(0.2 * (TIME - start), 0.0, speed)
+    x = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1])) * 1e-3))
+    channels = {"speed": Series(TIME, v, "m/s"), "position": Series(TIME, x, "m")}
+    return Recording("stroke", "stroke", ("axis",), channels)
+
+
+def signal(values: np.ndarray, signed: bool = True) -> Signal:
+    return Signal(TIME, values.reshape(-1, 1), np.zeros((N, 1), dtype=np.uint8), "N", signed)
+
+
+def runs(count: int, sigma: float = 1.0, direction: int = 1, seed: int = 0, mean: float = 100.0):
+    rng = np.random.default_rng(seed)
+    return [(stroke(direction), signal(mean + sigma * rng.normal(size=N))) for _ in range(count)]
+
+
+def test_the_limit_is_the_mean_plus_the_factor_times_the_spread():
+    fitted = Signature(safety_factor=5.0).fit(runs(40))
+    _, band = fitted.evaluate(stroke(), signal(np.zeros(N)))
+    upper = band.upper[1500:3900, 0]
+    assert np.median(upper) == pytest.approx(105.0, abs=0.2)
+    assert np.ptp(upper) < 1.5
+    assert (band.lower[1500:3900] == -np.inf).all()
+
+
+def test_two_sides_limit_both():
+    fitted = Signature(safety_factor=5.0, sides="two").fit(runs(40))
+    _, band = fitted.evaluate(stroke(), signal(np.zeros(N)))
+    assert np.median(band.lower[1500:3900]) == pytest.approx(95.0, abs=0.2)
+
+
+def test_backward_motion_is_watched_below_for_a_signed_signal_and_above_otherwise():
+    backward = runs(12, direction=-1)
+    signed = Signature().fit(backward)
+    _, band = signed.evaluate(stroke(-1), signal(np.zeros(N)))
+    assert (band.upper[2000:3900] == np.inf).all() and np.isfinite(band.lower[2000:3900]).all()
+    unsigned = Signature().fit([(recording, replace(s, signed=False)) for recording, s in backward])
+    _, band = unsigned.evaluate(stroke(-1), signal(np.zeros(N), False))
+    assert (band.lower[2000:3900] == -np.inf).all() and np.isfinite(band.upper[2000:3900]).all()
+
+
+def test_before_the_motion_starts_no_limit_is_known():
+    statistic, _ = Signature().fit(runs(12)).evaluate(stroke(), signal(np.zeros(N)))
+    assert (statistic.status[:390] == Status.NO_LIMIT).all()
+    assert statistic.valid[500:3900].all()
+
+
+def test_beyond_the_learned_travel_no_limit_is_known():
+    fitted = Signature(alignment="position").fit(runs(12))
+    longer = stroke(start=0.0)
+    statistic, _ = fitted.evaluate(longer, signal(np.zeros(N)))
+    learned = stroke()["position"].values[-1, 0]
+    beyond = longer["position"].values[:, 0] > learned + 5e-3
+    assert beyond.sum() > 100
+    assert (statistic.status[beyond] == Status.NO_LIMIT).all()
+
+
+def test_the_band_freezes_where_the_axis_stops_after_a_contact():
+    fitted = Signature().fit([(stroke(), signal(100.0 + 50.0 * TIME + 0.1 * r)) for r in range(12)])
+    stopped = stroke()
+    v, x = stopped["speed"].values.copy(), stopped["position"].values.copy()
+    v[2500:], x[2500:] = 0.0, x[2500] - 0.01  # it bounced back a little
+    stopped = replace(stopped, channels={"speed": Series(TIME, v, "m/s"), "position": Series(TIME, x, "m")})
+    _, band = fitted.evaluate(stopped, signal(np.zeros(N)))
+    assert np.ptp(band.upper[2500:, 0]) == 0.0
+    assert band.upper[2499, 0] == pytest.approx(band.upper[2600, 0], abs=0.2)
+
+
+@pytest.mark.parametrize("alignment", ["time", "position", "time_then_position"])
+def test_a_later_start_does_not_shift_the_band(alignment):
+    """The band belongs to the stroke, not to the log: whatever the rest before it, the same limit at the same travel."""
+    shape = 100.0 + 80.0 * np.sin(20.0 * stroke()["position"].values[:, 0])
+    fitted = Signature(alignment=alignment).fit([(stroke(), signal(shape + 0.1 * r)) for r in range(12)])
+    _, early = fitted.evaluate(stroke(), signal(np.zeros(N)))
+    _, late = fitted.evaluate(stroke(start=0.5), signal(np.zeros(N)))
+    np.testing.assert_allclose(late.upper[700:3999], early.upper[500:3799], atol=0.5)
+
+
+def test_too_few_runs_say_how_many_are_missing_unless_forced():
+    with pytest.raises(SignatureError, match="6 impact-free runs.*4 more"):
+        Signature().fit(runs(6))
+    assert Signature(force=True).fit(runs(6)).runs == 6
+    with pytest.raises(SignatureError):
+        Signature(force=True).fit(runs(1))
+
+
+def test_a_run_of_another_speed_or_direction_is_refused_by_name():
+    for other in (stroke(speed=0.15), stroke(-1)):
+        odd = replace(other, name="odd one")
+        with pytest.raises(SignatureError, match="odd one"):
+            Signature().fit([*runs(11), (odd, signal(np.zeros(N)))])
+
+
+def test_the_thesis_rule_is_the_mean_plus_one_standard_deviation_point_by_point():
+    pairs = runs(15)
+    fitted = Signature(rule="thesis", alignment="position").fit(pairs)
+    _, upper = fitted.limits(fitted.by_position)
+    point = 150
+    travel = pairs[0][0]["position"].values[:, 0] - pairs[0][0]["position"].values[402, 0]
+    passed = np.flatnonzero(travel >= fitted.by_position.grid[point])[0]
+    values = [s.values[passed, 0] for _, s in pairs]
+    assert upper[point, 0] == pytest.approx(np.mean(values) + np.std(values, ddof=1), rel=1e-6)
+
+
+def test_an_unknown_setting_is_refused_with_what_is_known():
+    for wrong in ({"rule": "best"}, {"sides": "three"}, {"alignment": "phase"}):
+        with pytest.raises(UsageError, match="known"):
+            Signature(**wrong)
+
+
+def test_a_part_without_valid_samples_has_no_limit():
+    pairs = runs(12)
+    for _, s in pairs:
+        s.status[2000:2600] = Status.GAP
+    statistic, _ = Signature(alignment="time").fit(pairs).evaluate(stroke(), signal(np.zeros(N)))
+    assert (statistic.status[2010:2590] == Status.NO_LIMIT).all()
+    assert statistic.valid[2700:3900].all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.lists(st.floats(-1e3, 1e3), min_size=4, max_size=4), min_size=3, max_size=12))
+def test_adding_runs_one_by_one_gives_what_learning_from_all_of_them_gives(values):
+    samples = np.array(values)[:, :, np.newaxis]
+    curve = Curve.empty(1.0, 2.0, 3.0, 1)
+    at_once = curve.learned(samples)
+    one_by_one = curve.learned(samples[:2])
+    for sample in samples[2:]:
+        one_by_one = one_by_one.updated(sample, None)
+    np.testing.assert_allclose(one_by_one.mean, at_once.mean, atol=1e-9)
+    np.testing.assert_allclose(one_by_one.squares, at_once.squares, rtol=1e-9, atol=1e-6)
+
+
+def test_forgetting_follows_a_drift_that_welford_averages_away():
+    samples = np.random.default_rng(1).normal(size=(20, 4, 1))
+    kept = forgotten = Curve.empty(1.0, 2.0, 3.0, 1).learned(samples)
+    for _ in range(100):
+        kept, forgotten = kept.updated(np.full((4, 1), 10.0), None), forgotten.updated(np.full((4, 1), 10.0), 20.0)
+    assert (forgotten.mean > 9.9).all() and (kept.mean < 9.0).all()
+    assert (forgotten.count == 20).all() and (forgotten.squares >= 0.0).all()
+
+
+def test_the_spread_has_a_floor_where_a_quantised_signal_does_not_vary():
+    samples = np.random.default_rng(1).normal(size=(20, 101, 1))
+    samples[:, 40:45] = 3.0
+    _, spread = Curve.empty(1.0, 1.0, 100.0, 1).learned(samples).band(pooled=False)
+    assert spread[42, 0] == pytest.approx(0.1 * np.median(spread), rel=1e-9)
