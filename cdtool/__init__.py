@@ -7,6 +7,7 @@ What a command does, a notebook does in one line:
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
+    cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cdtool.version import __version__
 
 if TYPE_CHECKING:
+    from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.workflows.benchmark import benchmark
     from cdtool.workflows.detection import detect
     from cdtool.workflows.information import info
@@ -29,9 +31,10 @@ _API = {
     "detect": "cdtool.workflows.detection:detect",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
     "info": "cdtool.workflows.information:info",
+    "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }
 
-__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read"]
+__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read", "simulate_gate"]
 
 
 def __getattr__(name: str) -> Any:

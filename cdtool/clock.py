@@ -130,7 +130,7 @@ def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
     for joint in range(series.joint_count):
         # Copies: a Series is read-only, and the kernel's signature is of arrays that are not.
         column = series.values[:, joint].copy()
-        _differentiate(series.time.copy(), column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
+        _differentiate(series.time, column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
     return Series(series.time, rates, unit)
 
 

@@ -1,4 +1,4 @@
-"""The signature file: versioned JSON, checked against machine and detector, written atomically, updated under a lock."""
+"""The signature file: versioned JSON, checked against machine and detector, atomic, updated under a lock."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
     learned.check(gate, Momentum())
-    with pytest.raises(SignatureError, match="bandwidth = 10.0, the machine file has 12.0"):
+    with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, the machine file has 12\.0"):
         learned.check(gate, Momentum(12.0))
     with pytest.raises(SignatureError, match="another machine"):
         learned.check(replace(gate, load_inertia=(621.0,)), Momentum())

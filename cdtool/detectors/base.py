@@ -107,8 +107,8 @@ def observe_momentum(
     res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
     constant force and any T_k. `ready` (J,) is the time from which the residual may be judged.
     """
-    residual = np.zeros(net_force.shape)
-    status = np.zeros(net_force.shape, dtype=np.uint8)
+    residual = np.empty(net_force.shape)
+    status = np.empty(net_force.shape, dtype=np.uint8)
     for j in range(net_force.shape[1]):
         _observe(
             drive.time,
@@ -165,7 +165,9 @@ def _observe(
             x = bandwidth * elapsed
             if x < 0.02:
                 # 1 - exp(-x) to the last bit, without the call of exp.
-                weight = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0)))))
+                weight = x * (
+                    1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0)))))
+                )
             else:
                 weight = 1.0 - np.exp(-x)
             value += weight * ((impulse - (momentum[k] - last_momentum)) / elapsed - value)
@@ -177,3 +179,5 @@ def _observe(
             status[k] = 3
         elif time[k] < ready:
             status[k] = 1
+        else:
+            status[k] = 0

@@ -83,11 +83,6 @@ class Results:
         return json.dumps(_finite(asdict(self)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def write_results(path: Path, results: Results) -> None:
-    """Write results.json."""
-    path.write_text(results.to_json(), encoding="utf-8")
-
-
 def read_results(path: Path) -> Results:
     """Read results.json; raises RecordingError."""
     try:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError, UsageError
-from cdtool.formats.csv_dialect import SAMPLE_BYTES, Dialect, find_dialect, looks_like_text
+from cdtool.formats.csv_dialect import SAMPLE_BYTES, Dialect, find_dialect, is_number, looks_like_text
 from cdtool.formats.csv_rows import Rows, check_rows
 from cdtool.formats.source import Column, Source, split_unit, wanted_keys
 from cdtool.recording import Finding, FloatArray
@@ -89,16 +89,18 @@ class _Table:
         """The columns as float64, and whether a half-written last line was dropped."""
         count, cut = self.rows.count, self.rows.cut
         try:
-            frame = self._frame(keys, count, dtype=np.float64)
+            try:
+                frame = self._frame(keys, count, dtype=np.float64)
+            except ValueError as fault:
+                bad = self._first_bad_cell(keys)
+                if bad is None:
+                    raise
+                if not self._may_be_cut(bad[0]):
+                    raise self._not_a_number(*bad) from fault
+                count, cut = count - 1, True
+                frame = self._frame(keys, count, dtype=np.float64)
         except ValueError as fault:
-            bad = self._first_bad_cell(keys)
-            if bad is None:
-                raise RecordingError(f"{self.path}: cannot be read as a table: {_one_line(fault)}") from fault
-            row, key, text = bad
-            if row < count - 1 or self.rows.ended or row == 0:
-                raise self._not_a_number(row, key, text) from None
-            count, cut = count - 1, True
-            frame = self._frame(keys, count, dtype=np.float64)
+            raise RecordingError(f"{self.path}: cannot be read as a table: {_one_line(fault)}") from fault
         if keys and len(frame) != count:
             raise RecordingError(
                 f"{self.path}: {count} lines of numbers gave {len(frame)} rows",
@@ -117,7 +119,7 @@ class _Table:
         kept, findings = [], []
         for key in keys:
             bad = self._first_bad_cell([key])
-            if bad is None or (bad[0] == self.rows.count - 1 and not self.rows.ended and bad[0] > 0):
+            if bad is None or self._may_be_cut(bad[0]):
                 kept.append(key)
                 continue
             row, _, text = bad
@@ -126,6 +128,10 @@ class _Table:
         if not kept:
             raise RecordingError(f"{self.path}: no column holds numbers only", str(findings[0]) if findings else "")
         return kept, findings
+
+    def _may_be_cut(self, row: int) -> bool:
+        """True for the last row, if the file ends within it."""
+        return row > 0 and row == self.rows.count - 1 and not self.rows.ended
 
     def _frame(self, keys: list[str], count: int, **options: Any) -> pd.DataFrame:
         import pandas as pd
@@ -166,7 +172,7 @@ class _Table:
             for row, text in enumerate(texts[key]):
                 if found is not None and row >= found[0]:
                     break
-                if isinstance(text, str) and not _is_float(text, self.dialect.decimal):
+                if isinstance(text, str) and not is_number(text.strip(" \t"), self.dialect.decimal):
                     found = (row, key, text)
                     break
         return found
@@ -187,19 +193,6 @@ def _sample(path: Path) -> bytes:
         raise RecordingError(
             f"{path}: cannot be read: {fault.strerror}", "check the path and its permissions"
         ) from fault
-
-
-def _is_float(text: str, decimal: str) -> bool:
-    plain = text.strip()
-    if plain.lower() in ("true", "false"):
-        return True
-    if "_" in plain or (decimal == "," and "." in plain):
-        return False
-    try:
-        float(plain.replace(",", ".") if decimal == "," else plain)
-    except ValueError:
-        return False
-    return True
 
 
 def _one_line(fault: Exception) -> str:

@@ -16,9 +16,10 @@ _SCORED_LINES = 60
 # In the order of trust: where two split the lines equally well, the first is taken.
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma", " ": "blanks"}
 _MISSING = ("", "nan", "NaN", "NAN")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(inf|infinity)|true|false", re.IGNORECASE)
+_TAIL = r"(e[+-]?[0-9]+)?|[+-]?(inf|infinity)|true|false"
+_NUMBER = re.compile(rf"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+){_TAIL}", re.IGNORECASE)
+_COMMA_NUMBER = re.compile(rf"[+-]?([0-9]+,?[0-9]*|,[0-9]+){_TAIL}", re.IGNORECASE)
 _OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
-_COMMA_NUMBER = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ def find_dialect(path: Path, sample: bytes) -> Dialect:
         raise RecordingError(
             f"{path}: holds a header in line {start + 1} and no row of numbers", "was the recording stopped at once?"
         )
-    if not any(_is_number(cell, decimal) for line in body[header:] for cell in split_line(line, separator)):
+    cells = (cell for line in body[header:] for cell in split_line(line, separator))
+    if not any(is_number(cell, decimal) or cell in _MISSING[1:] for cell in cells):
         raise RecordingError(
             f"{path}: holds no row of numbers: line {data + 1} is {body[header][:60]!r}",
             "a table with a header line (or none) and rows of numbers is needed",
@@ -137,7 +139,7 @@ def _separator(lines: list[str]) -> str:
         cells = [cell for row in rows[1:] or rows for cell in row]
         decimal = "," if separator in (";", "\t") else "."
         numeric = sum(
-            cell in _MISSING or _is_number(cell, ".") or (decimal == "," and _is_number(cell, ",")) for cell in cells
+            cell in _MISSING or is_number(cell, ".") or (decimal == "," and is_number(cell, ",")) for cell in cells
         )
         score = (round(numeric / len(cells), 2), round(count / len(rows), 2))
         if score > best_score:
@@ -155,17 +157,18 @@ def _decimal(lines: list[str], separator: str) -> str:
 
 
 def _is_header(first: list[str], second: list[str], decimal: str) -> bool:
-    numbers = [_is_number(cell, decimal) or cell in _MISSING[1:] for cell in first]
+    numbers = [is_number(cell, decimal) or cell in _MISSING[1:] for cell in first]
     if all(numbers):
         return False
     if not any(numbers):
         return True
     # Some cells are numbers: a header with numbers as names, or rows that hold a date beside numbers?
-    below = [_is_number(cell, decimal) or cell in _MISSING for cell in second]
+    below = [is_number(cell, decimal) or cell in _MISSING for cell in second]
     return below != numbers
 
 
-def _is_number(cell: str, decimal: str) -> bool:
+def is_number(cell: str, decimal: str) -> bool:
+    """True for what pandas takes for a number: infinity, true and false (1 and 0) among them."""
     pattern = _COMMA_NUMBER if decimal == "," else _NUMBER
     return pattern.fullmatch(cell) is not None
 

@@ -37,7 +37,7 @@ class Mat:
         keys = list(names) if wanted is None else wanted_keys(path, wanted, names)
         scalars = [variable for variable, shape in shapes.items() if not _names(variable, shape)]
         read = [variable for variable, shape in shapes.items() if set(_names(variable, shape)) & set(keys)]
-        values = _load(path, [*read, *scalars])
+        values = _load(path, {variable: shapes[variable] for variable in (*read, *scalars)})
         columns: dict[str, Column] = {}
         findings = [Finding(f"variable '{name}' is a {kind}: left out", severity="note") for name, kind in others]
         for variable in read:
@@ -93,17 +93,18 @@ def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, s
     return shapes, others
 
 
-def _load(path: Path, variables: list[str]) -> dict[str, Any]:
+def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
     from scipy.io import loadmat
 
     try:
         # Only variables of numbers are named: no struct, object or function is ever built.
-        values: dict[str, Any] = loadmat(str(path), appendmat=False, variable_names=variables)
+        values: dict[str, Any] = loadmat(str(path), appendmat=False, variable_names=list(variables))
     except Exception as fault:  # as above
         raise _unreadable(path, fault) from fault
-    lost = [variable for variable in variables if variable not in values]
-    if lost:
-        raise RecordingError(f"{path}: variable '{lost[0]}' cannot be read", "save the file anew with -v7")
+    for variable, shape in variables.items():
+        value = np.asarray(values.get(variable))
+        if value.dtype.kind not in "biufc" or value.shape != shape:
+            raise RecordingError(f"{path}: damaged: variable '{variable}' is not as announced", "save it anew with -v7")
     return values
 
 

@@ -41,8 +41,10 @@ def choose_format(path: Path) -> Format:
         FORMATS.load(name)() for name in FORMATS.names(plugins=path.suffix.lower() not in _suffixes())
     ]
     by_suffix = [item for item in formats if path.suffix.lower() in item.suffixes]
+    # Almost any text can pass for a table: one that claims to be of another format must hold numbers.
+    claimed = by_suffix and all(item.name != "csv" for item in by_suffix)
     for item in [*by_suffix, *formats]:
-        if item.sniff(path):
+        if item.sniff(path) and not (claimed and item.name == "csv" and not _is_table(item, path)):
             return item
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -61,7 +63,12 @@ def survey(path: Path) -> Source:
 
 
 def read_recording(path: Path, machine_file: MachineFile) -> Recording:
-    """One file as a recording on the load side; raises RecordingError or ConfigurationError."""
+    """One log as a recording on the load side; raises RecordingError or ConfigurationError.
+
+    A folder of MCAP files, as rosbag2 writes it, is one log in parts.
+    """
+    if path.is_dir() and (parts := sorted(path.glob("*.mcap"))):
+        return replace(read_parts(parts, machine_file, path.name), source=str(path))
     found = choose_format(path)
     channels = _map(found, machine_file, path)
     return assemble(found.columns(path, channels), channels, machine_file.machine)
@@ -124,6 +131,13 @@ def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
             f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
         )
     return channels
+
+
+def _is_table(found: Format, path: Path) -> bool:
+    try:
+        return bool(found.columns(path).columns)
+    except RecordingError:
+        return False
 
 
 def _suffixes() -> set[str]:

@@ -165,14 +165,16 @@ class Axis:
         """
         net = np.empty_like(torque)
         for j, axis in enumerate(self.axes):
-            force = torque[:, j] - axis.viscous * friction_speed[:, j]
+            force = net[:, j]
+            # In place: on long logs the time goes into fresh memory, not into arithmetic.
+            np.multiply(friction_speed[:, j], -axis.viscous, out=force)
+            force += torque[:, j]
             if axis.constant_force:
                 force -= axis.constant_force
             if axis.coulomb:
                 sliding = axis.coulomb * np.sign(speed[:, j])
                 sticking = np.clip(force, -axis.coulomb, axis.coulomb)
                 force -= np.where(np.abs(speed[:, j]) > axis.stick_speed, sliding, sticking)
-            net[:, j] = force
         return net
 
     def _referred(self, channel: str, series: Series) -> Series:

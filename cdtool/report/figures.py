@@ -83,16 +83,13 @@ def save(figure: Figure, path: Path) -> None:
     """Write a figure as its suffix says; raises UsageError for an unknown suffix, CdtoolError where it cannot."""
     from importlib import import_module
 
-    from matplotlib.text import Text
-
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UsageError(f"{plain(path)} is no name for a figure", f"a name that ends in {', '.join(SUFFIXES)}")
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)
     canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)
     kind = suffix[1:]
     with drawing():
+        _settle(figure)
         write_whole(path, lambda stream: getattr(canvas, f"print_{kind}")(stream, metadata=_METADATA[suffix]))
 
 
@@ -104,3 +101,20 @@ def label(text: object, length: int = 40) -> str:
 def unit_label(unit: str) -> str:
     """A unit as it is written in print."""
     return label({"m/s2": "m/s²", "rad/s2": "rad/s²", "1": "–"}.get(unit, unit), 16)
+
+
+def _settle(figure: Figure) -> None:
+    """Arrange once and round: the solver's last bits differ from run to run, and with them the bytes of an SVG."""
+    from matplotlib.transforms import Bbox
+
+    engine = figure.get_layout_engine()
+    if engine is None or not figure.axes:
+        return
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        axes.set_position(Bbox.from_bounds(*(round(value, 6) for value in axes.get_position().bounds)))
+    title = figure._suptitle  # type: ignore[attr-defined]
+    if title is not None:
+        x, y = title.get_position()
+        title.set_position((round(x, 6), round(y, 6)))

@@ -30,11 +30,11 @@ _ONE_LINE = (
 
 @dataclass(frozen=True)
 class Image:
-    """A figure beside the report: its file name, caption, and group (empty: of all groups)."""
+    """A figure beside the report: its file name, caption, and group (None: of all groups)."""
 
     name: str
     caption: str
-    group: str = ""
+    group: str | None = None
 
 
 def to_markdown(results: Results, images: Sequence[Image] = ()) -> str:
@@ -45,7 +45,7 @@ def to_markdown(results: Results, images: Sequence[Image] = ()) -> str:
         "debounce included. Mean, standard deviation and median are those of the n detected contacts; "
         "read them beside the missed and the not assessable ones."
     )
-    parts += [_image(image) for image in images if not image.group]
+    parts += [_image(image) for image in images if image.group is None]
     summaries = summarise(results)
     for group in results.groups:
         parts.append(f"## {escape(group)}")

@@ -77,6 +77,8 @@ def frame_signal(axes: Axes, parts: Iterable[tuple[Signal, Band]], joint: int, s
         value = signal.values[part, joint]
         judged = value[signal.status[part, joint] == 0]
         values.append(judged if len(judged) else value)
+        if not len(judged):
+            normal.append(value)
         lower, upper = band.lower[part, joint], band.upper[part, joint]
         normal.append(value[(value >= lower) & (value <= upper) & (signal.status[part, joint] == 0)])
         limits += [lower, upper]
@@ -172,7 +174,8 @@ def _draw_band(
 
 def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span, legend: Legend) -> None:
     for code, reason in REASONS.items():
-        found = stretches(status == code, time, (span[1] - span[0]) / _PIXELS)
+        column = (span[1] - span[0]) / _PIXELS
+        found = [item for item in stretches(status == code, time, column) if item[1] - item[0] > 2.0 * column]
         if not found:
             continue
         axes.broken_barh(

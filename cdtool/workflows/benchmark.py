@@ -63,8 +63,8 @@ class _Scored:
 def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Progress | None = None) -> Benchmark:
     """Learn every detector's threshold, run them over all groups, match alarms with contacts.
 
-    A log that cannot be read or scored is left out and named in `results.skipped`. Raises ConfigurationError for a wrong
-    file, SignatureError where nothing can be learned, RecordingError where nothing could be scored.
+    A log that cannot be read or scored is left out and named in `results.skipped`. Raises ConfigurationError for a
+    wrong file, SignatureError where nothing can be learned, RecordingError where nothing could be scored.
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
     machine_file = setup.machine_file

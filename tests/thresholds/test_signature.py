@@ -90,7 +90,7 @@ def test_the_band_freezes_where_the_axis_stops_after_a_contact():
 
 @pytest.mark.parametrize("alignment", ["time", "position", "time_then_position"])
 def test_a_later_start_does_not_shift_the_band(alignment):
-    """The band belongs to the stroke, not to the log: whatever the rest before it, the same limit at the same travel."""
+    """The band belongs to the stroke, not to the log."""
     shape = 100.0 + 80.0 * np.sin(20.0 * stroke()["position"].values[:, 0])
     fitted = Signature(alignment=alignment).fit([(stroke(), signal(shape + 0.1 * r)) for r in range(12)])
     _, early = fitted.evaluate(stroke(), signal(np.zeros(N)))
@@ -99,7 +99,7 @@ def test_a_later_start_does_not_shift_the_band(alignment):
 
 
 def test_too_few_runs_say_how_many_are_missing_unless_forced():
-    with pytest.raises(SignatureError, match="6 impact-free runs.*4 more"):
+    with pytest.raises(SignatureError, match=r"6 impact-free runs.*4 more"):
         Signature().fit(runs(6))
     assert Signature(force=True).fit(runs(6)).runs == 6
     with pytest.raises(SignatureError):

@@ -1,0 +1,124 @@
+"""Bad input: one clear line naming file, row or key and the next step; no traceback; the other files go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.command import Outcome, cdtool
+
+HEADER = "t,i_motor,n_motor,phi,acc_x,load_cell,n_ref,i_ref"
+
+
+def written(path: Path, text: str | bytes) -> Path:
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+@pytest.fixture
+def good(gate_folder: Path) -> list[str]:
+    return (gate_folder / "stiff" / "01.csv").read_text().splitlines()
+
+
+@pytest.fixture
+def detect(gate_folder: Path, feekf_signature: Path) -> Callable[..., Outcome]:
+    def run(*logs: Path) -> Outcome:
+        return cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("missing.csv", None, ("missing.csv", "no such file")),
+        ("empty.csv", "", ("empty.csv", "empty")),
+        ("header.csv", HEADER + "\n", ("header.csv", "no row of numbers")),
+        ("picture.csv", b"\x89PNG\r\n\x1a\n" + bytes(200), ("picture.csv", "not a")),
+        ("page.csv", "<!DOCTYPE html><html><body>404</body></html>\n", ("page.csv",)),
+        ("notes.csv", "This is a text about a gate.\nNothing else.\n", ("notes.csv",)),
+        ("column.csv", "t,i_motor\n0,1\n1,2\n2,3\n", ("column.csv", "n_motor")),
+        (
+            "word.csv",
+            HEADER + "\n0,1,1,1,1,1,1,1\n1,1,fast,1,1,1,1,1\n2,1,1,1,1,1,1,1\n",
+            ("word.csv", "line 3", "fast"),
+        ),
+        ("cut.mcap", b"\x89MCAP0\r\n" + bytes(40), ("cut.mcap",)),
+        ("fake.mcap", b"not an mcap file at all", ("fake.mcap", "not a")),
+        ("fake.mat", b"not a mat file at all", ("fake.mat", "not a")),
+        ("odd.xyz", b"\x00\x01\x02\x03" * 50, ("odd.xyz", "not a")),
+    ],
+)
+def test_a_bad_file_is_one_line_with_its_name_and_a_next_step(detect, tmp_path, name, content, words):
+    path = tmp_path / name
+    if content is not None:
+        written(path, content)
+    done = detect(path)
+    assert done.status == 2, done
+    assert done.out == "" and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
+    assert all(word in done.err for word in words), done.err
+    assert done.err.rstrip().endswith(")"), done.err  # the next step stands in brackets
+
+
+def test_the_other_files_go_on_and_the_end_says_which_were_left_out(detect, tmp_path, gate_folder):
+    bad = written(tmp_path / "bad.csv", "")
+    done = detect(bad, gate_folder / "stiff" / "01.csv", tmp_path / "none.csv")
+    assert done.status == 3
+    assert "alarm" in done.out
+    assert "bad.csv" in done.err and "none.csv" in done.err and "2 items were left out" in done.err
+
+
+def test_a_folder_instead_of_a_file_is_named(detect, gate_folder):
+    done = detect(gate_folder)
+    assert done.status == 2 and "folder" in done.err
+
+
+def test_backward_and_repeated_time_is_told_and_the_rest_is_used(detect, tmp_path, good, gate_folder):
+    lines = [*good[:3001], good[2500], *good[3001:4001], good[4000], *good[4001:]]
+    path = written(tmp_path / "time.csv", "\n".join(lines) + "\n")
+    told = cdtool("info", path, "-m", gate_folder / "machine.toml").out
+    assert "1 time stamps run backward" in told and "1 time stamps repeat" in told
+    assert "3002" in told
+    done = detect(path)
+    assert done.status == 0 and "alarm" in done.out
+
+
+def test_missing_values_are_told_and_do_not_blind_the_detector(detect, tmp_path, good, gate_folder):
+    lines = list(good)
+    for k in range(1000, 7000, 20):
+        cells = lines[k].split(",")
+        cells[2] = "nan" if k % 40 else ""
+        lines[k] = ",".join(cells)
+    path = written(tmp_path / "nan.csv", "\n".join(lines) + "\n")
+    assert "300 of 7200 values are missing" in cdtool("info", path, "-m", gate_folder / "machine.toml").out
+    done = detect(path)
+    assert done.status == 0 and "alarm" in done.out
+
+
+def test_a_channel_without_any_value_is_not_assessable_not_quiet(detect, tmp_path, good):
+    lines = [good[0], *(",".join([*line.split(",")[:4], "nan", *line.split(",")[5:]]) for line in good[1:])]
+    done = detect(written(tmp_path / "blind.csv", "\n".join(lines) + "\n"))
+    assert done.status == 0 and "not assessable" in done.out and "missing samples" in done.out
+
+
+def test_a_half_written_last_line_is_dropped_and_told(detect, tmp_path, good, gate_folder):
+    path = written(tmp_path / "half.csv", "\n".join(good)[:-20])
+    assert "last line" in cdtool("info", path, "-m", gate_folder / "machine.toml").out
+    assert detect(path).status == 0
+
+
+def test_an_unknown_unit_in_the_machine_file_lists_the_known_ones(gate_folder, tmp_path):
+    text = (gate_folder / "machine.toml").read_text().replace('"rpm"', '"rpms"', 1)
+    machine = written(tmp_path / "machine.toml", text)
+    done = cdtool("info", gate_folder / "stiff" / "01.csv", "-m", machine)
+    assert done.status == 2 and "channels.speed.unit" in done.err and "did you mean rpm" in done.err
+
+
+def test_names_from_files_cannot_command_the_terminal(detect, tmp_path):
+    evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
+    written(evil, "")
+    done = detect(evil)
+    assert done.status == 2
+    assert "\x1b" not in done.err and "\u202e" not in done.err

@@ -1,0 +1,263 @@
+"""The commands as a user meets them: what they print, write and return."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.command import cdtool
+
+COMMANDS = (("info",), ("learn-signature",), ("detect",), ("benchmark",), ("simulate", "gate"), ("list",))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_holds_an_example_and_ends_with_0(command):
+    done = cdtool(*command, "--help")
+    assert done.status == 0
+    assert "Example: cdtool" in done.out
+
+
+def test_the_version_is_shown():
+    from cdtool import __version__
+
+    assert cdtool("--version").out.strip() == f"cdtool {__version__}"
+
+
+def test_an_unknown_command_or_option_ends_with_2():
+    for arguments in (("detects",), ("info", "--machines", "x"), ("simulate",), ("benchmark",)):
+        assert cdtool(*arguments).status == 2
+
+
+def test_info_shows_columns_without_and_channels_with_a_machine_file(gate_folder):
+    log = gate_folder / "stiff" / "01.csv"
+    plain = cdtool("info", log)
+    assert plain.status == 0 and "i_motor" in plain.out and "separator comma" in plain.out
+    mapped = cdtool("info", log, "--machine", gate_folder / "machine.toml")
+    assert mapped.status == 0
+    for word in ("torque", "speed", "m/s", "1000", "accelerometer fits the speed", "poles at 0.2"):
+        assert word in mapped.out
+    (values,) = json.loads(cdtool("info", log, "--machine", gate_folder / "machine.toml", "--json").out)
+    by_name = {channel["name"]: channel for channel in values["channels"]}
+    assert by_name["speed"]["rate_hz"] == pytest.approx(1000.0)
+    assert by_name["force"]["maximum"] > 3000.0
+
+
+def test_info_finds_an_accelerometer_that_is_mounted_the_other_way_round(gate_folder, tmp_path):
+    text = (gate_folder / "machine.toml").read_text().replace('unit = "g", scale = -1', 'unit = "g", scale = 1')
+    (tmp_path / "m.toml").write_text(text)
+    done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
+    assert "warning: acceleration: accelerometer has the opposite sign" in done.out
+    text = text.replace('unit = "g", scale = 1', 'unit = "m/s2", scale = -1')
+    (tmp_path / "m.toml").write_text(text)
+    done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
+    assert "wrong scale" in done.out and "may hold g" in done.out
+
+
+def test_info_of_several_logs_goes_on_after_a_bad_one(gate_folder, tmp_path):
+    (tmp_path / "empty.csv").write_text("")
+    done = cdtool("info", tmp_path / "empty.csv", gate_folder / "stiff" / "01.csv")
+    assert done.status == 3 and "empty.csv" in done.err and "i_motor" in done.out
+    assert cdtool("info", tmp_path / "empty.csv").status == 2
+
+
+def test_learning_writes_a_signature_file_and_tells_its_class(feekf_signature, gate_folder, tmp_path):
+    values = json.loads(feekf_signature.read_text())
+    assert values["detector"]["name"] == "friction_ekf" and values["unit"] == "N s/m"
+    assert len(values["runs"]) == 11 and all(len(run["sha256"]) == 64 for run in values["runs"])
+    logs = sorted((gate_folder / "free").glob("*.csv"))
+    machine = gate_folder / "machine.toml"
+    done = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "gm.json", "--json")
+    assert json.loads(done.out)["classes"] == [{"direction": 1, "nominal_speed": pytest.approx(0.2), "runs": 11}]
+
+
+def test_too_few_runs_end_with_2_and_say_how_many_are_missing(gate_folder, tmp_path):
+    logs = sorted((gate_folder / "free").glob("*.csv"))[:7]
+    arguments = ("learn-signature", *logs, "-m", gate_folder / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")
+    done = cdtool(*arguments)
+    assert done.status == 2 and "7 impact-free runs" in done.err and "3 more are needed" in done.err
+    assert not (tmp_path / "s.json").exists()
+    forced = cdtool(*arguments, "--force")
+    assert forced.status == 0 and "7 runs forward" in forced.err and (tmp_path / "s.json").exists()
+
+
+def test_a_bad_run_is_left_out_by_name_and_the_status_is_3(gate_folder, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("t,i_motor\n0,1\n1,2\n")
+    logs = sorted((gate_folder / "free").glob("*.csv"))
+    arguments = ("learn-signature", *logs, broken, "-m", gate_folder / "machine.toml", "-d", "gm")
+    done = cdtool(*arguments, "-o", tmp_path / "s.json")
+    assert done.status == 3
+    assert "broken.csv" in done.err and "n_motor" in done.err and "Traceback" not in done.err
+    assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
+
+
+def test_detecting_an_impact_tells_time_and_latency_and_draws(gate_folder, feekf_signature, tmp_path):
+    plot = tmp_path / "out.png"
+    arguments = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
+    done = cdtool("detect", gate_folder / "stiff" / "01.csv", *arguments, "--plot", plot)
+    assert done.status == 0 and "alarm" in done.out and plot.read_bytes()[:4] == b"\x89PNG"
+    (values,) = json.loads(cdtool("detect", gate_folder / "stiff" / "01.csv", *arguments, "--json").out)
+    alarm, contact = values["alarms"][0], values["contacts"][0]
+    assert values["verdict"] == "alarm" and 0.02 < alarm["time_s"] - contact["onset_s"] < 0.05
+    quiet = cdtool("detect", gate_folder / "holdout" / "01.csv", *arguments)
+    assert quiet.status == 0 and "no alarm" in quiet.out
+
+
+def test_detecting_with_a_hand_set_limit(gate_folder):
+    log = gate_folder / "stiff" / "01.csv"
+    machine = ("-m", gate_folder / "machine.toml")
+    done = cdtool("detect", log, *machine, "-d", "gm", "--limit", "250", "--json")
+    (values,) = json.loads(done.out)
+    assert values["alarms"][0]["limit"] == 250.0
+    for wrong in (("--limit", "250"), ("-d", "gm"), ("-d", "gm", "--limit", "many"), ("-d", "gmm", "--limit", "3")):
+        assert cdtool("detect", log, *machine, *wrong).status == 2
+
+
+def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp_path):
+    text = (gate_folder / "machine.toml").read_text() + "\n[detectors.feekf]\nminimum_speed = 0.04\n"
+    (tmp_path / "machine.toml").write_text(text)
+    log = gate_folder / "stiff" / "01.csv"
+    done = cdtool("detect", log, "-m", tmp_path / "machine.toml", "-s", feekf_signature)
+    assert done.status == 2 and "minimum_speed" in done.err
+
+
+def test_a_log_of_another_speed_is_not_assessable_not_silent(gate_folder, feekf_signature, tmp_path):
+    lines = (gate_folder / "free" / "01.csv").read_text().splitlines()
+    slow = [lines[0]]
+    for line in lines[1:]:
+        cells = line.split(",")
+        cells[2], cells[6] = f"{float(cells[2]) / 2:.3f}", f"{float(cells[6]) / 2:.3f}"
+        slow.append(",".join(cells))
+    (tmp_path / "slow.csv").write_text("\n".join(slow) + "\n")
+    done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    assert done.status == 0 and "not assessable" in done.out and "no signature for its class" in done.out
+
+
+def test_updating_adds_free_runs_and_refuses_impacts_and_repeats(gate_folder, feekf_signature, tmp_path):
+    signature = tmp_path / "s.json"
+    signature.write_bytes(feekf_signature.read_bytes())
+    machine = ("-m", gate_folder / "machine.toml")
+    logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
+    done = cdtool("learn-signature", *logs, *machine, "--update", signature)
+    assert done.status == 3 and "1 runs added" in done.out
+    assert "not an impact-free run" in done.err and "in the signature already" in done.err
+    before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
+    assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
+
+
+def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path):
+    results, report = tmp_path / "results.json", tmp_path / "report"
+    done = cdtool("benchmark", gate_folder / "benchmark.toml", "-o", results, "-o", report)
+    assert done.status == 0, done.err
+    assert "friction_ekf (feekf)" in done.out and "false alarms" in done.out
+    values = json.loads(results.read_text())
+    assert values["schema_version"] == 1
+    assert len(values["contacts"]) == 20 and len(values["exposure"]) == 15
+    stiff = {c["detector"]: c["latency_ms"] for c in values["contacts"] if c["recording"] == "stiff/01.csv"}
+    assert stiff["pure_inertia"] < stiff["friction_ekf"] < stiff["momentum"] < stiff["pure_torque"]
+    wanted = {"recording", "group", "detector", "joint", "onset_s", "onset_uncertainty_s", "alarm_s", "latency_ms"}
+    assert wanted | {"outcome", "force_at_alarm_n", "peak_force_n"} <= set(values["contacts"][0])
+    provenance = values["provenance"]
+    assert provenance["tool_version"] and len(provenance["logs_sha256"]) == 17
+    assert provenance["gains"]["momentum"] == {"bandwidth": 10.0}
+    assert (report / "report.md").exists() and list(report.glob("*.png"))
+
+
+def test_the_benchmark_is_the_same_bytes_whatever_the_number_of_jobs(gate_folder, tmp_path):
+    for jobs in (1, 4):
+        done = cdtool("benchmark", gate_folder / "benchmark.toml", "-o", tmp_path / f"{jobs}.json", "-j", jobs)
+        assert done.status == 0, done.err
+    assert (tmp_path / "1.json").read_bytes() == (tmp_path / "4.json").read_bytes()
+
+
+def benchmark_with(gate_folder: Path, tmp_path: Path, old: str, new: str) -> Path:
+    text = (gate_folder / "benchmark.toml").read_text().replace('"machine.toml"', f'"{gate_folder}/machine.toml"')
+    for group in ("free", "holdout", "stiff", "soft"):
+        text = text.replace(f'"{group}/', f'"{gate_folder}/{group}/')
+    old = old.replace("GATE", str(gate_folder))
+    assert old in text
+    path = tmp_path / "benchmark.toml"
+    path.write_text(text.replace(old, new.replace("GATE", str(gate_folder))))
+    return path
+
+
+def test_a_run_that_is_learned_and_scored_is_refused(gate_folder, tmp_path):
+    path = benchmark_with(gate_folder, tmp_path, '["GATE/holdout/*.csv"]', '["GATE/holdout/*.csv", "GATE/free/01.csv"]')
+    done = cdtool("benchmark", path)
+    assert done.status == 2 and "learned from and scored" in done.err and "01.csv" in done.err
+
+
+def test_an_impact_log_without_contact_is_left_out_by_name(gate_folder, tmp_path):
+    path = benchmark_with(gate_folder, tmp_path, '["GATE/stiff/*.csv"]', '["GATE/stiff/*.csv", "GATE/holdout/02.csv"]')
+    path.write_text(path.read_text().replace(f'"{gate_folder}/holdout/*.csv"', f'"{gate_folder}/holdout/01.csv"'))
+    done = cdtool("benchmark", path, "-o", tmp_path / "r.json")
+    assert done.status == 3 and "no contact found" in done.err and "02.csv" in done.err
+    assert [item["reason"][:50] for item in json.loads((tmp_path / "r.json").read_text())["skipped"]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"pi", "feekf"', '"pii", "feekf"', ("pii", "pi")),
+        ("[learn]", "[lern]", ("learn", "missing")),
+        ('"GATE/stiff/*.csv"', '"GATE/stif/*.csv"', ("impacts.stiff.logs", "nothing matches")),
+        ("above_n = 20.0", "above_n = -1", ("onset.above_n", "above 0")),
+        ("back_to_n = 8.0", "back_to_n = 30.0", ("onset.back_to_n", "more than above_n")),
+        ("above_n", "above", ("onset.above", "above_n")),
+        ("machine.toml", "machine.tml", ("machine.tml", "no such file")),
+    ],
+)
+def test_a_wrong_benchmark_file_is_one_line_naming_the_key(gate_folder, tmp_path, old, new, words):
+    done = cdtool("benchmark", benchmark_with(gate_folder, tmp_path, old, new))
+    assert done.status == 2
+    assert done.err.count("\n") == 1 and all(word in done.err for word in words), done.err
+
+
+def test_an_unknown_output_is_refused_before_any_work(gate_folder, tmp_path):
+    done = cdtool("benchmark", gate_folder / "benchmark.toml", "-o", tmp_path / "results.xlsx")
+    assert done.status == 2 and ".json" in done.err
+
+
+def test_listing_tells_detectors_with_gains_units_and_defaults():
+    entries = {entry["name"]: entry for entry in json.loads(cdtool("list", "detectors", "--json").out)}
+    assert set(entries) == {"pure_torque", "pure_inertia", "momentum", "inertial_momentum", "friction_ekf"}
+    assert entries["momentum"]["short_name"] == "gm"
+    assert entries["momentum"]["gains"][0]["default"] == 10.0 and entries["momentum"]["gains"][0]["unit"] == "rad/s"
+    for kind in ("thresholds", "machines", "formats"):
+        assert cdtool("list", kind).status == 0
+    assert cdtool("list", "detector").status == 2
+
+
+def test_simulating_is_reproducible_and_refuses_a_folder_that_is_in_use(tmp_path):
+    arguments = ("simulate", "gate", "--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 3)
+    for name in ("a", "b"):
+        assert cdtool(*arguments, "-o", tmp_path / name).status == 0
+    for path in sorted((tmp_path / "a").rglob("*.*")):
+        assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path
+    assert cdtool(*arguments, "-o", tmp_path / "a").status == 2
+    more = cdtool(
+        "simulate", "gate", "--free", 2, "--holdout", 0, "--stiff", 0, "--soft", 0, "--seed", 3, "-o", tmp_path / "c"
+    )
+    assert more.status == 0
+    assert (tmp_path / "c" / "free" / "01.csv").read_bytes() == (tmp_path / "a" / "free" / "01.csv").read_bytes()
+
+
+def test_mcap_and_csv_of_the_same_run_give_the_same_alarm(gate_folder, feekf_signature, tmp_path):
+    arguments = ("simulate", "gate", "--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 5)
+    assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
+    alarms = []
+    for log in (tmp_path / "m" / "stiff" / "01.mcap", gate_folder / "stiff" / "01.csv"):
+        done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-s", feekf_signature, "--json")
+        alarms.append(json.loads(done.out)[0]["alarms"][0]["time_s"])
+    assert alarms[0] == pytest.approx(alarms[1], abs=1.5e-3)
+
+
+def test_output_to_a_closed_pipe_ends_quietly():
+    code = "import sys; from cdtool.cli.app import main; sys.argv = ['cdtool', 'list', 'detectors']; main()"
+    command = f'{sys.executable} -c "{code}" | true'
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert "Traceback" not in done.stderr

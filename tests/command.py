@@ -1,0 +1,31 @@
+"""Running a command line in this process, as a shell would see it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass
+from unittest import mock
+
+from cdtool.cli.app import main
+
+
+@dataclass(frozen=True)
+class Outcome:
+    status: int
+    out: str
+    err: str
+
+
+def cdtool(*arguments: object) -> Outcome:
+    """`cdtool ARGUMENTS`: exit status, standard output, standard error."""
+    out, err = io.StringIO(), io.StringIO()
+    status = 0
+    argv = ["cdtool", *map(str, arguments)]
+    with mock.patch.object(sys, "argv", argv), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    return Outcome(int(status), out.getvalue(), err.getvalue())

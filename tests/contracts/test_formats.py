@@ -1,0 +1,73 @@
+"""What holds for every registered format, machine and plug-in."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+import cdtool.formats
+import cdtool.machines
+from cdtool.detectors import DETECTORS
+from cdtool.errors import CdtoolError, UsageError
+from cdtool.formats import FORMATS
+from cdtool.machines import MACHINES
+from cdtool.registry import Registry
+
+REGISTRIES = (FORMATS, MACHINES, DETECTORS)
+
+
+def test_every_file_of_the_folder_with_a_format_is_registered():
+    folder = Path(cdtool.formats.__file__).parent
+    helpers = {"__init__", "source", "channel_assembly", "reading", "csv_dialect", "csv_rows", "mat_check"}
+    names = {path.stem for path in folder.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert names - helpers == set(FORMATS.table)
+
+
+def test_every_file_of_the_folder_with_a_machine_is_registered():
+    folder = Path(cdtool.machines.__file__).parent
+    assert {path.stem for path in folder.glob("*.py")} - {"__init__", "axis"} == set(MACHINES.table)
+
+
+@pytest.mark.parametrize("name", FORMATS.names())
+def test_a_format_knows_its_suffixes_and_refuses_what_is_of_another(name, tmp_path):
+    found = FORMATS.load(name)()
+    assert found.name == name and all(suffix.startswith(".") for suffix in found.suffixes)
+    path = tmp_path / f"x{found.suffixes[0]}"
+    for content in (b"", b"\x00" * 64, b"\x89PNG\r\n\x1a\n" + bytes(64)):
+        path.write_bytes(content)
+        assert found.sniff(path) is False
+        with pytest.raises(CdtoolError, match=r"x\."):
+            found.columns(path)
+
+
+@pytest.mark.parametrize("registry", REGISTRIES, ids=lambda registry: registry.kind)
+def test_an_unknown_name_lists_the_nearest_known_ones(registry):
+    wrong = registry.names()[0][:-1] + "_"
+    with pytest.raises(UsageError, match=f"did you mean {registry.names()[0]}"):
+        registry.load(wrong)
+
+
+class Fake:
+    """A detector of another package."""
+
+
+def test_a_plugin_is_looked_for_only_when_an_unknown_name_is_asked_for(monkeypatch):
+    asked = []
+
+    def found(group: str) -> list[EntryPoint]:
+        asked.append(group)
+        return [
+            EntryPoint("mine", "tests.contracts.test_formats:Fake", group),
+            EntryPoint("broken", "no_such_package.detector:X", group),
+        ]
+
+    monkeypatch.setattr("cdtool.registry.entry_points", found)
+    registry = Registry("detector", dict(DETECTORS.table))
+    registry.load("momentum")
+    assert asked == []
+    assert registry.load("mine") is Fake
+    assert "mine" in registry.names(plugins=True)
+    with pytest.raises(CdtoolError, match="no_such_package"):
+        registry.load("broken")

@@ -1,0 +1,91 @@
+"""A learned gate: what a detector says of a simulated run, as the workflows would hand it to a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from cdtool.activation import Activation
+from cdtool.detectors import DETECTORS
+from cdtool.evaluation.matching import match
+from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results, Skipped
+from cdtool.machines.linear_axis import LinearAxis
+from cdtool.operations import operations_of
+from cdtool.pipeline import Detection, detect_operation, run_detector
+from cdtool.recording import Recording
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.benchmark import Trace
+from cdtool.workflows.detection import Detected
+
+NAMES = ("pure_inertia", "friction_ekf", "momentum", "pure_torque")
+RULE = OnsetRule(above=20.0, back_to=8.0)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Detectors with their signatures."""
+
+    detect: Callable[[Recording, str], Detection]
+
+    def detected(self, recording: Recording, name: str) -> Detected:
+        return Detected(recording, (self.detect(recording, name),), tuple(find_contacts(recording, RULE)))
+
+    def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
+        detections = tuple(self.detect(recording, name) for name in names)
+        contacts = tuple(find_contacts(recording, RULE))
+        matchings = tuple(match(item.verdict.alarms, contacts, item.statistic) for item in detections)
+        return Trace(group, operations_of(recording)[0], contacts, detections, matchings)
+
+
+@pytest.fixture(scope="session")
+def bench(gate: LinearAxis, simulated: Callable[[str, int], Recording]) -> Bench:
+    free = [operations_of(simulated("none", seed))[0] for seed in range(10)]
+    detectors = {name: DETECTORS.load(name)() for name in NAMES}
+    learned = {
+        name: Signature().fit([(op.recording.without_ground_truth(), run_detector(op, gate, detector)) for op in free])
+        for name, detector in detectors.items()
+    }
+
+    def detect(recording: Recording, name: str) -> Detection:
+        operation = operations_of(recording)[0]
+        return detect_operation(operation, gate, detectors[name], (learned[name],), Activation())
+
+    return Bench(detect)
+
+
+def contact(
+    detector: str, group: str, latency: float | None, outcome: str = "detected", name: str = "01"
+) -> ContactResult:
+    alarm = None if latency is None else 5.0 + 1e-3 * latency
+    return ContactResult(name, group, detector, "gate", 5.0, 5e-4, alarm, latency, outcome, None, 3600.0)
+
+
+@pytest.fixture
+def results() -> Results:
+    """Two detectors; slow latencies of `momentum`, one miss, one not assessable, one false alarm."""
+    rng = np.random.default_rng(3)
+    contacts = [contact("friction_ekf", "stiff", x) for x in (30.0, 34.0, 38.0)]
+    contacts += [contact("momentum", "stiff", x) for x in (60.0, 70.0)]
+    contacts += [contact("momentum", "stiff", None, "missed"), contact("friction_ekf", "stiff", None, "not_assessable")]
+    contacts += [contact("momentum", "soft", float(x)) for x in rng.uniform(300.0, 400.0, 30)]
+    return Results(
+        provenance={
+            "tool_version": "9.8.7",
+            "onset": "above 20 N, back to 8 N",
+            "machine_sha256": "c0ffee" * 10,
+            "short_names": {"friction_ekf": "feekf"},
+            "gains": {"momentum": {"bandwidth": 30.0}},
+            "signature_sha256": {"momentum": "5eed" * 16},
+            "logs_sha256": {"stiff/01.csv": "ab12" * 16},
+        },
+        detectors=("friction_ekf", "momentum"),
+        groups=("stiff", "soft", "holdout"),
+        contacts=tuple(contacts),
+        false_alarms=(FalseAlarmResult("h1", "holdout", "momentum", "gate", 1.0),),
+        exposure=(ExposureResult("holdout", "momentum", 40, 40, 0.1), ExposureResult("stiff", "momentum", 3, 3, 0.01)),
+        skipped=(Skipped("broken.csv", "broken.csv: empty file"),),
+    )

@@ -1,0 +1,301 @@
+"""Figures say what happened, in plain text, with the same bytes each time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib
+import numpy as np
+import pytest
+
+from cdtool.activation import Activation
+from cdtool.detection import Signal, Status, Verdict
+from cdtool.errors import CdtoolError, UsageError
+from cdtool.evaluation.matching import match
+from cdtool.evaluation.onset import find_contacts
+from cdtool.operations import operations_of
+from cdtool.pipeline import Detection
+from cdtool.recording import Recording, Series
+from cdtool.report import detection_plot, latency_plot, trigger_plot
+from cdtool.report.detection_plot import plot_detected
+from cdtool.report.figures import SUFFIXES, drawing, new_figure, save
+from cdtool.report.latency_plot import plot_latencies
+from cdtool.report.style import look_of
+from cdtool.report.trigger_plot import plot_triggers
+from cdtool.thresholds.limit import Limit
+from cdtool.workflows.detection import Detected
+from tests.report.conftest import NAMES, RULE, Bench, contact
+from tests.report.hostile import HOSTILE
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def texts(path: Path) -> list[str]:
+    """Every text of an SVG, in order; an XML error where the file is none."""
+    return ["".join(item.itertext()) for item in ElementTree.parse(path).iter(f"{SVG}text")]
+
+
+def joined(path: Path) -> str:
+    found = texts(path)
+    assert found
+    return "\n".join(found)
+
+
+@pytest.fixture
+def six_joints() -> Detected:
+    """A log of 6 joints with hand-set limits of which joints 1 and 3 are exceeded; joint 4 is not watched."""
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 10.0, 2e-3)
+    torque = rng.normal(0.0, 1.0, (len(time), 6))
+    torque[2500:2600, [1, 3]] += 60.0
+    names = tuple(f"joint_{i}" for i in range(6))
+    channels = {"torque": Series(time, torque, "N m"), "speed": Series(time, np.ones((len(time), 6)), "rad/s")}
+    recording = Recording("arm", "arm.csv", names, channels)
+    status = np.zeros(torque.shape, dtype=np.uint8)
+    status[1000:1200] = Status.GAP
+    statistic, band = Limit.given((40, 40, 40, 40, float("inf"), 40), 6).evaluate(
+        recording, Signal(time, torque, status, "N m")
+    )
+    alarms = Activation().alarms(statistic, band)
+    assert {alarm.joint for alarm in alarms} == {1, 3}
+    operation = operations_of(recording)[0]
+    return Detected(recording, (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),), ())
+
+
+def test_a_detection_names_latency_alarm_onset_and_what_was_not_assessable(bench: Bench, simulated, tmp_path):
+    found = bench.detected(simulated("stiff", 1), "friction_ekf")
+    (alarm, *_), (hit, *_) = found.detections[0].verdict.alarms, found.contacts
+    plot_detected(found, tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert f"latency {1e3 * (alarm.time - hit.start):.0f} ms" in shown
+    assert f"alarm {alarm.time:.3f} s" in shown
+    assert f"onset {hit.start:.3f} s" in shown
+    for expected in (
+        "stiff1",
+        "friction_ekf",
+        "not assessable: start-up",
+        "load cell [N]",
+        "trigger",
+        "signal [N s/m]",
+    ):
+        assert expected in shown
+    assert "time from contact onset [ms]" in shown
+
+
+def test_a_run_without_alarm_has_neither_zoom_nor_latency(bench: Bench, simulated, tmp_path):
+    plot_detected(bench.detected(simulated("none", 77), "momentum"), tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "no alarm" in shown
+    assert "time [s]" in shown
+    assert "latency" not in shown
+    assert "[ms]" not in shown
+
+
+def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simulated, tmp_path):
+    found = bench.detected(simulated("stiff", 1), "momentum")
+    detection = found.detections[0]
+    silent = replace(detection, verdict=Verdict("no alarm"))
+    plot_detected(replace(found, detections=(silent,)), tmp_path / "missed.svg")
+    assert "missed" in joined(tmp_path / "missed.svg")
+    assert "not assessable: missing samples" not in joined(tmp_path / "missed.svg")
+    status = np.full_like(detection.statistic.status, Status.GAP)
+    blind = replace(
+        detection,
+        statistic=replace(detection.statistic, status=status),
+        verdict=Verdict("not assessable", reason="missing samples 100 %"),
+    )
+    plot_detected(replace(found, detections=(blind,)), tmp_path / "blind.svg")
+    shown = joined(tmp_path / "blind.svg")
+    assert "not assessable: missing samples 100 %" in shown
+    assert "missed" not in shown
+
+
+def test_only_the_joints_that_alarm_are_drawn_and_the_others_are_counted(six_joints, tmp_path):
+    plot_detected(six_joints, tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "joint_1" in shown
+    assert "joint_3" in shown
+    assert "joint_0" not in shown
+    assert "2 of 6 joints shown: those that alarm" in shown
+    assert "not assessable: missing samples" in shown
+    assert "load cell" not in shown
+
+
+def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(bench: Bench, simulated, tmp_path):
+    trace = bench.trace(simulated("stiff", 2), "stiff")
+    detections, matchings = list(trace.detections), list(trace.matchings)
+    first = NAMES.index("pure_inertia")
+    detections[first] = replace(detections[first], verdict=Verdict("no alarm"))
+    matchings[first] = match((), trace.contacts, detections[first].statistic)
+    trace = replace(trace, detections=tuple(detections), matchings=tuple(matchings))
+    plot_triggers(trace, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    order = [next(i for i, text in enumerate(shown) if text.startswith(name)) for name in NAMES]
+    by_name = dict(zip(NAMES, order, strict=True))
+    assert sorted(NAMES, key=by_name.__getitem__) == ["friction_ekf", "momentum", "pure_torque", "pure_inertia"]
+    late = {d.detector: m.matches[0].latency for d, m in zip(detections, matchings, strict=True)}
+    for name in ("friction_ekf", "momentum", "pure_torque"):
+        assert f"{1e3 * late[name]:.0f} ms" in shown
+    assert "missed" in shown
+
+
+def test_triggers_of_a_run_without_contact_say_so(bench: Bench, simulated, tmp_path):
+    plot_triggers(bench.trace(simulated("none", 77), "holdout"), tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    assert shown.count("no alarm") == len(NAMES)
+    assert any("no contact" in text for text in shown)
+
+
+def test_latencies_show_counts_of_missed_and_not_assessable(results, tmp_path):
+    plot_latencies(results, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    for expected in ("stiff", "soft", "friction_ekf", "momentum", "34", "3 of 4", "2 of 3", "30 of 30", "missed"):
+        assert expected in shown
+    assert "holdout" not in shown
+
+
+def test_latencies_over_more_than_a_decade_get_a_logarithmic_axis(results):
+    with drawing():
+        wide = latency_plot._figure(results)
+        narrow = latency_plot._figure(replace(results, groups=("stiff",)))
+    assert {axes.get_xscale() for axes in wide.axes} == {"log"}
+    assert {axes.get_xscale() for axes in narrow.axes} == {"linear"}
+    assert narrow.axes[0].get_xlim()[0] == 0.0
+
+
+def test_a_latency_of_zero_is_drawn_on_a_logarithmic_axis_and_said(results, tmp_path):
+    more = replace(results, contacts=(*results.contacts, contact("momentum", "stiff", 0.0)))
+    plot_latencies(more, tmp_path / "a.svg")
+    assert "below 1 ms drawn there" in joined(tmp_path / "a.svg")
+
+
+def test_latencies_without_any_contact_or_detection_are_drawn_too(results, tmp_path):
+    plot_latencies(replace(results, contacts=()), tmp_path / "none.svg")
+    assert "no contact in any group" in joined(tmp_path / "none.svg")
+    missed = tuple(replace(item, latency_ms=None, alarm_s=None, outcome="missed") for item in results.contacts)
+    plot_latencies(replace(results, contacts=missed), tmp_path / "missed.svg")
+    assert "0 of 30" in texts(tmp_path / "missed.svg")
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_same_figure_has_the_same_bytes(bench: Bench, simulated, results, tmp_path, suffix):
+    found, trace = bench.detected(simulated("soft", 1), "pure_inertia"), bench.trace(simulated("soft", 1), "soft")
+    written = []
+    for name in ("a", "b"):
+        plot_detected(found, tmp_path / f"{name}d{suffix}")
+        plot_triggers(trace, tmp_path / f"{name}t{suffix}")
+        plot_latencies(results, tmp_path / f"{name}l{suffix}")
+        written.append([(tmp_path / f"{name}{kind}{suffix}").read_bytes() for kind in "dtl"])
+    assert written[0] == written[1]
+    assert all(len(content) > 1000 for content in written[0])
+
+
+def test_neither_the_users_settings_nor_ours_leak(results, tmp_path):
+    plot_latencies(results, tmp_path / "a.png")
+    with matplotlib.rc_context({"text.usetex": True, "savefig.dpi": 30, "lines.linewidth": 9, "savefig.bbox": "tight"}):
+        before = dict(matplotlib.rcParams)
+        plot_latencies(results, tmp_path / "b.png")
+        assert dict(matplotlib.rcParams) == before
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "suffix"), [*((kind, ".svg") for kind in HOSTILE), ("math", ".png"), ("long", ".pdf")]
+)
+def test_hostile_names_are_drawn_as_plain_text(bench: Bench, simulated, results, tmp_path, kind, suffix):
+    name = HOSTILE[kind]
+    recording = replace(simulated("stiff", 1), name=name, joints=(name,))
+    plot_detected(bench.detected(recording, "momentum"), tmp_path / f"d{suffix}")
+    trace = bench.trace(recording, name, ("momentum",))
+    plot_triggers(replace(trace, detections=(replace(trace.detections[0], detector=name),)), tmp_path / f"t{suffix}")
+    renamed = tuple(replace(item, group=name, detector=name) for item in results.contacts)
+    plot_latencies(replace(results, groups=(name,), detectors=(name,), contacts=renamed), tmp_path / f"l{suffix}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"{figure}{suffix}" for figure in "dtl")
+    if suffix == ".svg":
+        for figure in "dtl":
+            shown = joined(tmp_path / f"{figure}.svg")
+            assert not set(shown) & set("\u202e\u2067\x00\x1b\ufffe")
+            assert all(len(text) < 130 for text in texts(tmp_path / f"{figure}.svg"))
+            if kind == "math":
+                assert "$x^2$" in shown
+            if kind == "script":
+                assert "<script>" in shown  # as a text, not as an element
+                assert not list(ElementTree.parse(tmp_path / f"{figure}.svg").iter(f"{SVG}script"))
+
+
+def test_no_text_of_any_figure_is_read_as_mathematics(bench: Bench, simulated, results):
+    from matplotlib.text import Text
+
+    recording = simulated("stiff", 1)
+    found = bench.detected(recording, "momentum")
+    matching = match(found.detections[0].verdict.alarms, find_contacts(recording, RULE), found.detections[0].statistic)
+    with drawing():
+        figures = [
+            detection_plot._figure(found, (matching,)),
+            trigger_plot._figure(bench.trace(recording, "stiff")),
+            latency_plot._figure(results),
+        ]
+        for figure in figures:
+            figure.draw_without_rendering()
+            artists = figure.findobj(Text)
+            assert len(artists) > 10
+            assert not any(artist.get_parse_math() for artist in artists)
+
+
+def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, results, six_joints):
+    recording = simulated("stiff", 1)
+    found = bench.detected(replace(recording, name="n" * 300, joints=("j" * 300,)), "friction_ekf")
+    six = replace(six_joints, recording=replace(six_joints.recording, name="n" * 300))
+    with drawing():
+        figures = [
+            detection_plot._figure(found, [detection_plot._matching(found.detections[0], found.contacts)]),
+            detection_plot._figure(six, [detection_plot._matching(six.detections[0], ())]),
+            trigger_plot._figure(bench.trace(recording, "g" * 300)),
+            latency_plot._figure(results),
+        ]
+        for figure in figures:
+            figure.draw_without_rendering()
+            drawn = figure.get_tightbbox()
+            width, height = figure.get_size_inches()
+            assert drawn.x0 >= -0.02
+            assert drawn.y0 >= -0.02
+            assert drawn.x1 <= width + 0.02
+            assert drawn.y1 <= height + 0.02
+
+
+def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(results, tmp_path):
+    with pytest.raises(CdtoolError, match="cannot be written") as fault:
+        plot_latencies(results, tmp_path / "no" / "a.png")
+    assert "make the folder" in fault.value.hint
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(CdtoolError) as fault:
+        plot_latencies(results, tmp_path / "folder.png")
+    assert "folder" in fault.value.hint
+    with pytest.raises(UsageError, match=r"a\.gif") as fault:
+        plot_latencies(results, tmp_path / "a.gif")
+    assert ".svg" in fault.value.hint
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch):
+    target = tmp_path / "a.png"
+    target.write_bytes(b"old")
+
+    def fail(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with drawing():
+        figure = new_figure(2.0, 2.0)
+        monkeypatch.setattr("matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", fail)
+        with pytest.raises(CdtoolError, match="No space left"):
+            save(figure, target)
+    assert target.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_detector_looks_the_same_everywhere_and_known_ones_differ():
+    assert len({look_of(name).colour for name in (*NAMES, "inertial_momentum")}) == 5
+    assert len({look_of(name).marker for name in (*NAMES, "inertial_momentum")}) == 5
+    assert look_of("someone's plug-in") == look_of("someone's plug-in")

@@ -1,0 +1,28 @@
+"""Text from files is made harmless, and long text short."""
+
+from __future__ import annotations
+
+import pytest
+
+from cdtool.plain_text import plain, shorten
+from tests.report.hostile import HOSTILE
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_plain_text_is_one_line_of_printable_characters_of_the_same_length(kind):
+    text = plain(HOSTILE[kind])
+    assert len(text) == len(HOSTILE[kind])
+    assert len(text.splitlines()) <= 1
+    assert text.isprintable()
+    text.encode("utf-8")
+
+
+def test_ordinary_text_of_any_language_stays():
+    assert plain("Tür 7 — 門 α_β.csv") == "Tür 7 — 門 α_β.csv"
+
+
+def test_long_text_keeps_its_beginning_and_end():
+    text = "a_long_name_of_a_recording_0042"
+    assert shorten(text, 12) == "a_long…_0042"
+    assert len(shorten(text, 12)) == 12
+    assert shorten(text, len(text)) == text
