@@ -75,8 +75,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     cells = [[str(cell) for cell in row] for row in (head, *rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
     for row in cells:
-        first, *others = (cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths)))
-        print("  ".join((first, *others)).rstrip())
+        others = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        print("  ".join((row[0].ljust(widths[0]), *others)).rstrip())
 
 
 def verdict(name: str, spread: Spread, target: float, at_most: bool = False) -> bool:

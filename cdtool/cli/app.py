@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import sys
+import warnings
 from typing import Annotated
 
 import typer
@@ -50,8 +52,14 @@ def _options(
     """
 
 
+def _show_note(message: Warning | str, *_: object, **__: object) -> None:
+    typer.echo(f"note: {message}", err=True)
+
+
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
+    warnings.showwarning = _show_note
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
     try:
         app()
     except CdtoolError as fault:

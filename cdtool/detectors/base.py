@@ -165,9 +165,8 @@ def _observe(
             x = bandwidth * elapsed
             if x < 0.02:
                 # 1 - exp(-x) to the last bit, without the call of exp.
-                weight = x * (
-                    1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0)))))
-                )
+                tail = 1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))
+                weight = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * tail)))
             else:
                 weight = 1.0 - np.exp(-x)
             value += weight * ((impulse - (momentum[k] - last_momentum)) / elapsed - value)
