@@ -3,8 +3,8 @@
     python benchmarks/gate_accuracy.py            # seeds 11 12 13 14 15
     python benchmarks/gate_accuracy.py 101 102    # others
 
-Each seed: 14 free runs to learn from, 40 hold-out runs, 30 stiff and 30 soft impacts, simulated in memory. Every gain
-is the detector's default, for all seeds and groups alike. What is compared is the simulated gate; it is tuned so that
+Each seed: 14 free runs to learn from, 40 hold-out runs, 30 stiff and 30 soft impacts, simulated in memory: the runs
+that `cdtool simulate gate --seed` writes. Every gain is the detector's default, for all seeds and groups alike. What is compared is the simulated gate; it is tuned so that
 the thesis's latencies come out (see its module), so this is a check of reproduction, not of a real gate.
 """
 
@@ -26,6 +26,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, GateRun, Impact, simulate_gate_run
+from cdtool.simulation.gate_recordings import GROUPS
 from cdtool.tables import Table
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.learning import fit_signatures
@@ -60,12 +61,13 @@ def score_seed(seed: int, detectors: list[str]) -> dict[str, Score]:
     """Scores by the detector's short name."""
     parameters = GateParameters()
     machine = _machine(parameters)
-    sequences = iter(np.random.SeedSequence(seed).spawn(sum(count for count, _ in COUNTS.values())))
     operations: dict[str, list[Operation]] = {}
     for group, (count, impact) in COUNTS.items():
-        runs = [simulate_gate_run(parameters, np.random.default_rng(next(sequences)), impact) for _ in range(count)]
-        logs = [_recording(run, f"{group}/{i:02d}", parameters) for i, run in enumerate(runs, 1)]
-        operations[group] = [operation for log in logs for operation in operations_of(log)]
+        operations[group] = []
+        for number in range(1, count + 1):
+            rng = np.random.default_rng([seed, GROUPS.index(group), number])
+            log = _recording(simulate_gate_run(parameters, rng, impact), f"{group}/{number:02d}", parameters)
+            operations[group] += operations_of(log)
     return {name: _score(operations, machine, name) for name in detectors}
 
 
@@ -126,7 +128,7 @@ def _orders(cell: str, scores: dict[int, dict[str, Score]]) -> bool:
         order = sorted((name for name in means if name in reference), key=lambda name: means[name])
         good = order == reference
         held &= good
-        print(f"{cell:5s} seed {seed}: {' < '.join(order)}{'' if good else '   NOT ' + ' < '.join(reference)}")
+        print(f"{cell:5s} seed {seed}: {' < '.join(order)}{'' if good else '   wanted ' + ' < '.join(reference)}")
     return held
 
 
@@ -135,7 +137,7 @@ def _mean(figures: list[float]) -> float:
 
 
 def _rows(cell: str, scores: dict[int, dict[str, Score]]) -> tuple[list[tuple[object, ...]], bool, int, bool]:
-    """Table rows of one cell; are the means within bounds; misses; no detector above the false alarms allowed."""
+    """Table rows of one cell; is every seed's mean within bounds; misses; no detector above the false alarms allowed."""
     rows: list[tuple[object, ...]] = []
     near, missed_in_all, quiet = True, 0, True
     for name in next(iter(scores.values())):
@@ -143,19 +145,21 @@ def _rows(cell: str, scores: dict[int, dict[str, Score]]) -> tuple[list[tuple[ob
         pooled = [latency for score in of_seeds for latency in score.latencies[cell]]
         missed = sum(score.missed[cell] for score in of_seeds)
         reference = REFERENCE[cell].get(name)
-        deviation = _mean(pooled) / reference - 1.0 if reference else None
-        near &= deviation is None or abs(deviation) <= WITHIN
+        deviations = [_mean(score.latencies[cell]) / reference - 1.0 for score in of_seeds] if reference else []
+        worst = max(deviations, key=abs, default=0.0)
+        near &= abs(worst) <= WITHIN
         missed_in_all += missed
-        quiet &= all(score.false_alarms <= FALSE_ALARMS_ALLOWED for score in of_seeds)
+        false_alarms = sum(score.false_alarms for score in of_seeds)
+        quiet &= false_alarms <= FALSE_ALARMS_ALLOWED
         rows.append(
             (
                 f"{cell} {name}",
                 *(f"{_mean(score.latencies[cell]):.0f}" for score in of_seeds),
                 f"{_mean(pooled):.1f} +- {stdev(pooled) if len(pooled) > 1 else float('nan'):.1f}",
                 missed,
-                sum(score.false_alarms for score in of_seeds),
+                false_alarms,
                 f"{reference:.1f}" if reference else "-",
-                f"{100 * deviation:+.0f} %" if deviation is not None else "-",
+                f"{100 * worst:+.0f} %" if reference else "-",
             )
         )
     return rows, near, missed_in_all, quiet
@@ -175,20 +179,24 @@ def main(seeds: tuple[int, ...]) -> int:
         rows += more
         near &= cell_near
         missed += cell_missed
-    heads = (*map(str, seeds), "mean +- std", "missed", "false", "reference", "off by")
+    heads = (*map(str, seeds), "mean +- std", "missed", "false", "reference", "worst seed")
     table(("", *heads), rows)
-    print("false: false alarms over hold-out and impact runs, the same in both cells; std over all impacts\n")
+    print("false: alarms over all hold-out and impact runs of all seeds, so the same in both cells; std over")
+    print("all impacts; worst seed: largest deviation of a seed's mean from the reference\n")
     ordered = [_orders(cell, scores) for cell in CELLS]
     wanted = (
         ("order stiff " + "<".join(REFERENCE["stiff"]), ordered[0]),
         ("order soft " + "<".join(REFERENCE["soft"]), ordered[1]),
-        (f"means within {100 * WITHIN:.0f} %", near),
+        (f"every mean within {100 * WITHIN:.0f} %", near),
         (f"missed: {missed}, wanted 0", missed == 0),
-        (f"at most {FALSE_ALARMS_ALLOWED} false alarm a detector and seed", quiet),
+        (f"at most {FALSE_ALARMS_ALLOWED} false alarm a detector over all seeds", quiet),
     )
     held = all(good for _, good in wanted)
+    print()
+    for text, good in wanted:
+        print(f"{'ok  ' if good else 'FAIL'}  {text}")
     print(
-        f"\n{'ok  ' if held else 'FAIL'}  " + "; ".join(f"{text}: {'yes' if good else 'NO'}" for text, good in wanted)
+        f"{'ok  ' if held else 'FAIL'}  {'all' if held else 'not all'} of it held on seeds {' '.join(map(str, seeds))}"
     )
     return 0 if held else 1
 

@@ -36,7 +36,8 @@ def no_cache_folder(monkeypatch):
     """As in a read-only installation with a read-only home: numba finds nowhere to put its cache."""
     from numba.core import caching
 
-    monkeypatch.setattr(caching._CacheImpl, "_locator_classes", [])
+    implementation = getattr(caching, "_CacheImpl", None) or caching.CacheImpl
+    monkeypatch.setattr(implementation, "_locator_classes", [])
     monkeypatch.setattr(kernels, "_told", False)
 
 
