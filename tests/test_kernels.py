@@ -50,7 +50,9 @@ def test_where_no_cache_can_be_written_it_compiles_anyway_and_says_so_once(no_ca
 
 
 def test_importing_modules_with_kernels_does_not_load_numba():
-    code = "import sys, cdtool.detectors.friction_ekf, cdtool.activation, cdtool.clock; sys.exit('numba' in sys.modules)"
+    code = (
+        "import sys, cdtool.detectors.friction_ekf, cdtool.activation, cdtool.clock; sys.exit('numba' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import sys
 import warnings
@@ -58,6 +59,9 @@ def _show_note(message: Warning | str, *_: object, **__: object) -> None:
 
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
+    gc.set_threshold(
+        50_000, 10, 10
+    )  # imports make objects that stay: searching them for garbage is a tenth of a detect
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
     try:

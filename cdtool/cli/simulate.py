@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import plain, progress
+from cdtool.cli.console import plain, print_json, progress
+from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
 
 simulate = typer.Typer(help="Write simulated recordings with known contacts.", no_args_is_help=True)
@@ -29,6 +30,7 @@ def gate(
     soft: Annotated[int, typer.Option("--soft", min=0, help="Impacts with a rubber bumper.")] = 30,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")] = 1,
     file_format: Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")] = "csv",
+    as_json: JsonOption = False,
 ) -> None:
     """The heavy sliding gate of the thesis's chapter 5: recordings, machine.toml and benchmark.toml.
 
@@ -41,4 +43,7 @@ def gate(
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     with progress("simulating") as advance:
         written = write_gate_recordings(output, counts, seed, file_format, advance)
+    if as_json:
+        print_json({"folder": str(output), "recordings": written, "seed": seed})
+        return
     typer.echo(f"{written} recordings, machine.toml and benchmark.toml written to {plain(output)}")

@@ -38,7 +38,7 @@ def judge(stroke: Operation, runs: list[Operation], machine: MachineFile, detect
 
 
 def beyond(found: Detection) -> float:
-    """By how much the signal leaves the band at most, on the side that opposes the motion; negative: it stays inside."""
+    """By how much the signal leaves its band at most on the side that opposes the motion; negative: it stays inside."""
     signal, band = found.statistic, found.band
     forward = found.operation.motion.direction > 0
     outside = signal.values - band.upper if forward else band.lower - signal.values

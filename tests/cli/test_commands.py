@@ -235,7 +235,8 @@ def test_listing_tells_detectors_with_gains_units_and_defaults():
 def test_simulating_is_reproducible_and_refuses_a_folder_that_is_in_use(tmp_path):
     arguments = ("simulate", "gate", "--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 3)
     for name in ("a", "b"):
-        assert cdtool(*arguments, "-o", tmp_path / name).status == 0
+        done = cdtool(*arguments, "-o", tmp_path / name, "--json")
+        assert json.loads(done.out) == {"folder": str(tmp_path / name), "recordings": 2, "seed": 3}
     for path in sorted((tmp_path / "a").rglob("*.*")):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path
     assert cdtool(*arguments, "-o", tmp_path / "a").status == 2

@@ -131,9 +131,27 @@ def test_a_rigid_gate_without_motor_meets_the_closed_form_of_a_spring_impact() -
     alone = replace(LOSSLESS, motor_inertia=1e-12, take_up_stiffness=1e-3, backlash=1.0, post_stiffness=1e9)
     alone = replace(alone, drive_stiffness=1e-3)
     truth = coast(alone, "stiff", substeps=100)
-    expected = 0.2 * np.sqrt(GATE.load_cell_stiffness * GATE.leaf_mass)
-    assert expected == pytest.approx(3521.4, abs=0.1)
-    assert truth["contact_force"].max() == pytest.approx(expected, rel=2e-3)
+    mass, stiffness, speed = GATE.leaf_mass, GATE.load_cell_stiffness, 0.2
+    rate = np.sqrt(stiffness / mass)
+    force = truth["contact_force"]
+    pressed = np.flatnonzero(force > 0.0)
+    assert force.max() == pytest.approx(speed * np.sqrt(stiffness * mass), rel=2e-3)
+    assert (pressed[-1] - pressed[0]) * 1e-3 == pytest.approx(np.pi / rate, abs=2e-3)
+    assert truth["leaf_position"].max() - 0.02 == pytest.approx(speed / rate, rel=3e-3)
+    assert force[pressed[0] + 20] == pytest.approx(speed * np.sqrt(stiffness * mass) * np.sin(rate * 0.0205), rel=0.03)
+
+
+def test_the_closed_form_of_the_rigid_impact_has_its_reference_figures() -> None:
+    mass, stiffness, speed = 620.0, 5e5, 0.2
+    rate = np.sqrt(stiffness / mass)
+    assert speed * np.sqrt(stiffness * mass) == pytest.approx(3521.4, abs=0.1)
+    assert speed * rate == pytest.approx(5.680, abs=1e-3)
+    assert speed / rate == pytest.approx(7.043e-3, abs=1e-6)
+    assert np.pi / rate == pytest.approx(110.63e-3, abs=1e-5)
+    assert 0.5 * mass * speed**2 == pytest.approx(12.40, abs=1e-2)
+    force = speed * np.sqrt(stiffness * mass) * np.sin(rate * 21e-3)
+    assert force == pytest.approx(1978.0, abs=1.0)
+    assert force / mass == pytest.approx(3.19, abs=1e-2)
 
 
 def test_the_bumper_and_the_load_cell_in_series_carry_the_same_force() -> None:

@@ -1,0 +1,28 @@
+"""Every benchmark, one after the other, each in its own process; ends with status 1 where a target is not held.
+
+python benchmarks/run_all.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+QUESTIONS = ("friction_ekf", "momentum", "start_up", "whole_benchmark", "gate_accuracy")
+
+
+def main() -> int:
+    folder = Path(__file__).parent
+    failed = []
+    for name in QUESTIONS:
+        done = subprocess.run([sys.executable, str(folder / f"{name}.py")], check=False)
+        if done.returncode:
+            failed.append(name)
+        print(flush=True)
+    print(f"not held: {', '.join(failed)}" if failed else "every target held")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

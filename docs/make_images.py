@@ -1,0 +1,80 @@
+"""Make the images of the docs: python docs/make_images.py
+
+From sample_logs/gate, and from the real recordings where CDTOOL_DATA (or ../shared/data) holds them; what is skipped is
+said. An image above 200 kB is an error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
+EXAMPLES = ROOT / "docs" / "examples"
+DATA = Path(os.environ.get("CDTOOL_DATA", ROOT.parent / "shared" / "data"))
+LARGEST = 200_000
+UR10E_LIMITS = "33,inf,53,inf,inf,inf"
+
+
+def cdtool(*arguments: object, folder: Path) -> None:
+    """Run a command in a folder, so that titles show short names; ends the script where it fails."""
+    code = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def gate(work: Path) -> None:
+    """One detector on a stiff impact, all detectors on a soft one, and the latencies."""
+    logs = ROOT / "sample_logs" / "gate"
+    free = sorted(path.relative_to(logs) for path in (logs / "free").iterdir())
+    signature = work / "gate.json"
+    cdtool("learn-signature", *free, "-m", "machine.toml", "-d", "feekf", "-o", signature, folder=logs)
+    image = IMAGES / "detect_stiff_feekf.png"
+    cdtool("detect", "stiff/03.csv", "-m", "machine.toml", "-s", signature, "--plot", image, folder=logs)
+    cdtool("benchmark", "benchmark.toml", "-o", work / "report", folder=logs)
+    for name in ("latency.png", "triggers_soft.png"):
+        shutil.copyfile(work / "report" / name, IMAGES / name)
+
+
+def emps(work: Path) -> None:
+    """The momentum observer on the recording with force pulses."""
+    logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
+    cut = ("--operations", "motion")
+    learn = ("learn-signature", "DATA_EMPS.mat", "-m", machine, "-d", "gm", *cut, "--force", "-o", signature)
+    cdtool(*learn, folder=logs)
+    image = IMAGES / "emps_pulses_gm.png"
+    cdtool("detect", "DATA_EMPS_PULSES.mat", "-m", machine, "-s", signature, *cut, "--plot", image, folder=logs)
+
+
+def ur10e(_: Path) -> None:
+    """Pure torque with a limit on the recording with three contacts."""
+    limits = ("-d", "pt", "--limit", UR10E_LIMITS, "--debounce", 2)
+    image = IMAGES / "ur10e_link4.png"
+    cdtool("detect", "link4.csv", "-m", EXAMPLES / "ur10e.toml", *limits, "--plot", image, folder=DATA / "ur10e")
+
+
+def main() -> int:
+    """Make all images that can be made; 1 where one is too large."""
+    IMAGES.mkdir(exist_ok=True)
+    sources = {gate: ROOT / "sample_logs" / "gate", emps: DATA / "emps", ur10e: DATA / "ur10e"}
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for make, needed in sources.items():
+            if needed.is_dir():
+                make(Path(folder))
+            else:
+                print(f"skipped {make.__name__}: no folder {needed}")
+    large = [path for path in sorted(IMAGES.glob("*.png")) if path.stat().st_size > LARGEST]
+    for path in large:
+        print(f"{path.name}: {path.stat().st_size} bytes, more than {LARGEST}")
+    return 1 if large else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
