@@ -66,6 +66,7 @@ void run_filter(
     covariance p = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     double d = viscous, a = 0.0, v = 0.0, now = 0.0, held_force = 0.0, settled = 0.0;
     double last_speed_time = 0.0, last_acceleration_time = -INFINITY, last_applicable = -INFINITY;
+    int forward = 1, against = 0;
     const double inverse_inertia = 1.0 / inertia;
     const double bandwidth_scale = sqrt(q_d / (r_a + q_a)) * inverse_inertia;
 
@@ -92,6 +93,8 @@ void run_filter(
             p = (covariance){initial_variance, 0.0, 0.0, r_a, 0.0, r_v};
             settled = 0.0;
             last_applicable = -INFINITY;
+            forward = v > 0.0;
+            against = 0;
             applicable = fabs(v) >= minimum_speed;
             now = time[k];
             last_speed_time = now;
@@ -138,6 +141,12 @@ void run_filter(
             p = update_third(p, k1, k2, k3, r_v);
             double since = time[k] - last_speed_time;
             if (applicable) {
+                against = (speed[k] > 0.0) != forward ? against + 1 : 0;
+                if (against == 3) {
+                    forward = !forward;
+                    against = 0;
+                    settled = 0.0;
+                }
                 settled += bandwidth_scale * fabs(speed[k]) * sqrt(since);
                 last_applicable = time[k];
             } else if (time[k] - last_applicable > glitch) {

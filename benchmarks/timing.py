@@ -58,16 +58,16 @@ def ratio(over: Sequence[float], under: Sequence[float]) -> Spread:
 
 def environment() -> str:
     """Processor, cores, load, Python and the libraries that matter: without it no ratio says anything."""
-    parts = [_processor(), f"{os.cpu_count()} cores"]
+    machine = [_processor(), f"{os.cpu_count()} cores"]
     if hasattr(os, "getloadavg"):
-        parts.append(f"load {os.getloadavg()[0]:.1f}")
-    parts.append(f"Python {platform.python_version()}")
+        machine.append(f"load {os.getloadavg()[0]:.1f}")
+    software = [f"Python {platform.python_version()}"]
     for name in ("numpy", "numba", "scipy", "filterpy", "typer"):
         try:
-            parts.append(f"{name} {version(name)}")
+            software.append(f"{name} {version(name)}")
         except PackageNotFoundError:
-            parts.append(f"no {name}")
-    return ", ".join(parts)
+            software.append(f"no {name}")
+    return f"{', '.join(machine)}\n{', '.join(software)}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:

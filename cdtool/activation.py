@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from cdtool.detection import Alarm, Band, Signal, StatusArray
 from cdtool.errors import UsageError
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 # Without a number of samples, an alarm needs this long outside the band [s]: 9 samples at 1 kHz.
@@ -37,35 +37,43 @@ class Activation:
             return self.debounce
         return max(1, round(DEBOUNCE_TIME / period)) if period > 0.0 else 1
 
-    def alarms(self, statistic: Signal, band: Band) -> tuple[Alarm, ...]:
-        """All alarms in order of time, over all joints."""
+    def alarms(self, statistic: Signal, band: Band) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints."""
         period = float(np.median(np.diff(statistic.time))) if len(statistic.time) > 1 else 0.0
-        found: list[Alarm] = []
+        alarms: list[Alarm] = []
+        crossings: list[Alarm] = []
         for joint in range(statistic.values.shape[1]):
             value = np.ascontiguousarray(statistic.values[:, joint])
             lower = np.ascontiguousarray(band.lower[:, joint])
             upper = np.ascontiguousarray(band.upper[:, joint])
             status = np.ascontiguousarray(statistic.status[:, joint])
             outside = (value > upper) | (value < lower)
-            for k in _raise_alarms(statistic.time, outside, status, self.samples(period), self.rearm):
+            at, armed = _cross(statistic.time, outside, status, self.samples(period), self.rearm)
+            for k, was_armed in zip(at, armed, strict=True):
                 above = bool(value[k] > upper[k])
                 limit = float(upper[k] if above else lower[k])
                 side = "above" if above else "below"
-                found.append(Alarm(float(statistic.time[k]), joint, side, float(value[k]), limit))  # type: ignore[arg-type]
-        return tuple(sorted(found, key=lambda alarm: (alarm.time, alarm.joint)))
+                crossing = Alarm(float(statistic.time[k]), joint, side, float(value[k]), limit)  # type: ignore[arg-type]
+                crossings.append(crossing)
+                if was_armed:
+                    alarms.append(crossing)
+        return _in_order(alarms), _in_order(crossings)
 
 
-def _raise_alarms(
+def _in_order(alarms: list[Alarm]) -> tuple[Alarm, ...]:
+    return tuple(sorted(alarms, key=lambda alarm: (alarm.time, alarm.joint)))
+
+
+def _cross(
     time: FloatArray, outside: BoolArray, status: StatusArray, debounce: int, rearm: float
-) -> npt.NDArray[np.int64]:
-    if not outside.any():
-        return np.empty(0, dtype=np.int64)
-    at = np.empty(len(time), dtype=np.int64)
-    count = _activate(np.ascontiguousarray(time), outside, status, debounce, rearm, at)
-    return at[:count]
+) -> tuple[npt.NDArray[np.int64], BoolArray]:
+    at = np.empty(len(time) if outside.any() else 0, dtype=np.int64)
+    armed = np.empty(len(at), dtype=np.bool_)
+    count = _activate(np.ascontiguousarray(time), outside, status, debounce, rearm, at, armed) if len(at) else 0
+    return at[:count], armed[:count]
 
 
-@kernel("int64(Array(float64, 1, 'C', readonly=True), b1[::1], uint8[::1], int64, float64, int64[::1])")
+@kernel(f"int64({READ_ONLY}, b1[::1], uint8[::1], int64, float64, int64[::1], b1[::1])")
 def _activate(
     time: FloatArray,
     outside: BoolArray,
@@ -73,29 +81,29 @@ def _activate(
     debounce: int,
     rearm: float,
     at: npt.NDArray[np.int64],
+    armed_at: BoolArray,
 ) -> int:
-    alarms = 0
+    crossings = 0
     count = 0
     armed = True
-    inside_since = -1.0
     inside = False
+    inside_since = 0.0
     for k in range(len(time)):
         if status[k] == 3:
             continue
-        out = outside[k] and status[k] == 0
-        if armed:
-            count = count + 1 if out else 0
-            if count >= debounce:
-                at[alarms] = k
-                alarms += 1
-                armed = False
-                inside = False
-        elif out:
+        if outside[k] and status[k] == 0:
             inside = False
-        elif not inside:
+            count += 1
+            if count == debounce:
+                at[crossings] = k
+                armed_at[crossings] = armed
+                crossings += 1
+                armed = False
+            continue
+        count = 0
+        if not inside:
             inside = True
             inside_since = time[k]
         elif time[k] - inside_since >= rearm:
             armed = True
-            count = 0
-    return alarms
+    return crossings

@@ -157,8 +157,7 @@ def _unit_factor(
     scale = table.numbers("scale", count, 1.0)
     if any(item == 0.0 for item in scale):
         raise table.fault("scale", "is 0", "a factor other than 0, e.g. N m per A")
-    if channel in ("label", "trigger"):
-        table.raw("unit")
+    if channel in ("label", "trigger"):  # high or low: a unit would mean nothing, and is refused as an unknown key
         return "1", scale
     name = table.text("unit", "")
     if not name:

@@ -81,8 +81,13 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Three answers: alarm, no alarm, or not assessable with the reason."""
+    """Three answers: alarm, no alarm, or not assessable with the reason.
+
+    `alarms` are what an operator would hear: raised, then armed again only after a while inside the band. `crossings`
+    are all debounced exits from the band, the alarms among them: an alarm that is still latched hides no contact.
+    """
 
     outcome: Literal["alarm", "no alarm", "not assessable"]
     alarms: tuple[Alarm, ...] = ()
     reason: str = ""
+    crossings: tuple[Alarm, ...] = ()

@@ -76,7 +76,7 @@ def _compile(function: Callable[..., Any], signature: str) -> Callable[..., Any]
     global _told
     function = _linked(function)
     try:
-        return njit(signature, cache=True, nogil=True, error_model="numpy")(function)
+        return njit(signature, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
     except (RuntimeError, OSError) as fault:
         if not _told:
             _told = True
@@ -86,4 +86,4 @@ def _compile(function: Callable[..., Any], signature: str) -> Callable[..., Any]
                 RuntimeWarning,
                 stacklevel=4,
             )
-        return njit(signature, nogil=True, error_model="numpy")(function)
+        return njit(signature, nogil=True, error_model="numpy", fastmath={"contract"})(function)

@@ -79,6 +79,8 @@ def _read_gains(table: Table) -> dict[str, dict[str, float]]:
             registry.load(name)(**given)
         except ConfigurationError as fault:
             raise ConfigurationError(f"{table.key(name)}: {fault.message}", fault.hint) from fault
+        if known[name] in gains:
+            raise table.fault(name, f"is {known[name]} again", "give a detector's gains once, under one of its names")
         gains[known[name]] = given
     return gains
 

@@ -61,9 +61,9 @@ def detect_operation(
         verdict = Verdict("not assessable", reason=refused)
         return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
     statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
-    alarms = activation.alarms(statistic, band)
+    alarms, crossings = activation.alarms(statistic, band)
     if alarms:
-        verdict = Verdict("alarm", alarms)
+        verdict = Verdict("alarm", alarms, crossings=crossings)
     elif not statistic.valid.any():
         shares = statistic.shares()
         reason = ", ".join(f"{text} {100 * share:.0f} %" for text, share in shares.items()) or "no samples"

@@ -65,6 +65,20 @@ class Table:
             raise self.fault(name, f"has {len(value)} values", f"one number, or {count}: one a joint")
         return tuple(self._checked(f"{name}[{i}]", item, minimum, above) for i, item in enumerate(value))
 
+    def whole(self, name: str, default: int, *, minimum: int) -> int:
+        """A whole number of at least `minimum`."""
+        value = self.raw(name, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
+            raise self.fault(name, f"is {value!r}", f"a whole number of at least {minimum} is needed")
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        """true or false."""
+        value = self.raw(name, default)
+        if not isinstance(value, bool):
+            raise self.fault(name, f"is {value!r}", "true or false, without quotes")
+        return value
+
     def text(self, name: str, default: str | None = None) -> str:
         """A string; required without a default."""
         value = self.raw(name)

@@ -17,7 +17,7 @@ def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
     codes = np.zeros(values.shape, dtype=np.uint8) if status is None else np.asarray(status, np.uint8).reshape(-1, 1)
     time = np.arange(len(values)) * period
     band = Band(np.full(values.shape, -1.0), np.full(values.shape, 1.0))
-    return Activation(debounce, rearm).alarms(Signal(time, values, codes, "N"), band)
+    return Activation(debounce, rearm).alarms(Signal(time, values, codes, "N"), band)[0]
 
 
 def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
@@ -51,6 +51,15 @@ def test_it_is_armed_again_only_after_half_a_second_inside():
     assert len(alarms([2] * 5 + [0] * 502 + [2] * 5)) == 2
 
 
+def test_every_debounced_exit_is_a_crossing_and_only_the_armed_ones_are_alarms():
+    values = np.array([2.0] * 5 + [0.0] * 10 + [2.0] * 5).reshape(-1, 1)
+    signal = Signal(np.arange(20) * 1e-3, values, np.zeros((20, 1), dtype=np.uint8), "N")
+    band = Band(np.full((20, 1), -1.0), np.full((20, 1), 1.0))
+    armed, crossings = Activation(3).alarms(signal, band)
+    assert [round(1e3 * alarm.time) for alarm in armed] == [2]
+    assert [round(1e3 * alarm.time) for alarm in crossings] == [2, 17]
+
+
 def test_the_default_debounce_is_nine_milliseconds_of_samples():
     assert Activation().samples(1e-3) == 9
     assert Activation().samples(5e-3) == 2
@@ -67,17 +76,15 @@ def test_a_debounce_below_one_is_refused():
 def test_the_alarms_are_those_of_a_plain_reading_of_the_rule(values, debounce):
     expected, count, armed, inside_since = [], 0, True, None
     for k, value in enumerate(values):
-        out = abs(value) > 1.0
-        if armed:
-            count = count + 1 if out else 0
-            if count == debounce:
-                expected.append(k)
-                armed, inside_since = False, None
-        elif out:
+        if abs(value) > 1.0:
             inside_since = None
-        elif inside_since is None:
-            inside_since = k
-        elif k - inside_since >= 10:
-            armed, count = True, 0
+            count += 1
+            if count == debounce:
+                expected += [k] if armed else []
+                armed = False
+            continue
+        count = 0
+        inside_since = k if inside_since is None else inside_since
+        armed = armed or k - inside_since >= 10
     found = alarms(values, debounce=debounce, rearm=10.0, period=1.0)
     assert [round(alarm.time) for alarm in found] == expected

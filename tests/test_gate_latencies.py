@@ -42,7 +42,7 @@ def scores(gate, simulated):
                 contacts = find_contacts(operation.recording, OnsetRule(20.0, 8.0))
                 assert len(contacts) == (kind != "none")
                 detection = detect_operation(operation, gate, detector, fitted, Activation())
-                matching = match(detection.verdict.alarms, contacts, detection.statistic)
+                matching = match(detection.verdict, contacts, detection.statistic)
                 false_alarms[name] += len(matching.false_alarms)
                 missed[name] += sum(item.outcome != "detected" for item in matching.matches)
                 latencies += [1e3 * item.latency for item in matching.matches if item.outcome == "detected"]

@@ -142,3 +142,14 @@ def test_a_motor_voltage_can_stand_for_the_torque(tmp_path):
     assert source.duty is not None and source.duty.supply_voltage == 24.0 and source.factor == (0.01,)
     with pytest.raises(ConfigurationError, match="resistance"):
         read(tmp_path, text.replace("resistance = 0.5, ", ""))
+
+
+def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
+    text = MACHINE + CHANNELS + "[detectors.feekf]\nminimum_speed = 0.04\n"
+    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*friction_ekf again"):
+        read(tmp_path, text)
+
+
+def test_a_unit_of_a_label_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"channels\.label\.unit"):
+        read(tmp_path, MACHINE + CHANNELS.replace("force =", 'label = { column = "hit", unit = "N" }\nforce ='))

@@ -59,9 +59,8 @@ def _show_note(message: Warning | str, *_: object, **__: object) -> None:
 
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
-    gc.set_threshold(
-        50_000, 10, 10
-    )  # imports make objects that stay: searching them for garbage is a tenth of a detect
+    # What imports make stays: searching it for garbage is a tenth of a short command.
+    gc.set_threshold(50_000, 10, 10)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
     try:

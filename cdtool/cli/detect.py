@@ -29,6 +29,12 @@ def detect(
     detector: Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")] = None,
     operations: OperationsOption = "whole",
     debounce: DebounceOption = None,
+    onset_above: Annotated[
+        float | None, typer.Option("--onset-above", help="Onset: load cell above this [N]. Default: from its noise.")
+    ] = None,
+    onset_back_to: Annotated[
+        float | None, typer.Option("--onset-back-to", help="Onset: followed back to this [N]. Default: half of it.")
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
@@ -38,6 +44,7 @@ def detect(
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
+    from cdtool.evaluation.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.detection import detect as run
 
@@ -57,6 +64,7 @@ def detect(
                     limit=limits,
                     operations=operations,
                     debounce=debounce,
+                    onset=OnsetRule(above=onset_above, back_to=onset_back_to),
                 )
                 done.append((log, found))
                 if plot_names:
@@ -112,14 +120,15 @@ def _show(rows: list[tuple[Detection, Detected]]) -> None:
     cells = []
     for detection, found in rows:
         inside = [c for c in found.contacts if _inside(detection, c.start)]
-        matching = match(detection.verdict.alarms, inside, detection.statistic)
-        latency = {id(item.alarm): item.latency for item in matching.matches if item.alarm}
+        matching = match(detection.verdict, inside, detection.statistic)
+        latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
+        events = sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint))
         joints = detection.operation.recording.joints
-        if not detection.verdict.alarms:
+        if not events:
             why = detection.verdict.reason
             cells.append((detection.operation.name, detection.verdict.outcome, "-", "-", "-", "-", "-", why))
-        for alarm in detection.verdict.alarms:
-            late = 1e3 * latency[id(alarm)] if id(alarm) in latency else None
+        for alarm in events:
+            late = 1e3 * latency[alarm] if alarm in latency else None
             cells.append(
                 (
                     detection.operation.name,

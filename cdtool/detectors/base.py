@@ -105,9 +105,10 @@ def observe_momentum(
     """Residual and status (n, J) of the generalized momentum observer (thesis 2.18-2.19 corrected).
 
     res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
-    constant force and any T_k. `ready` (J,) is the time from which the residual may be judged.
+    constant force and any T_k. `ready` (J,) is the time from which the residual may be judged. `momentum` is used up:
+    the residual is written over it, since on long logs fresh memory costs as much as the filter.
     """
-    residual = np.empty(net_force.shape)
+    residual = momentum
     status = np.empty(net_force.shape, dtype=np.uint8)
     for j in range(net_force.shape[1]):
         _observe(

@@ -105,6 +105,7 @@ def run_filter(
 
     `speed` and `acceleration` may hold NaN (no sample), `force` may not; `missing`: force or speed is missing.
     """
+    reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)
     next_sample = 0
     started = False
@@ -119,6 +120,8 @@ def run_filter(
     applicable = False
     settled = 0.0
     last_applicable = -np.inf
+    forward = True
+    against = 0
     inverse_inertia = 1.0 / inertia
     bandwidth_scale = np.sqrt(q_d / (r_a + q_a)) * inverse_inertia
     for k in range(len(time)):
@@ -141,6 +144,8 @@ def run_filter(
             p = (initial_variance, 0.0, 0.0, r_a, 0.0, r_v)
             settled = 0.0
             last_applicable = -np.inf
+            forward = v > 0.0
+            against = 0
             applicable = abs(v) >= minimum_speed
             now = time[k]
             last_speed_time = now
@@ -189,6 +194,11 @@ def run_filter(
             since = time[k] - last_speed_time
             # Rough bandwidth: ready once its integral over time reaches 3.
             if applicable:
+                against = against + 1 if (speed[k] > 0.0) != forward else 0
+                if against == reversal_samples:
+                    forward = not forward
+                    against = 0
+                    settled = 0.0  # after a rebound the estimate has the wrong sign for a while
                 settled += bandwidth_scale * abs(speed[k]) * np.sqrt(since)
                 last_applicable = time[k]
             elif time[k] - last_applicable > glitch:

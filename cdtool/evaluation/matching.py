@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.detection import Alarm, Signal
+from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.recording import Contact
 
 Outcome = Literal["detected", "missed", "not_assessable"]
@@ -38,28 +38,27 @@ class Matching:
     false_alarms: tuple[Alarm, ...]
 
 
-def match(alarms: Sequence[Alarm], contacts: Sequence[Contact], statistic: Signal, window: float = 1.0) -> Matching:
-    """Match in order of time: each contact takes the first alarm in its window that no earlier contact took.
+def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, window: float = 1.0) -> Matching:
+    """Match in order of time: each contact takes the first crossing in its window that no earlier contact took.
 
     An alarm outside every window, and not while the load cell still feels a contact, is false. One before a contact is
-    counted as false and does not hide the contact's own detection.
+    counted as false and does not hide the contact's own detection: any new crossing detects, armed again or not.
     """
-    taken: set[int] = set()
+    taken: set[Alarm] = set()
     matches = []
     for contact in sorted(contacts, key=lambda item: item.start):
-        found = None
-        for i, alarm in enumerate(alarms):
-            if i not in taken and contact.start - contact.uncertainty <= alarm.time <= contact.start + window:
-                found = i
-                break
+        opens, closes = contact.start - contact.uncertainty, contact.start + window
+        inside = (alarm for alarm in verdict.crossings if opens <= alarm.time <= closes and alarm not in taken)
+        found = next(inside, None)
         if found is None:
             outcome: Outcome = "missed" if _assessable(statistic, contact, window) else "not_assessable"
             matches.append(Match(contact, outcome))
             continue
         taken.add(found)
-        latency = alarms[found].time - contact.start
-        matches.append(Match(contact, "detected", alarms[found], max(latency, 0.0), latency < 0.0))
-    false = tuple(alarm for i, alarm in enumerate(alarms) if i not in taken and not _belongs(alarm, contacts, window))
+        latency = found.time - contact.start
+        matches.append(Match(contact, "detected", found, max(latency, 0.0), latency < 0.0))
+    alone = (alarm for alarm in verdict.alarms if alarm not in taken)
+    false = tuple(alarm for alarm in alone if not _belongs(alarm, contacts, window))
     return Matching(tuple(matches), false)
 
 

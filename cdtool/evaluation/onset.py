@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.errors import RecordingError
+from cdtool.errors import RecordingError, UsageError
 from cdtool.recording import Contact, FloatArray, Recording
 
 # Baseline and noise: this share of the recording from its start, and at least this many samples.
@@ -33,6 +33,14 @@ class OnsetRule:
     samples: int = 3
     sigmas: float = 8.0
     separation: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("above", "back_to"):
+            value = getattr(self, name)
+            if value is not None and not value > 0.0:
+                raise UsageError(f"onset: {name} is {value}", "a force above 0 N")
+        if self.above is not None and self.back_to is not None and self.back_to > self.above:
+            raise UsageError(f"onset: back_to is {self.back_to:g}, more than above", "at most above")
 
     @property
     def described(self) -> str:

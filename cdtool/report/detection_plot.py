@@ -195,7 +195,7 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
 def _matching(detection: Detection, contacts: Sequence[Contact]) -> Matching:
     part = detection.operation.recording
     inside = [contact for contact in contacts if part.start <= contact.start <= part.end]
-    return match(detection.verdict.alarms, inside, detection.statistic)
+    return match(detection.verdict, inside, detection.statistic)
 
 
 def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:

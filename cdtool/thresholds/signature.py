@@ -24,7 +24,6 @@ SPEED_TOLERANCE = 0.05
 
 _START_SHARE = 0.1
 _RUNNING_SHARE = 0.95
-_TIME_STEP, _TIME_WINDOW = 5e-3, 0.05
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
 
@@ -190,7 +189,10 @@ class Signature:
             for recording, signal in pairs
         ]
         joints = pairs[0][1].values.shape[1]
-        by_time = Curve.empty(_TIME_STEP, _TIME_WINDOW, self._longest_time(wheres), joints)
+        # In time the grid and the window are what they are in position at the nominal speed.
+        pace = 1.0 / motion.nominal_speed
+        step, window = pace * self.position_step, pace * self.position_window
+        by_time = Curve.empty(step, window, self._longest_time(wheres), joints)
         longest = max((float(np.nanmax(where.travel, initial=0.0)) for where in wheres), default=0.0)
         by_position = Curve.empty(self.position_step, self.position_window, longest, joints)
         samples: tuple[list[FloatArray], list[FloatArray]] = ([], [])

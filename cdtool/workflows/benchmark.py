@@ -140,7 +140,9 @@ def _learn(
             if not operations:
                 raise SignatureError(f"no run to learn {detector.name} from", "check with cdtool info")
             pairs = [(op.recording.without_ground_truth(), run_detector(op, machine, detector)) for op in operations]
-            thresholds[detector.name] = (THRESHOLDS.load(setup.threshold)().fit(pairs),)
+            thresholds[detector.name] = (
+                THRESHOLDS.load(setup.threshold)(safety_factor=setup.signature.factor).fit(pairs),
+            )
     return thresholds, skipped
 
 
@@ -182,7 +184,7 @@ def _score(
                 scored.skipped.append(Skipped(operation.name, str(fault)))
                 continue
             detections.append(detection)
-            matchings.append(match(detection.verdict.alarms, inside, detection.statistic, setup.window))
+            matchings.append(match(detection.verdict, inside, detection.statistic, setup.window))
         scored.traces.append(Trace(group, operation, inside, tuple(detections), tuple(matchings)))
     scored.detecting = perf_counter() - begin - scored.reading
     return scored

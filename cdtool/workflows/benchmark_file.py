@@ -96,13 +96,13 @@ def _signature(table: Table) -> tuple[Signature, int | None]:
         "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
         "position_step": table.number("position_step", Signature.position_step, above=0.0),
         "position_window": table.number("position_window", Signature.position_window, above=0.0),
-        "force": bool(table.raw("force", False)),
+        "force": table.flag("force", False),
     }
     if "safety_factor" in table:
         settings["safety_factor"] = table.number("safety_factor", above=0.0)
     debounce = None
     if "debounce" in table:
-        debounce = round(table.number("debounce", minimum=1.0))
+        debounce = table.whole("debounce", 1, minimum=1)
     table.finish()
     return Signature(**settings), debounce
 
@@ -115,7 +115,7 @@ def _onset(table: Table) -> OnsetRule:
     rule = OnsetRule(
         above=above,
         back_to=back_to,
-        samples=round(table.number("samples", OnsetRule.samples, minimum=1.0)),
+        samples=table.whole("samples", OnsetRule.samples, minimum=1),
         sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
         separation=table.number("separation_s", OnsetRule.separation, above=0.0),
     )

@@ -101,7 +101,8 @@ def _motion_findings(recording: Recording) -> list[Finding]:
     except CdtoolError:
         strokes = 0
     word = "forward" if motion.direction > 0 else "backward"
-    text = f"{strokes} strokes by motion; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
+    cut = f"{strokes} {'stroke' if strokes == 1 else 'strokes'} by motion"
+    text = f"{cut}; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
     return [Finding(text, "speed", "note"), *_consistency(recording)]
 
 

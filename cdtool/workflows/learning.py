@@ -78,11 +78,21 @@ def fit_signatures(
         reasons = [*unread, *skipped]
         reason = f"; first reason: {reasons[0].reason}" if reasons else ""
         raise SignatureError(f"no run to learn {detector.name} from{reason}", "check with cdtool info")
-    fitted = tuple(
-        rule.fit([(operation.recording.without_ground_truth(), signal) for operation, signal in members])
-        for members in _by_class(pairs)
-    )
-    return fitted, [operation for operation, _ in pairs], skipped
+    fitted: list[FittedSignature] = []
+    used: list[Operation] = []
+    refused: list[CdtoolError] = []
+    for members in _by_class(pairs):
+        try:
+            fitted.append(rule.fit([(item.recording.without_ground_truth(), signal) for item, signal in members]))
+            used += [item for item, _ in members]
+        except SignatureError as fault:
+            # A stray run of another class does not stop the others; without any class to learn it is an error.
+            refused.append(fault)
+            motion = members[0][0].motion.described
+            skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]
+    if not fitted:
+        raise refused[0]
+    return tuple(fitted), used, skipped
 
 
 def signature_file(

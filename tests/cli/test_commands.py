@@ -95,6 +95,21 @@ def test_a_bad_run_is_left_out_by_name_and_the_status_is_3(gate_folder, tmp_path
     assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
 
 
+def test_a_stray_run_of_another_speed_is_left_out_and_the_others_are_learned(gate_folder, tmp_path):
+    lines = (gate_folder / "free" / "01.csv").read_text().splitlines()
+    slow = [lines[0]]
+    for line in lines[1:]:
+        cells = line.split(",")
+        cells[2], cells[6] = f"{float(cells[2]) / 2:.3f}", f"{float(cells[6]) / 2:.3f}"
+        slow.append(",".join(cells))
+    (tmp_path / "slow.csv").write_text("\n".join(slow) + "\n")
+    logs = sorted((gate_folder / "free").glob("*.csv"))
+    machine = ("-m", gate_folder / "machine.toml")
+    done = cdtool("learn-signature", *logs, tmp_path / "slow.csv", *machine, "-d", "gm", "-o", tmp_path / "s.json")
+    assert done.status == 3 and "slow.csv" in done.err and "forward at 0.1/s" in done.err
+    assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
+
+
 def test_detecting_an_impact_tells_time_and_latency_and_draws(gate_folder, feekf_signature, tmp_path):
     plot = tmp_path / "out.png"
     arguments = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
@@ -208,6 +223,8 @@ def test_an_impact_log_without_contact_is_left_out_by_name(gate_folder, tmp_path
         ("above_n = 20.0", "above_n = -1", ("onset.above_n", "above 0")),
         ("back_to_n = 8.0", "back_to_n = 30.0", ("onset.back_to_n", "more than above_n")),
         ("above_n", "above", ("onset.above", "above_n")),
+        ("[onset]", '[signature]\nforce = "no"\n[onset]', ("signature.force", "true or false")),
+        ("[onset]", "[signature]\ndebounce = 2.6\n[onset]", ("signature.debounce", "whole number")),
         ("machine.toml", "machine.tml", ("machine.tml", "no such file")),
     ],
 )

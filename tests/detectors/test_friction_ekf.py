@@ -185,3 +185,23 @@ def test_a_million_hostile_samples_leave_the_estimate_finite(gate):
     signal = FrictionEkf().signal(moving(speed, force, acceleration), gate)
     assert np.isfinite(signal.values).all()
     assert 0.05 < signal.valid.mean() < 1.0
+
+
+def test_after_a_rebound_it_starts_up_anew_for_its_estimate_has_the_wrong_sign(gate):
+    """The reversal takes 5 ms below the minimum speed: too short for a stop, but the direction has changed."""
+    n = 6000
+    k = np.arange(n)
+    speed = np.interp(k, [0, 3000, 3030, n], [0.2, 0.2, -0.2, -0.2])
+    signal = FrictionEkf().signal(moving(speed, speed * 900.0), gate)
+    assert signal.status[2990, 0] == Status.VALID
+    turned = np.flatnonzero(speed < -0.03)[5]
+    assert (signal.status[turned : turned + 200, 0] == Status.START_UP).all()
+    assert signal.status[-1, 0] == Status.VALID
+
+
+def test_a_single_wild_speed_sample_does_not_start_it_anew(gate):
+    n = 6000
+    speed = np.full(n, 0.2)
+    speed[4000] = -0.2
+    signal = FrictionEkf().signal(moving(speed, np.full(n, 180.0), np.zeros(n)), gate)
+    assert signal.valid[4001:4100].all()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.detection import Alarm, Signal, Status
-from cdtool.evaluation.matching import match
+from cdtool.detection import Alarm, Signal, Status, Verdict
+from cdtool.evaluation.matching import Matching
+from cdtool.evaluation.matching import match as match_verdict
 from cdtool.recording import Contact
 
 TIME = np.arange(10_000) * 1e-3
@@ -15,6 +16,11 @@ CONTACT = Contact(5.0, 5.3, 0.01)
 
 def alarm(time: float) -> Alarm:
     return Alarm(time, 0, "above", 2.0, 1.0)
+
+
+def match(alarms: list[Alarm], contacts: list[Contact], signal: Signal) -> Matching:
+    """Every alarm is a crossing."""
+    return match_verdict(Verdict("alarm", tuple(alarms), crossings=tuple(alarms)), contacts, signal)
 
 
 def statistic(valid=lambda t: t >= 0.0) -> Signal:
@@ -69,3 +75,11 @@ def test_valid_at_the_onset_and_then_lost_is_missed():
 def test_an_alarm_inside_the_onsets_uncertainty_has_latency_zero_and_is_flagged():
     matching = match([alarm(4.995)], [CONTACT], statistic())
     assert (matching.matches[0].latency, matching.matches[0].clipped) == (0.0, True)
+
+
+def test_an_alarm_that_is_still_latched_does_not_hide_the_contact():
+    early, again = alarm(4.8), alarm(5.04)
+    verdict = Verdict("alarm", (early,), crossings=(early, again))
+    matching = match_verdict(verdict, [CONTACT], statistic())
+    assert matching.matches[0].alarm == again
+    assert matching.false_alarms == (early,)

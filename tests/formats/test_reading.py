@@ -145,7 +145,8 @@ def test_a_folder_of_mcap_files_is_one_log_in_parts(tmp_path):
         stream = Stream("/speed", "std_msgs/msg/Float64", time, {"data": time + number})
         write_mcap(bag / f"bag_{number}.mcap", [stream], start_ns=10**18 + number * 10**9)
     (tmp_path / "machine.toml").write_text(
-        '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels.mcap]\nspeed = { topic = "/speed", field = "data" }\n'
+        '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n'
+        '[channels.mcap]\nspeed = { topic = "/speed", field = "data" }\n'
     )
     recording = read_recording(bag, read_machine_file(tmp_path / "machine.toml"))
     assert recording.name == "bag" and len(recording["speed"]) == 2000

@@ -37,7 +37,7 @@ class Bench:
     def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
         detections = tuple(self.detect(recording, name) for name in names)
         contacts = tuple(find_contacts(recording, RULE))
-        matchings = tuple(match(item.verdict.alarms, contacts, item.statistic) for item in detections)
+        matchings = tuple(match(item.verdict, contacts, item.statistic) for item in detections)
         return Trace(group, operations_of(recording)[0], contacts, detections, matchings)
 
 

@@ -58,7 +58,7 @@ def six_joints() -> Detected:
     statistic, band = Limit.given((40, 40, 40, 40, float("inf"), 40), 6).evaluate(
         recording, Signal(time, torque, status, "N m")
     )
-    alarms = Activation().alarms(statistic, band)
+    alarms, _ = Activation().alarms(statistic, band)
     assert {alarm.joint for alarm in alarms} == {1, 3}
     operation = operations_of(recording)[0]
     return Detected(recording, (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),), ())
@@ -128,7 +128,7 @@ def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(ben
     detections, matchings = list(trace.detections), list(trace.matchings)
     first = NAMES.index("pure_inertia")
     detections[first] = replace(detections[first], verdict=Verdict("no alarm"))
-    matchings[first] = match((), trace.contacts, detections[first].statistic)
+    matchings[first] = match(Verdict("no alarm"), trace.contacts, detections[first].statistic)
     trace = replace(trace, detections=tuple(detections), matchings=tuple(matchings))
     plot_triggers(trace, tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
@@ -230,7 +230,7 @@ def test_no_text_of_any_figure_is_read_as_mathematics(bench: Bench, simulated, r
 
     recording = simulated("stiff", 1)
     found = bench.detected(recording, "momentum")
-    matching = match(found.detections[0].verdict.alarms, find_contacts(recording, RULE), found.detections[0].statistic)
+    matching = match(found.detections[0].verdict, find_contacts(recording, RULE), found.detections[0].statistic)
     with drawing():
         figures = [
             detection_plot._figure(found, (matching,)),

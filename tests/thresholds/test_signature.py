@@ -135,7 +135,7 @@ def test_a_part_without_valid_samples_has_no_limit():
     for _, s in pairs:
         s.status[2000:2600] = Status.GAP
     statistic, _ = Signature(alignment="time").fit(pairs).evaluate(stroke(), signal(np.zeros(N)))
-    assert (statistic.status[2010:2590] == Status.NO_LIMIT).all()
+    assert (statistic.status[2030:2570] == Status.NO_LIMIT).all()
     assert statistic.valid[2700:3900].all()
 
 
