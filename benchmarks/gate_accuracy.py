@@ -25,9 +25,8 @@ from cdtool.evaluation.onset import OnsetRule, find_contacts
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
-from cdtool.recording import Recording, Series
-from cdtool.simulation.gate_model import GateParameters, GateRun, Impact, simulate_gate_run
-from cdtool.simulation.gate_recordings import GROUPS
+from cdtool.simulation.gate_model import GateParameters, Impact, simulate_gate_run
+from cdtool.simulation.gate_recordings import GROUPS, as_recording
 from cdtool.tables import Table
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.learning import fit_signatures
@@ -67,7 +66,7 @@ def score_seed(seed: int, detectors: list[str]) -> dict[str, Score]:
         operations[group] = []
         for number in range(1, count + 1):
             rng = np.random.default_rng([seed, GROUPS.index(group), number])
-            log = _recording(simulate_gate_run(parameters, rng, impact), f"{group}/{number:02d}", parameters)
+            log = as_recording(simulate_gate_run(parameters, rng, impact), f"{group}/{number:02d}", parameters)
             operations[group] += operations_of(log)
     return {name: _score(operations, machine, name) for name in detectors}
 
@@ -104,20 +103,6 @@ def _machine(parameters: GateParameters) -> LinearAxis:
         "viscous_friction": parameters.viscous_friction * ratio**2,
     }
     return LinearAxis.from_table(Table(values, "benchmark"))
-
-
-def _recording(run: GateRun, name: str, parameters: GateParameters) -> Recording:
-    ratio = parameters.transmission_ratio
-    values = {
-        "torque": (run.motor_torque / ratio, "N"),
-        "speed": (run.motor_speed * ratio, "m/s"),
-        "position": (run.motor_position * ratio, "m"),
-        "acceleration": (run.acceleration, "m/s2"),
-        "reference_speed": (run.reference_speed * ratio, "m/s"),
-        "force": (run.load_cell, "N"),
-    }
-    channels = {channel: Series(run.time, array, unit) for channel, (array, unit) in values.items()}
-    return Recording(name, name, ("axis",), channels)
 
 
 def _orders(cell: str, scores: dict[int, dict[str, Score]]) -> bool:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cdtool.machines.linear_axis import LinearAxis
-from cdtool.recording import FloatArray, Recording, Series
-from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
+from cdtool.recording import Recording
+from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.simulation.gate_recordings import as_recording
 from cdtool.tables import Table
 
 GATE = {
@@ -27,21 +29,6 @@ def machine_of(values: dict[str, object]) -> LinearAxis:
     return machine
 
 
-def gate_recording(run: GateRun, name: str = "run") -> Recording:
-    """A simulated run as it is after reading: every channel on the load side."""
-    ratio = GateParameters().transmission_ratio
-    values: dict[str, tuple[FloatArray, str]] = {
-        "torque": (run.motor_torque / ratio, "N"),
-        "speed": (run.motor_speed * ratio, "m/s"),
-        "position": (run.motor_position * ratio, "m"),
-        "acceleration": (run.acceleration, "m/s2"),
-        "reference_speed": (run.reference_speed * ratio, "m/s"),
-        "force": (run.load_cell, "N"),
-    }
-    channels = {channel: Series(run.time, numbers, unit) for channel, (numbers, unit) in values.items()}
-    return Recording(name, f"{name}.csv", ("gate",), channels, digest=f"digest of {name}")
-
-
 @pytest.fixture(scope="session")
 def gate() -> LinearAxis:
     return machine_of(GATE)
@@ -55,7 +42,7 @@ def simulated() -> Callable[[str, int], Recording]:
     def make(kind: str, seed: int) -> Recording:
         if (kind, seed) not in kept:
             run = simulate_gate_run(GateParameters(), np.random.default_rng([99, seed]), kind)  # type: ignore[arg-type]
-            kept[kind, seed] = gate_recording(run, f"{kind}{seed}")
+            kept[kind, seed] = replace(as_recording(run, f"{kind}{seed}", GateParameters()), digest=f"{kind}{seed}")
         return kept[kind, seed]
 
     return make

@@ -14,8 +14,9 @@ from cdtool.report.contacts_csv import contacts_csv
 from cdtool.report.figures import SUFFIXES
 from cdtool.report.files import write_text
 from cdtool.report.markdown import Image, to_markdown
-from cdtool.workflows.benchmark import Benchmark, Trace
+from cdtool.workflows.benchmark import Benchmark
 from cdtool.workflows.detection import Detected
+from cdtool.workflows.scoring import Trace
 
 _KNOWN = (".json", ".md", ".csv", *SUFFIXES)
 _LONGEST_NAME = 40

@@ -14,7 +14,7 @@ from cdtool.recording import Contact
 from cdtool.report.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.panels import Legend, Span, count_from, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.style import look_of
-from cdtool.workflows.benchmark import Trace
+from cdtool.workflows.scoring import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import UsageError
+from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, GateRun, Impact, simulate_gate_run
 from cdtool.units import UNITS
 
@@ -39,6 +40,22 @@ class _Planned:
     number: int
     name: str
     suffix: str
+
+
+def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recording:
+    """A run as it is after reading, without a file between: every channel on the load side."""
+    ratio = parameters.transmission_ratio
+    values = {
+        "torque": (run.motor_torque / ratio, "N"),
+        "speed": (run.motor_speed * ratio, "m/s"),
+        "position": (run.motor_position * ratio, "m"),
+        "acceleration": (run.acceleration, "m/s2"),
+        "reference_speed": (run.reference_speed * ratio, "m/s"),
+        "reference_torque": (run.reference_torque / ratio, "N"),
+        "force": (run.load_cell, "N"),
+    }
+    channels = {channel: Series(run.time, array, unit) for channel, (array, unit) in values.items()}
+    return Recording(name, name, ("gate",), channels)
 
 
 def write_gate_recordings(

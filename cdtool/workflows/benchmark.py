@@ -2,41 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from cdtool.activation import Activation
-from cdtool.clock import previous_value
-from cdtool.errors import CdtoolError, RecordingError, SignatureError
-from cdtool.evaluation.matching import Match, Matching, match
-from cdtool.evaluation.onset import find_contacts
+from cdtool.errors import RecordingError, SignatureError
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results, Skipped
 from cdtool.kernels import compile_loaded
 from cdtool.operations import Operation
-from cdtool.pipeline import Detection, detect_operation, run_detector
-from cdtool.recording import Contact
+from cdtool.pipeline import run_detector
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
 from cdtool.workflows.learning import fit_signatures
-from cdtool.workflows.runs import Progress, in_order, load_operations, load_runs, shown_path, told
-
-
-@dataclass(frozen=True)
-class Trace:
-    """One operation with every detector's detection: what a plot needs."""
-
-    group: str
-    operation: Operation
-    contacts: tuple[Contact, ...]
-    detections: tuple[Detection, ...]
-    matchings: tuple[Matching, ...]
+from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
+from cdtool.workflows.scoring import Scored, Trace, contact_results, false_alarm_results, score_log
 
 
 @dataclass(frozen=True)
@@ -46,18 +32,6 @@ class Benchmark:
     results: Results
     traces: tuple[Trace, ...]
     seconds: Mapping[str, float]
-
-
-@dataclass
-class _Scored:
-    """What one log gave."""
-
-    traces: list[Trace] = field(default_factory=list)
-    skipped: list[Skipped] = field(default_factory=list)
-    findings: list[Skipped] = field(default_factory=list)
-    digest: tuple[str, str] | None = None
-    reading: float = 0.0
-    detecting: float = 0.0
 
 
 def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Progress | None = None) -> Benchmark:
@@ -78,8 +52,8 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
     work = [(group, path) for group in setup.groups for path in _paths(setup, group)]
     activation = Activation(setup.debounce)
 
-    def score(item: tuple[str, Path]) -> _Scored:
-        return _score(setup, item[0], item[1], detectors, thresholds, activation)
+    def score(item: tuple[str, Path]) -> Scored:
+        return score_log(setup, item[0], item[1], detectors, thresholds, activation)
 
     traces: dict[str, Trace] = {}
     contacts: list[ContactResult] = []
@@ -96,8 +70,8 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
         seconds["reading"] += scored.reading
         seconds["detecting"] += scored.detecting
         for trace in scored.traces:
-            contacts += _contact_results(trace, group)
-            false_alarms += _false_alarm_results(trace, group)
+            contacts += contact_results(trace)
+            false_alarms += false_alarm_results(trace)
             for detection in trace.detections:
                 figures = exposure.setdefault((group, detection.detector), [0, 0.0, 0, 0])
                 figures[0] += 1
@@ -146,90 +120,6 @@ def _learn(
     return thresholds, skipped
 
 
-def _score(
-    setup: BenchmarkFile,
-    group: str,
-    path: Path,
-    detectors: Sequence[Any],
-    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
-    activation: Activation,
-) -> _Scored:
-    scored = _Scored()
-    begin = perf_counter()
-    try:
-        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
-        contacts = [] if group == HOLDOUT else find_contacts(recording, setup.onset)
-        if group != HOLDOUT and not contacts:
-            raise RecordingError(
-                f"{path}: no contact found ({setup.onset.described})",
-                "lower [onset] above_n, or move the log to [holdout]",
-            )
-    except CdtoolError as fault:
-        scored.skipped.append(Skipped(shown_path(path, setup.path.parent), str(fault)))
-        scored.reading = perf_counter() - begin
-        return scored
-    scored.reading = perf_counter() - begin
-    scored.digest = (recording.source, recording.digest)
-    scored.findings = told(recording)
-    for operation in operations:
-        part = operation.recording
-        inside = tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
-        detections, matchings = [], []
-        for detector in detectors:
-            try:
-                detection = detect_operation(
-                    operation, setup.machine_file.machine, detector, thresholds[detector.name], activation
-                )
-            except CdtoolError as fault:
-                scored.skipped.append(Skipped(operation.name, str(fault)))
-                continue
-            detections.append(detection)
-            matchings.append(match(detection.verdict, inside, detection.statistic, setup.window))
-        scored.traces.append(Trace(group, operation, inside, tuple(detections), tuple(matchings)))
-    scored.detecting = perf_counter() - begin - scored.reading
-    return scored
-
-
-def _contact_results(trace: Trace, group: str) -> list[ContactResult]:
-    recording = trace.operation.recording
-    return [
-        ContactResult(
-            recording=recording.name,
-            group=group,
-            detector=detection.detector,
-            joint=recording.joints[found.alarm.joint] if found.alarm else None,
-            onset_s=found.contact.start,
-            onset_uncertainty_s=found.contact.uncertainty,
-            alarm_s=found.alarm.time if found.alarm else None,
-            latency_ms=1e3 * found.latency if found.alarm else None,
-            outcome=found.outcome,
-            force_at_alarm_n=_force_at_alarm(trace, found),
-            peak_force_n=found.contact.peak_force if np.isfinite(found.contact.peak_force) else None,
-            clipped=found.clipped,
-            reason=detection.verdict.reason or None if found.outcome == "not_assessable" else None,
-        )
-        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
-        for found in matching.matches
-    ]
-
-
-def _false_alarm_results(trace: Trace, group: str) -> list[FalseAlarmResult]:
-    recording = trace.operation.recording
-    return [
-        FalseAlarmResult(recording.name, group, detection.detector, recording.joints[alarm.joint], alarm.time)
-        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
-        for alarm in matching.false_alarms
-    ]
-
-
-def _force_at_alarm(trace: Trace, found: Match) -> float | None:
-    recording = trace.operation.recording
-    if found.alarm is None or "force" not in recording:
-        return None
-    force = float(previous_value(recording["force"], np.array([found.alarm.time]))[0, 0])
-    return force if np.isfinite(force) else None
-
-
 def _provenance(
     setup: BenchmarkFile,
     detectors: Sequence[Any],
@@ -260,9 +150,6 @@ def _provenance(
 
 
 def _digest(thresholds: Sequence[FittedThreshold]) -> str:
-    import hashlib
-    import json
-
     text = json.dumps([item.to_dict() for item in thresholds], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 

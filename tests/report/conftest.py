@@ -18,8 +18,8 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, detect_operation, run_detector
 from cdtool.recording import Recording
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark import Trace
 from cdtool.workflows.detection import Detected
+from cdtool.workflows.scoring import Trace
 
 NAMES = ("pure_inertia", "friction_ekf", "momentum", "pure_torque")
 RULE = OnsetRule(above=20.0, back_to=8.0)
