@@ -177,7 +177,15 @@ def the_results_file_has_the_fields_of_the_page() -> None:
         assert set(results[part][0]) <= named, part
 
 
+def the_table_of_the_readme_is_what_its_benchmark_prints() -> None:
+    lines = {" ".join(line.split()) for line in cdtool("benchmark", "sample_logs/gate/benchmark.toml").out.splitlines()}
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = [" ".join(line.split()) for line in text.splitlines() if re.match(r"(stiff|soft) +\w+ +\d", line)]
+    assert len(rows) == 10 and set(rows) <= lines
+
+
 CLAIMS: dict[str, Callable[[], None]] = {
+    "README.md": the_table_of_the_readme_is_what_its_benchmark_prints,
     "docs/benchmark-file.md": the_results_file_has_the_fields_of_the_page,
     "docs/choosing.md": the_table_of_choosing_is_what_the_run_gave,
     "docs/signature.md": the_thesis_rule_alarms_in_every_impact_free_run,

@@ -50,14 +50,13 @@ def show_table(results: Results) -> None:
     """The thesis's table 5.1 for each group, with what its figures have to be read beside."""
     from cdtool.evaluation.statistics import summarise
 
-    names = results.provenance.get("short_names", {})
     columns = [("group", "left"), ("detector", "left")]
-    columns += [(name, "right") for name in ("mean ms", "std ms", "median ms", "n", "missed", "not assessable")]
-    columns += [("false alarms", "right"), ("operations", "right")]
+    columns += [(name, "right") for name in ("mean\nms", "std\nms", "median\nms", "n", "missed", "n.a.")]
+    columns += [("false\nalarms", "right"), ("ops", "right")]
     rows = [
         (
             item.group,
-            f"{item.detector} ({names[item.detector]})" if item.detector in names else item.detector,
+            item.detector,
             number(item.mean_ms),
             number(item.std_ms, 2),
             number(item.median_ms),
@@ -71,4 +70,5 @@ def show_table(results: Results) -> None:
     ]
     table(columns, rows)
     provenance = results.provenance
-    typer.echo(f"latency from onset ({provenance.get('onset')}) to alarm, debounce included; n: contacts detected")
+    typer.echo("latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable;")
+    typer.echo(f"ops: operations scored; onset: {provenance.get('onset')}")

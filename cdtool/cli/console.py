@@ -52,17 +52,20 @@ def leave(skipped: Sequence[Skipped]) -> None:
 
 
 def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], title: str = "") -> None:
-    """Print a table: columns as (heading, "left" or "right"); cells are plain text."""
-    from rich import box
+    """Print a table: columns as (heading, "left" or "right"); cells are plain text; an empty column is left out."""
     from rich.console import Console
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    made: Table = RichTable(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for heading, side in columns:
+    kept = [i for i in range(len(columns)) if not rows or any(str(row[i]) for row in rows)]
+    made: Table = RichTable(
+        box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, 2, 0, 0)
+    )
+    for i in kept:
+        heading, side = columns[i]
         made.add_column(heading, justify="right" if side == "right" else "left", overflow="fold")
     for row in rows:
-        made.add_row(*(Text(plain(cell)) for cell in row))
+        made.add_row(*(Text(plain(row[i])) for i in kept))
     # A pipe or a log file has no width: long names must not be folded there.
     width = None if sys.stdout.isatty() else 160
     Console(width=width, highlight=False).print(made)

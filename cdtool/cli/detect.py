@@ -142,8 +142,8 @@ def _show(rows: list[tuple[Detection, Detected]]) -> None:
                 )
             )
     unit = rows[0][0].statistic.unit
-    columns = [("recording", "left"), ("verdict", "left"), ("time s", "right"), ("joint", "left")]
-    columns += [(f"signal {unit}", "right"), ("limit", "right"), ("latency ms", "right"), ("why", "left")]
+    columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
+    columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     table(columns, cells, title=rows[0][0].detector)
 
 

@@ -50,7 +50,7 @@ def _show(item: Info) -> None:
     details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
     typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
     columns = [("channel", "left"), ("unit", "left")]
-    columns += [(name, "right") for name in ("samples", "missing", "rate Hz", "start s", "length s", "min", "max")]
+    columns += [(name, "right") for name in ("samples", "lost", "Hz", "start\ns", "length\ns", "min", "max")]
     rows = [
         (
             channel.name,
@@ -60,12 +60,13 @@ def _show(item: Info) -> None:
             number(channel.rate_hz, 5),
             number(channel.start_s, 7),
             number(channel.duration_s, 6),
-            number(channel.minimum, 5),
-            number(channel.maximum, 5),
+            number(channel.minimum, 4),
+            number(channel.maximum, 4),
         )
         for channel in item.channels
     ]
     table(columns, rows)
+    typer.echo()
     for finding in item.findings:
         typer.echo(f"{finding.severity}: {plain(finding)}")
     if not item.findings:

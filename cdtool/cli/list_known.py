@@ -59,11 +59,9 @@ def _entry(kind: str, name: str) -> dict[str, Any]:
 
 
 def _show_detectors(entries: list[dict[str, Any]]) -> None:
-    rows = []
     for entry in entries:
-        gains = entry["gains"] or [{"name": "-", "default": None, "unit": "", "meaning": ""}]
-        for i, gain in enumerate(gains):
-            head = (f"{entry['name']} ({entry['short_name']})", ", ".join(entry["needs"])) if i == 0 else ("", "")
-            rows.append((*head, gain["name"], number(gain["default"], 4), gain["unit"], gain["meaning"]))
-    columns = [("detector", "left"), ("needs", "left"), ("gain", "left"), ("default", "right"), ("unit", "left")]
-    table([*columns, ("meaning", "left")], rows)
+        typer.echo(f"{entry['name']} ({entry['short_name']}): {entry['title']}; needs {', '.join(entry['needs'])}")
+        for gain in entry["gains"]:
+            unit = "" if gain["unit"] == "1" else f" {gain['unit']}"
+            typer.echo(f"    {gain['name']} = {number(gain['default'], 4)}{unit}")
+            typer.echo(f"        {gain['meaning']}")

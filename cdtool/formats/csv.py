@@ -24,7 +24,7 @@ _MISSING = ["", "nan", "NaN", "NAN"]
 
 @dataclass(frozen=True)
 class Csv:
-    """Separator, header, decimal mark and encoding are found from the first lines; see csv_dialect."""
+    """Tables of text: separator, header, decimal mark and encoding are found from the first lines."""
 
     name: ClassVar[str] = "csv"
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat")

@@ -20,7 +20,7 @@ _HDF5_MAGIC = b"MATLAB 7.3 MAT-file"
 
 @dataclass(frozen=True)
 class Mat:
-    """A vector is a column, a matrix (n, k) the columns `name[0]` to `name[k-1]`, a scalar a detail."""
+    """MATLAB files up to version 7: a vector is a column, a matrix the columns `name[0]`, `name[1]` and so on."""
 
     name: ClassVar[str] = "mat"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)

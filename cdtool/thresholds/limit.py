@@ -45,7 +45,7 @@ class FittedLimit:
 
 @dataclass(frozen=True)
 class Limit:
-    """Fit: mean of the runs' largest magnitudes plus `safety_factor` of their standard deviations, on either side.
+    """Constant limits: the mean of the runs' extremes, `safety_factor` of their standard deviations further out.
 
     Fails where friction or gravity vary along the path, where a sensor drifts, or where the speed changes.
     """

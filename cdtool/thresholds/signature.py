@@ -138,7 +138,7 @@ class FittedSignature:
 
 @dataclass(frozen=True)
 class Signature:
-    """Fit: mean and pooled spread of at least 10 runs of one class; limit = mean + `safety_factor` * spread.
+    """The normal band along the stroke: mean + `safety_factor` * pooled spread of at least 10 impact-free runs.
 
     `rule` "pooled": spread over neighbours within the window, the mean's deviation from its smoothed course included;
     "thesis": mean + 1 standard deviation, point by point, which alarms in almost every run. `sides` "one" watches the

@@ -21,7 +21,7 @@ __all__ = ["Mcap"]
 
 @dataclass(frozen=True)
 class Mcap:
-    """A column is a topic and a field: `/joint_states position[0]`. See fields.py for the language of fields."""
+    """MCAP logs with JSON or ROS 2 CDR messages: a column is a topic and a field, `/joint_states position[0]`."""
 
     name: ClassVar[str] = "mcap"
     suffixes: ClassVar[tuple[str, ...]] = (".mcap",)
