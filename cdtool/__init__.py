@@ -15,10 +15,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from cdtool.version import __version__
-
 if TYPE_CHECKING:
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
+    from cdtool.version import __version__
     from cdtool.workflows.benchmark import benchmark
     from cdtool.workflows.detection import detect
     from cdtool.workflows.information import info
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.runs import read_log as read
 
 _API = {
+    "__version__": "cdtool.version:__version__",
     "read": "cdtool.workflows.runs:read_log",
     "learn_signature": "cdtool.workflows.learning:learn_signature",
     "detect": "cdtool.workflows.detection:detect",

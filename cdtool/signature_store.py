@@ -13,7 +13,6 @@ from typing import Any
 from cdtool.errors import SignatureError, UsageError
 from cdtool.machine_file import fingerprint
 from cdtool.thresholds.signature import FittedSignature
-from cdtool.version import __version__
 
 SCHEMA_VERSION = 1
 _KIND = "cdtool signature"
@@ -136,6 +135,8 @@ def with_run(signature: SignatureFile, index: int, updated: FittedSignature, run
 
 
 def _to_json(signature: SignatureFile) -> dict[str, Any]:
+    from cdtool.version import __version__  # looking it up costs as much as all of --help
+
     return {
         "kind": _KIND,
         "schema_version": SCHEMA_VERSION,

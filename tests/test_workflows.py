@@ -1,0 +1,167 @@
+"""The Python API on one long log of an axis that opens and closes, with contacts in both directions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.errors import SignatureError, UsageError
+from cdtool.signature_store import write_signature
+from cdtool.thresholds.signature import Signature
+from tests.command import cdtool as run
+
+MACHINE = """
+[machine]
+type = "linear_axis"
+name = "door"
+coordinates = "load"
+load_mass = 80.0
+viscous_friction = 40.0
+coulomb_friction = 15.0
+[channels]
+time = { column = "t", unit = "s" }
+torque = { column = "drive", unit = "N" }
+speed = { column = "v", unit = "m/s" }
+position = { column = "x", unit = "m" }
+force = { column = "cell", unit = "N" }
+label = { column = "hit", scale = 1 }
+"""
+STROKE = 4.0
+
+
+def write_log(path: Path, strokes: int, contacts: dict[int, float], seed: int) -> None:
+    """Strokes forth and back at 0.25 m/s, 4 s each; contacts: stroke -> force that the drive has to overcome [N]."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(strokes * STROKE / 1e-3)) * 1e-3
+    phase = time % STROKE
+    direction = np.where((time // STROKE).astype(int) % 2 == 0, 1.0, -1.0)
+    speed = direction * np.interp(phase, [0.0, 0.5, 1.0, 3.0, 3.5, 4.0], [0.0, 0.0, 0.25, 0.25, 0.0, 0.0])
+    rate = np.gradient(speed, 1e-3)
+    pushed = np.zeros(len(time))
+    for stroke, force in contacts.items():
+        begin = stroke * STROKE + 2.0
+        ramp = np.clip((time - begin) / 0.05, 0.0, 1.0) * (time < begin + 0.6)
+        pushed += force * ramp
+    drive = 80.0 * rate + 40.0 * speed + 15.0 * np.sign(speed) + direction * pushed + rng.normal(0.0, 1.0, len(time))
+    columns = {
+        "t": time,
+        "drive": drive,
+        "v": speed + rng.normal(0.0, 1e-4, len(time)),
+        "x": np.cumsum(speed) * 1e-3,
+        "cell": pushed + rng.normal(0.0, 0.2, len(time)),
+        "hit": (pushed > 0.0).astype(float),
+    }
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.7g")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("door")
+    (path / "machine.toml").write_text(MACHINE)
+    write_log(path / "free.csv", 24, {}, 1)
+    write_log(path / "quiet.csv", 6, {}, 2)
+    write_log(path / "hits.csv", 6, {1: 60.0, 2: 60.0, 5: 60.0}, 3)
+    return path
+
+
+def test_one_long_log_gives_a_signature_for_each_direction(folder):
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    assert [(motion.direction, runs) for motion, runs in learned.runs] == [(1, 12), (-1, 12)]
+    with pytest.raises(SignatureError, match="1 impact-free runs"):
+        cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm")
+
+
+def test_contacts_are_found_in_both_directions_and_nothing_else(folder, tmp_path):
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    write_signature(tmp_path / "door.json", learned.signature)
+    found = cdtool.detect(
+        folder / "hits.csv", folder / "machine.toml", signature=tmp_path / "door.json", operations="motion"
+    )
+    outcomes = [detection.verdict.outcome for detection in found.detections]
+    assert outcomes == ["no alarm", "alarm", "alarm", "no alarm", "no alarm", "alarm"]
+    sides = [detection.verdict.alarms[0].side for detection in found.detections if detection.verdict.alarms]
+    assert sides == ["below", "above", "below"]
+    assert [contact.start for contact in found.contacts] == pytest.approx([6.0, 10.0, 22.0], abs=0.01)
+
+
+BENCHMARK = """
+machine = "machine.toml"
+detectors = ["gm", "pt"]
+operations = "motion"
+[learn]
+logs = ["free.csv"]
+[holdout]
+logs = ["quiet.csv"]
+[impacts.push]
+logs = ["hits.csv"]
+"""
+
+
+def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
+    (folder / "benchmark.toml").write_text(BENCHMARK)
+    results = cdtool.benchmark(folder / "benchmark.toml").results
+    exposure = {(item.group, item.detector): (item.recordings, item.operations) for item in results.exposure}
+    assert exposure["push", "momentum"] == (1, 6) and exposure["holdout", "pure_torque"] == (1, 6)
+    rows = [(row.recording, row.detector, row.outcome) for row in results.contacts]
+    names = ("hits.csv#2", "hits.csv#3", "hits.csv#6")
+    assert rows == [(name, detector, "detected") for name in names for detector in ("momentum", "pure_torque")]
+    assert all(10.0 < row.latency_ms < 150.0 for row in results.contacts)
+    assert results.false_alarms == () and results.skipped == ()
+    assert results.contacts[0].force_at_alarm_n > 10.0
+
+
+def test_the_plain_limit_serves_a_benchmark_too(folder):
+    text = BENCHMARK.replace('operations = "motion"', 'operations = "motion"\nthreshold = "limit"')
+    (folder / "limit.toml").write_text(text)
+    results = cdtool.benchmark(folder / "limit.toml").results
+    outcomes = {row.detector: row.outcome for row in results.contacts}
+    assert outcomes["momentum"] == "detected"
+    assert results.provenance["threshold"] == "limit"
+
+
+def test_labels_serve_as_ground_truth_where_no_load_cell_is_mapped(folder):
+    text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
+    (folder / "labels.toml").write_text(text)
+    (folder / "label_benchmark.toml").write_text(BENCHMARK.replace("machine.toml", "labels.toml"))
+    results = cdtool.benchmark(folder / "label_benchmark.toml").results
+    assert [row.outcome for row in results.contacts] == ["detected"] * 6
+    assert all(row.peak_force_n is None and row.force_at_alarm_n is None for row in results.contacts)
+
+
+def test_a_trigger_channel_cuts_too_and_a_wrong_way_to_cut_is_refused(folder):
+    text = MACHINE + 'trigger = { column = "hit" }\n'
+    (folder / "trigger.toml").write_text(text.replace('label = { column = "hit", scale = 1 }\n', ""))
+    found = cdtool.detect(
+        folder / "hits.csv", folder / "trigger.toml", detector="pt", limit=[70.0], operations="trigger"
+    )
+    assert [detection.verdict.outcome for detection in found.detections] == ["alarm"] * 3
+    with pytest.raises(UsageError, match="motion"):
+        cdtool.detect(folder / "hits.csv", folder / "machine.toml", detector="pt", limit=[70.0], operations="strokes")
+
+
+def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
+    path = tmp_path / "door.json"
+    machine = ("-m", folder / "machine.toml", "--operations", "motion")
+    assert run("learn-signature", folder / "free.csv", *machine, "-d", "gm", "-o", path).status == 0
+    first = json.loads(path.read_text())
+    done = run("learn-signature", folder / "quiet.csv", *machine, "--update", path, "--forget", 20)
+    assert done.status == 0 and "6 runs added" in done.out
+    second = json.loads(path.read_text())
+    assert second["first"] == first["first"] and len(second["runs"]) == 30
+    assert second["current"][0]["by_position"]["count"] == first["current"][0]["by_position"]["count"]
+    assert second["current"][0]["by_position"]["mean"] != first["current"][0]["by_position"]["mean"]
+
+
+def test_the_signature_rule_reaches_the_file(folder):
+    rule = Signature(sides="two", safety_factor=7.0, alignment="position")
+    learned = cdtool.learn_signature(
+        [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", debounce=4
+    )
+    fitted = learned.signature.current[0]
+    assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
+    assert learned.signature.debounce == 4
