@@ -53,11 +53,16 @@ class Signal:
         valid: BoolArray = self.status == Status.VALID
         return valid
 
-    def shares(self) -> dict[str, float]:
-        """Share of the samples for each reason not to judge, over all joints."""
-        size = max(self.status.size, 1)
-        counts = {text: int(np.count_nonzero(self.status == code)) for code, text in REASONS.items()}
-        return {text: count / size for text, count in counts.items() if count}
+    def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
+        """Share of the samples for each reason not to judge, over all joints, from `start` to `end` [s]."""
+        status = self.status[(self.time >= start) & (self.time <= end)]
+        counts = {text: int(np.count_nonzero(status == code)) for code, text in REASONS.items()}
+        return {text: count / status.size for text, count in counts.items() if count}
+
+    def why_not(self, start: float = -np.inf, end: float = np.inf) -> str:
+        """The reasons not to judge in words, with their shares, from `start` to `end` [s]."""
+        shares = self.shares(start, end)
+        return ", ".join(f"{text} {100.0 * share:.0f} %" for text, share in shares.items()) or "no samples"
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,23 @@ from typing import Any
 import numpy as np
 
 from cdtool.activation import Activation
-from cdtool.detection import Band, Signal, Status, Verdict
+from cdtool.clock import previous_value
+from cdtool.detection import REASONS, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.operations import Operation
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.signature import SPEED_TOLERANCE, FittedSignature
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of an operation that cannot be judged: why, from when to when [s], from where to where [load unit]."""
+
+    reason: str
+    start: float
+    end: float
+    way_start: float
+    way_end: float
 
 
 @dataclass(frozen=True)
@@ -33,6 +45,24 @@ class Detection:
             return 0.0
         period = float(np.median(np.diff(self.statistic.time)))
         return period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
+
+    def not_judged(self) -> list[Stretch]:
+        """The stretches in which the leading joint's signal could not be judged, in order of time."""
+        joint = self.operation.motion.joint
+        status, time = self.statistic.status[:, joint], self.statistic.time
+        edges = np.flatnonzero(np.diff(status)) + 1
+        starts, ends = [0, *edges.tolist()], [*(edges - 1).tolist(), len(status) - 1]
+        found = [(a, b) for a, b in zip(starts, ends, strict=True) if len(status) and status[a] != Status.VALID]
+        recording = self.operation.recording
+        way = (
+            previous_value(recording["position"], time)[:, joint]
+            if "position" in recording
+            else np.full(len(time), np.nan)
+        )
+        return [
+            Stretch(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
+            for a, b in found
+        ]
 
 
 def run_detector(operation: Operation, machine: Any, detector: Detector) -> Signal:
@@ -65,9 +95,7 @@ def detect_operation(
     if alarms:
         verdict = Verdict("alarm", alarms, crossings=crossings)
     elif not statistic.valid.any():
-        shares = statistic.shares()
-        reason = ", ".join(f"{text} {100 * share:.0f} %" for text, share in shares.items()) or "no samples"
-        verdict = Verdict("not assessable", reason=reason)
+        verdict = Verdict("not assessable", reason=statistic.why_not())
     else:
         verdict = Verdict("no alarm")
     return Detection(operation, detector.name, statistic, band, verdict)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -165,3 +166,53 @@ def test_the_signature_rule_reaches_the_file(folder):
     fitted = learned.signature.current[0]
     assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
     assert learned.signature.debounce == 4
+
+
+def test_what_could_not_be_judged_is_told_with_its_share(folder):
+    (folder / "benchmark.toml").write_text(BENCHMARK)
+    results = cdtool.benchmark(folder / "benchmark.toml").results
+    momentum = next(item for item in results.exposure if (item.group, item.detector) == ("holdout", "momentum"))
+    assert set(momentum.not_judged) == {"start-up", "no limit known here"}
+    assert 0.05 < sum(momentum.not_judged.values()) < 0.5
+    done = run(
+        "detect",
+        folder / "quiet.csv",
+        "-m",
+        folder / "machine.toml",
+        "-d",
+        "gm",
+        "--limit",
+        40,
+        "--operations",
+        "motion",
+    )
+    assert done.status == 0
+    assert re.search(r"not judged in .*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(.*\) start-up", done.out)
+
+
+def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
+    write_log(folder / "rest.csv", 6, {1: 60.0}, 4)
+    table = np.loadtxt(folder / "rest.csv", delimiter=",", skiprows=1)
+    resting = table[-1].copy()
+    tail = np.tile(resting, (4000, 1))
+    tail[:, 0] = table[-1, 0] + 1e-3 * np.arange(1, 4001)
+    tail[:, 2], tail[:, 4] = 0.0, 0.0
+    tail[2500:2800, 4] = 200.0  # the cell is hit long after the last stroke
+    rows = np.vstack((table, tail))
+    header = "t,drive,v,x,cell,hit"
+    np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
+    (folder / "rest.toml").write_text(BENCHMARK.replace("hits.csv", "rest.csv"))
+    results = cdtool.benchmark(folder / "rest.toml").results
+    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s lies in no operation (cut by motion)"]
+    assert len(results.contacts) == 2
+
+
+def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
+    """The speed is lost from before the contact on: the momentum observer sees nothing, and says so."""
+    table = np.loadtxt(folder / "hits.csv", delimiter=",", skiprows=1)
+    table[(table[:, 0] > 5.9) & (table[:, 0] < 8.0), 2] = np.nan
+    np.savetxt(folder / "lost.csv", table, delimiter=",", header="t,drive,v,x,cell,hit", comments="", fmt="%.7g")
+    (folder / "lost.toml").write_text(BENCHMARK.replace("hits.csv", "lost.csv"))
+    row = cdtool.benchmark(folder / "lost.toml").results.contacts[0]
+    assert (row.detector, row.outcome) == ("momentum", "not_assessable")
+    assert "missing samples" in row.reason

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +17,9 @@ from cdtool.evaluation.results import Skipped
 if TYPE_CHECKING:
     from cdtool.pipeline import Detection
     from cdtool.workflows.detection import Detected
+
+# Operations of which is told what could not be judged, and how many stretches of each.
+_SHOWN, _STRETCHES = 6, 3
 
 
 def detect(
@@ -86,6 +91,8 @@ def detect(
         print_json([_as_json(log, detection, found) for log, found in done for detection in found.detections])
     else:
         _show([(detection, found) for _, found in done for detection in found.detections])
+    if not as_json:
+        _show_not_judged([detection for _, found in done for detection in found.detections])
     for log, _ in done:
         if log in plot_names and not as_json:
             typer.echo(f"plot written to {plain(plot_names[log])}")
@@ -147,6 +154,21 @@ def _show(rows: list[tuple[Detection, Detected]]) -> None:
     table(columns, cells, title=rows[0][0].detector)
 
 
+def _show_not_judged(detections: list[Detection]) -> None:
+    """What share of an operation could not be judged, and when, where and why in its longest stretches."""
+    shown = [detection for detection in detections if detection.statistic.shares()]
+    for detection in shown[:_SHOWN]:
+        longest = sorted(detection.not_judged(), key=lambda item: item.start - item.end)[:_STRETCHES]
+        parts = []
+        for item in sorted(longest, key=lambda item: item.start):
+            where = f" ({item.way_start:.3g} to {item.way_end:.3g})" if math.isfinite(item.way_end) else ""
+            parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
+        share = 1.0 - float(detection.statistic.valid.mean())
+        typer.echo(f"not judged in {plain(detection.operation.name)}: {100.0 * share:.0f} %; {'; '.join(parts)}")
+    if len(shown) > _SHOWN:
+        typer.echo(f"not judged: and {len(shown) - _SHOWN} operations more (--json has all)")
+
+
 def _as_json(log: Path, detection: Detection, found: Detected) -> dict[str, Any]:
     joints = detection.operation.recording.joints
     return {
@@ -172,6 +194,7 @@ def _as_json(log: Path, detection: Detection, found: Detected) -> dict[str, Any]
             if _inside(detection, contact.start)
         ],
         "not_judged": detection.statistic.shares(),
+        "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
         "findings": [str(item) for item in found.recording.findings],
     }
 

@@ -21,13 +21,17 @@ Outcome = Literal["detected", "missed", "not_assessable"]
 
 @dataclass(frozen=True)
 class Match:
-    """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero."""
+    """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero.
+
+    `reason` tells why a contact could not be assessed.
+    """
 
     contact: Contact
     outcome: Outcome
     alarm: Alarm | None = None
     latency: float = float("nan")
     clipped: bool = False
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,11 @@ def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, wind
         inside = (alarm for alarm in verdict.crossings if opens <= alarm.time <= closes and alarm not in taken)
         found = next(inside, None)
         if found is None:
-            outcome: Outcome = "missed" if _assessable(statistic, contact, window) else "not_assessable"
-            matches.append(Match(contact, outcome))
+            if _assessable(statistic, contact, window):
+                matches.append(Match(contact, "missed"))
+            else:
+                why = verdict.reason or statistic.why_not(contact.start, closes)
+                matches.append(Match(contact, "not_assessable", reason=why))
             continue
         taken.add(found)
         latency = found.time - contact.start

@@ -46,7 +46,10 @@ class FalseAlarmResult:
 
 @dataclass(frozen=True)
 class ExposureResult:
-    """How long and how often a detector was watched in a group: the denominator of its false alarms."""
+    """How long and how often a detector watched in a group: the denominator of its false alarms.
+
+    `not_assessable` counts operations that it could judge nowhere; `not_judged` is the share of all samples by reason.
+    """
 
     group: str
     detector: str
@@ -54,6 +57,7 @@ class ExposureResult:
     operations: int
     hours: float
     not_assessable: int = 0
+    not_judged: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
-from cdtool.evaluation.results import Results, Skipped
+from cdtool.evaluation.results import ExposureResult, Results, Skipped
 from cdtool.evaluation.statistics import Summary, summarise
 from cdtool.plain_text import plain
 
@@ -51,6 +51,9 @@ def to_markdown(results: Results, images: Sequence[Image] = ()) -> str:
         parts.append(f"## {escape(group)}")
         parts.append(_group_table([item for item in summaries if item.group == group], results.provenance))
         parts += [_image(image) for image in images if image.group == group]
+    blind = [item for item in results.exposure if item.not_judged]
+    if blind:
+        parts += ["## What could not be judged", _not_judged(blind)]
     if results.skipped:
         parts += ["## Left out", _reasons(results.skipped)]
     if results.findings:
@@ -80,6 +83,19 @@ def _group_table(rows: Sequence[Summary], provenance: Mapping[str, Any]) -> str:
         for row in rows
     ]
     return _table(("detector", *_FIGURES), cells, numeric=True)
+
+
+def _not_judged(items: Iterable[ExposureResult]) -> str:
+    rows = [
+        (
+            escape(item.group),
+            escape(item.detector),
+            f"{100.0 * sum(item.not_judged.values()):.0f} %",
+            escape(", ".join(f"{reason} {100.0 * share:.0f} %" for reason, share in item.not_judged.items())),
+        )
+        for item in items
+    ]
+    return _table(("group", "detector", "share of its samples", "why"), rows)
 
 
 def _reasons(items: Iterable[Skipped]) -> str:

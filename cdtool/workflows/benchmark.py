@@ -12,7 +12,7 @@ from typing import Any
 
 from cdtool.activation import Activation
 from cdtool.errors import RecordingError, SignatureError
-from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results, Skipped
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Results, Skipped
 from cdtool.kernels import compile_loaded
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
@@ -22,7 +22,7 @@ from cdtool.version import __version__
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
 from cdtool.workflows.learning import fit_signatures
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
-from cdtool.workflows.scoring import Scored, Trace, contact_results, false_alarm_results, score_log
+from cdtool.workflows.scoring import Exposure, Scored, Trace, contact_results, false_alarm_results, score_log
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
     traces: dict[str, Trace] = {}
     contacts: list[ContactResult] = []
     false_alarms: list[FalseAlarmResult] = []
-    exposure: dict[tuple[str, str], list[float]] = {}
+    exposure: dict[tuple[str, str], Exposure] = {}
     skipped = [*learn.skipped, *skipped]
     findings = list(learn.findings)
     digests = {op.recording.source: op.recording.digest for op in learn.operations}
@@ -73,14 +73,11 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
             contacts += contact_results(trace)
             false_alarms += false_alarm_results(trace)
             for detection in trace.detections:
-                figures = exposure.setdefault((group, detection.detector), [0, 0.0, 0, 0])
-                figures[0] += 1
-                figures[1] += detection.assessed_seconds / 3600.0
-                figures[2] += detection.verdict.outcome == "not assessable"
+                exposure.setdefault((group, detection.detector), Exposure()).add(detection)
             if len(trace.detections) > len(traces[group].detections if group in traces else ()):
                 traces[group] = trace
         for name in {detection.detector for trace in scored.traces for detection in trace.detections}:
-            exposure[group, name][3] += 1
+            exposure[group, name].recordings += 1
     if not exposure:
         reason = f"; first reason: {skipped[0].recording}: {skipped[0].reason}" if skipped else ""
         raise RecordingError(f"{setup.path}: no recording could be scored{reason}", "check with cdtool info")
@@ -90,9 +87,7 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
         groups=setup.groups,
         contacts=tuple(contacts),
         false_alarms=tuple(false_alarms),
-        exposure=tuple(
-            ExposureResult(group, name, int(n[3]), int(n[0]), n[1], int(n[2])) for (group, name), n in exposure.items()
-        ),
+        exposure=tuple(item.result(group, name) for (group, name), item in exposure.items()),
         skipped=tuple(skipped),
         findings=tuple(findings),
     )

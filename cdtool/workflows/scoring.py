@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from cdtool.clock import previous_value
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.evaluation.matching import Match, Matching, match
 from cdtool.evaluation.onset import find_contacts
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Skipped
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import Contact
@@ -47,6 +48,34 @@ class Scored:
     detecting: float = 0.0
 
 
+@dataclass
+class Exposure:
+    """How long one detector watched one group, added up operation by operation."""
+
+    recordings: int = 0
+    operations: int = 0
+    seconds: float = 0.0
+    not_assessable: int = 0
+    samples: int = 0
+    not_judged: Counter[str] = field(default_factory=Counter)
+
+    def add(self, detection: Detection) -> None:
+        """Count one operation."""
+        self.operations += 1
+        self.seconds += detection.assessed_seconds
+        self.not_assessable += detection.verdict.outcome == "not assessable"
+        size = detection.statistic.status.size
+        self.samples += size
+        for reason, share in detection.statistic.shares().items():
+            self.not_judged[reason] += round(share * size)
+
+    def result(self, group: str, detector: str) -> ExposureResult:
+        """The row of results.json."""
+        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.not_judged.items())}
+        hours = self.seconds / 3600.0
+        return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
+
+
 def score_log(
     setup: BenchmarkFile,
     group: str,
@@ -73,6 +102,10 @@ def score_log(
     scored.reading = perf_counter() - begin
     scored.digest = (recording.source, recording.digest)
     scored.findings = told(recording)
+    for contact in contacts:
+        if not any(item.recording.start <= contact.start <= item.recording.end for item in operations):
+            text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {setup.operations})"
+            scored.skipped.append(Skipped(recording.name, text))
     for operation in operations:
         part = operation.recording
         inside = tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
@@ -109,7 +142,7 @@ def contact_results(trace: Trace) -> list[ContactResult]:
             force_at_alarm_n=_force_at_alarm(trace, found),
             peak_force_n=found.contact.peak_force if np.isfinite(found.contact.peak_force) else None,
             clipped=found.clipped,
-            reason=detection.verdict.reason or None if found.outcome == "not_assessable" else None,
+            reason=found.reason or None,
         )
         for detection, matching in zip(trace.detections, trace.matchings, strict=True)
         for found in matching.matches
