@@ -23,11 +23,14 @@ CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
 
 @dataclass(frozen=True)
 class Finding:
-    """Something odd about a file or a channel: what, where, how often; `severity` tells note from warning."""
+    """Something odd about a file or a channel: what, where, how often.
+
+    `severity`: a note, a warning, or a loss: data that the file held, or should hold, could not be read.
+    """
 
     message: str
     channel: str = ""
-    severity: Literal["note", "warning"] = "warning"
+    severity: Literal["note", "warning", "loss"] = "warning"
 
     def __str__(self) -> str:
         return f"{self.channel}: {self.message}" if self.channel else self.message

@@ -52,6 +52,7 @@ def detect(
     from cdtool.evaluation.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.detection import detect as run
+    from cdtool.workflows.runs import lost
 
     machine_file = read_machine_file(machine)
     limits = _limits(limit)
@@ -72,6 +73,7 @@ def detect(
                     onset=OnsetRule(above=onset_above, back_to=onset_back_to),
                 )
                 done.append((log, found))
+                skipped += lost(found.recording)
                 if plot_names:
                     from cdtool.report.detection_plot import plot_detected
 

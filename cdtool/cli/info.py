@@ -42,7 +42,8 @@ def info(
     else:
         for item in done:
             _show(item)
-    if failed:
+    lossy = any(finding.severity == "loss" for item in done for finding in item.findings)
+    if failed or lossy:
         raise typer.Exit(ExitStatus.INCOMPLETE if done else ExitStatus.UNUSABLE)
 
 

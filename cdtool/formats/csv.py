@@ -53,7 +53,10 @@ class Csv:
         arrays, cut = table.read(keys)
         if cut:
             findings.append(
-                Finding(f"the last line ({rows.line(table.rows.count - (not rows.cut))}) is cut off: dropped")
+                Finding(
+                    f"the last line ({rows.line(table.rows.count - (not rows.cut))}) is cut off: dropped",
+                    severity="loss",
+                )
             )
         columns = {key: Column(key, values, unit=split_unit(key)[1]) for key, values in arrays.items()}
         return Source(

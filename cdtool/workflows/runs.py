@@ -104,6 +104,7 @@ def load_runs(
         recording, parts = loaded
         operations.extend(parts)
         findings.extend(told(recording))
+        skipped.extend(lost(recording))
     return Runs(tuple(operations), tuple(skipped), tuple(findings))
 
 
@@ -117,6 +118,11 @@ def shown_path(path: Path, base: Path | None = None) -> str:
 def told(recording: Recording) -> list[Skipped]:
     """The warnings among a recording's findings, under its name."""
     return [Skipped(recording.name, str(item)) for item in recording.findings if item.severity == "warning"]
+
+
+def lost(recording: Recording) -> list[Skipped]:
+    """What could not be read of a recording that is used nevertheless: to be told like what was left out."""
+    return [Skipped(recording.name, str(item)) for item in recording.findings if item.severity == "loss"]
 
 
 def _glob(path: Path) -> Iterator[Path]:

@@ -22,7 +22,7 @@ from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import Contact
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
-from cdtool.workflows.runs import load_operations, shown_path, told
+from cdtool.workflows.runs import load_operations, lost, shown_path, told
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,7 @@ def score_log(
     scored.reading = perf_counter() - begin
     scored.digest = (recording.source, recording.digest)
     scored.findings = told(recording)
+    scored.skipped += lost(recording)
     for contact in contacts:
         if not any(item.recording.start <= contact.start <= item.recording.end for item in operations):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {setup.operations})"

@@ -105,8 +105,20 @@ def test_a_channel_without_any_value_is_not_assessable_not_quiet(detect, tmp_pat
 
 def test_a_half_written_last_line_is_dropped_and_told(detect, tmp_path, good, gate_folder):
     path = written(tmp_path / "half.csv", "\n".join(good)[:-20])
-    assert "last line" in cdtool("info", path, "-m", gate_folder / "machine.toml").out
-    assert detect(path).status == 0
+    told = cdtool("info", path, "-m", gate_folder / "machine.toml")
+    assert told.status == 3 and "loss: the last line" in told.out
+    done = detect(path)
+    assert done.status == 3 and "alarm" in done.out and "last line" in done.err
+
+
+def test_a_truncated_mcap_file_gives_what_lies_before_the_cut_and_status_3(detect, tmp_path):
+    arguments = ("simulate", "gate", "--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 5)
+    assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
+    whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
+    path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])
+    done = detect(path)
+    assert done.status == 3
+    assert "alarm" in done.out and "damaged at byte" in done.err and "messages before it were read" in done.err
 
 
 def test_an_unknown_unit_in_the_machine_file_lists_the_known_ones(gate_folder, tmp_path):

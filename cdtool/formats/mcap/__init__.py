@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -64,7 +64,8 @@ class Mcap:
             decoded = decode_topic(topic)
             topic.messages = []
             if decoded.failed:
-                findings.append(_failure(topic, decoded))
+                # A topic that nobody has asked for is no loss.
+                findings.append(replace(_failure(topic, decoded), severity="warning"))
             for item in survey_columns(topic, decoded, log.origin):
                 if isinstance(item, Finding):
                     findings.append(item)
@@ -104,7 +105,9 @@ def _decoded(path: Path, topic: Topic, findings: list[Finding]) -> Decoded:
 
 
 def _failure(topic: Topic, decoded: Decoded) -> Finding:
-    return Finding(f"{decoded.failed} of {topic.count} messages cannot be decoded: {decoded.reason}", topic.name)
+    return Finding(
+        f"{decoded.failed} of {topic.count} messages cannot be decoded: {decoded.reason}", topic.name, "loss"
+    )
 
 
 def _header_finding(topic: Topic, decoded: Decoded) -> list[Finding]:

@@ -200,13 +200,17 @@ class _Reader:
                 "copy the file anew; `mcap recover` may find more",
             ) from fault
         self.log.findings.append(
-            Finding(f"damaged at byte {self.at} ({reason}): only the {self.log.count} messages before it were read")
+            Finding(
+                f"damaged at byte {self.at} ({reason}): only the {self.log.count} messages before it were read",
+                severity="loss",
+            )
         )
 
     def finished(self) -> Log:
         log = self.log
         if self.stated is not None and self.stated != log.count:
-            log.findings.append(Finding(f"the file's summary says {self.stated} messages, {log.count} were read"))
+            text = f"the file's summary says {self.stated} messages, {log.count} were read"
+            log.findings.append(Finding(text, severity="loss"))
         if self.unverified:
             log.findings.append(
                 Finding(f"{self.unverified} of {log.count} messages carry no checksum: unverified", severity="note")
