@@ -15,6 +15,7 @@ from cdtool.errors import CdtoolError, ExitStatus, UsageError
 from cdtool.evaluation.results import Skipped
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.matching import Matching
     from cdtool.pipeline import Detection
     from cdtool.workflows.detection import Detected
 
@@ -90,9 +91,12 @@ def detect(
         raise typer.Exit(ExitStatus.UNUSABLE)
     print_skipped(skipped)
     if as_json:
-        print_json([_as_json(log, detection, found) for log, found in done for detection in found.detections])
+        pairs = (
+            (log, found, *pair) for log, found in done for pair in zip(found.detections, found.matchings, strict=True)
+        )
+        print_json([_as_json(*item) for item in pairs])
     else:
-        _show([(detection, found) for _, found in done for detection in found.detections])
+        _show([pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)])
     if not as_json:
         _show_not_judged([detection for _, found in done for detection in found.detections])
     for log, _ in done:
@@ -123,37 +127,31 @@ def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
     return {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
 
 
-def _show(rows: list[tuple[Detection, Detected]]) -> None:
-    from cdtool.evaluation.matching import match
-
-    cells = []
-    for detection, found in rows:
-        inside = [c for c in found.contacts if _inside(detection, c.start)]
-        matching = match(detection.verdict, inside, detection.statistic)
-        latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
-        events = sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint))
-        joints = detection.operation.recording.joints
-        if not events:
-            why = detection.verdict.reason
-            cells.append((detection.operation.name, detection.verdict.outcome, "-", "-", "-", "-", "-", why))
-        for alarm in events:
-            late = 1e3 * latency[alarm] if alarm in latency else None
-            cells.append(
-                (
-                    detection.operation.name,
-                    "alarm",
-                    f"{alarm.time:.3f}",
-                    joints[alarm.joint],
-                    number(alarm.statistic, 4),
-                    number(alarm.limit, 4),
-                    number(late, 3),
-                    "",
-                )
-            )
+def _show(rows: list[tuple[Detection, Matching]]) -> None:
+    """A row for each alarm, for each contact without one, and for each operation without either."""
+    cells = [cell for detection, matching in rows for cell in _rows_of(detection, matching)]
     unit = rows[0][0].statistic.unit
     columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     table(columns, cells, title=rows[0][0].detector)
+
+
+def _rows_of(detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+    name, joints = detection.operation.name, detection.operation.recording.joints
+    latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
+    rows: list[tuple[object, ...]] = []
+    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
+        late = number(1e3 * latency[alarm], 3) if alarm in latency else "-"
+        figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
+        rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, ""))
+    for item in matching.matches:
+        if not item.alarm:
+            outcome = item.outcome.replace("_", " ")
+            why = f"contact at {item.contact.start:.3f} s{': ' + item.reason if item.reason else ''}"
+            rows.append((name, outcome, "-", "-", "-", "-", "-", why))
+    if not rows:
+        rows.append((name, detection.verdict.outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
+    return rows
 
 
 def _show_not_judged(detections: list[Detection]) -> None:
@@ -171,7 +169,7 @@ def _show_not_judged(detections: list[Detection]) -> None:
         typer.echo(f"not judged: and {len(shown) - _SHOWN} operations more (--json has all)")
 
 
-def _as_json(log: Path, detection: Detection, found: Detected) -> dict[str, Any]:
+def _as_json(log: Path, found: Detected, detection: Detection, matching: Matching) -> dict[str, Any]:
     joints = detection.operation.recording.joints
     return {
         "log": str(log),
@@ -191,16 +189,17 @@ def _as_json(log: Path, detection: Detection, found: Detected) -> dict[str, Any]
             for alarm in detection.verdict.alarms
         ],
         "contacts": [
-            {"onset_s": contact.start, "onset_uncertainty_s": contact.uncertainty, "peak_force_n": contact.peak_force}
-            for contact in found.contacts
-            if _inside(detection, contact.start)
+            {
+                "onset_s": item.contact.start,
+                "onset_uncertainty_s": item.contact.uncertainty,
+                "peak_force_n": item.contact.peak_force,
+                "outcome": item.outcome,
+                "alarm_s": item.alarm.time if item.alarm else None,
+                "latency_ms": 1e3 * item.latency,
+            }
+            for item in matching.matches
         ],
         "not_judged": detection.statistic.shares(),
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
         "findings": [str(item) for item in found.recording.findings],
     }
-
-
-def _inside(detection: Detection, time: float) -> bool:
-    recording = detection.operation.recording
-    return recording.start <= time <= recording.end

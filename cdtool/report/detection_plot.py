@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.detection import Alarm
-from cdtool.evaluation.matching import Match, Matching, match
+from cdtool.evaluation.matching import Match
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact
 from cdtool.report.figures import drawing, label, new_figure, save, unit_label
@@ -53,22 +53,21 @@ class _Event:
         return self.alarm.time if self.alarm else 0.0
 
 
-def plot_detected(found: Detected, path: Path, matchings: Sequence[Matching] | None = None) -> None:
+def plot_detected(found: Detected, path: Path) -> None:
     """Draw one log: a panel a joint that alarms (else the leading joint), trigger, load cell, and a zoom on the event.
 
-    `matchings`, one a detection, are made here where they are not given. Raises UsageError, CdtoolError (see `save`).
+    Raises UsageError, CdtoolError (see `save`).
     """
-    made = matchings if matchings is not None else [_matching(item, found.contacts) for item in found.detections]
     with drawing():
-        figure = _figure(found, made)
+        figure = _figure(found)
         save(figure, path)
 
 
-def _figure(found: Detected, matchings: Sequence[Matching]) -> Figure:
+def _figure(found: Detected) -> Figure:
     alarming, joints = _shown_joints(found)
     recording = found.recording
     whole = (recording.start, recording.end)
-    matches = [item for matching in matchings for item in matching.matches]
+    matches = [item for matching in found.matchings for item in matching.matches]
     event = _event(matches, [alarm for item in found.detections for alarm in item.verdict.alarms])
     zoom = _zoom(event, whole)
     spans = [whole] if zoom is None else [whole, zoom]
@@ -97,7 +96,7 @@ def _figure(found: Detected, matchings: Sequence[Matching]) -> Figure:
         late = next(item.latency for item in matches if item.alarm is event.alarm)
         _write_latency(grid[len(joints), -1], event, late)
     figure.suptitle(
-        f"{label(recording.name, 60)}  ·  {label(detector)}\n{outcome_words(found, matchings, alarming, joints)}",
+        f"{label(recording.name, 60)}  ·  {label(detector)}\n{outcome_words(found, alarming, joints)}",
         fontsize=10,
         x=0.01,
         ha="left",
@@ -190,12 +189,6 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
         fontsize=9,
         fontweight="bold",
     )
-
-
-def _matching(detection: Detection, contacts: Sequence[Contact]) -> Matching:
-    part = detection.operation.recording
-    inside = [contact for contact in contacts if part.start <= contact.start <= part.end]
-    return match(detection.verdict, inside, detection.statistic)
 
 
 def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from cdtool.evaluation.matching import Matching
 from cdtool.report.figures import label
 from cdtool.workflows.detection import Detected
 
 
-def outcome_words(found: Detected, matchings: Sequence[Matching], alarming: list[int], joints: list[int]) -> str:
+def outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> str:
     """What became of the contacts, which alarms belong to none, what could not be judged, which joints are drawn."""
-    matches = [item for matching in matchings for item in matching.matches]
+    matches = [item for matching in found.matchings for item in matching.matches]
     late = [1e3 * item.latency for item in matches if item.outcome == "detected"]
     words = []
     if len(matches) == 1:
@@ -19,7 +16,7 @@ def outcome_words(found: Detected, matchings: Sequence[Matching], alarming: list
     elif matches:
         spread = f" after {min(late):.0f} to {max(late):.0f} ms" if late else ""
         words.append(f"{len(late)} of {len(matches)} contacts detected{spread}")
-    extra = sum(len(matching.false_alarms) for matching in matchings)
+    extra = sum(len(matching.false_alarms) for matching in found.matchings)
     alarms = sum(len(item.verdict.alarms) for item in found.detections)
     if matches and extra:
         words.append(f"{extra} false {'alarm' if extra == 1 else 'alarms'}")

@@ -96,7 +96,7 @@ def _write_trace(trace: Trace, folder: Path, group: str) -> list[Image]:
     detectors: set[str] = set()
     for detection, matching in zip(trace.detections, trace.matchings, strict=True):
         name = f"detection_{group}_{slug(detection.detector, detectors)}.png"
-        plot_detected(Detected(recording, (detection,), trace.contacts), folder / name, (matching,))
+        plot_detected(Detected(recording, (detection,), trace.contacts, (matching,)), folder / name)
         images.append(Image(name, f"{trace.operation.name}: {detection.detector}", trace.group))
     return images
 

@@ -8,8 +8,10 @@ from pathlib import Path
 
 from cdtool.activation import Activation
 from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.matching import Matching, match
 from cdtool.evaluation.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import Contact, Recording
 from cdtool.signature_store import read_signature
@@ -20,11 +22,15 @@ from cdtool.workflows.runs import load_operations
 
 @dataclass(frozen=True)
 class Detected:
-    """A log, what the detector says of each of its operations, and the contacts where the log has ground truth."""
+    """A log, what the detector says of each of its operations, and the contacts where the log has ground truth.
+
+    `matchings` hold each operation's alarms against its contacts, in the order of `detections`.
+    """
 
     recording: Recording
     detections: tuple[Detection, ...]
     contacts: tuple[Contact, ...]
+    matchings: tuple[Matching, ...]
 
 
 def detect(
@@ -37,6 +43,7 @@ def detect(
     operations: str = "whole",
     debounce: int | None = None,
     onset: OnsetRule | None = None,
+    window: float = 1.0,
 ) -> Detected:
     """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
 
@@ -61,7 +68,17 @@ def detect(
     activation = Activation(debounce)
     recording, parts = load_operations(Path(log), machine_file, operations)
     detections = tuple(detect_operation(part, machine_file.machine, instance, thresholds, activation) for part in parts)
-    return Detected(recording, detections, _contacts(recording, onset or OnsetRule()))
+    contacts = _contacts(recording, onset or OnsetRule())
+    matchings = tuple(
+        match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window) for item in detections
+    )
+    return Detected(recording, detections, contacts, matchings)
+
+
+def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+    """The contacts whose onset lies in an operation."""
+    part = operation.recording
+    return tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
 
 
 def _contacts(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]:

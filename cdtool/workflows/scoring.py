@@ -22,6 +22,7 @@ from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import Contact
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.detection import contacts_of
 from cdtool.workflows.runs import load_operations, lost, shown_path, told
 
 
@@ -104,12 +105,11 @@ def score_log(
     scored.findings = told(recording)
     scored.skipped += lost(recording)
     for contact in contacts:
-        if not any(item.recording.start <= contact.start <= item.recording.end for item in operations):
+        if not any(contacts_of(item, [contact]) for item in operations):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {setup.operations})"
             scored.skipped.append(Skipped(recording.name, text))
     for operation in operations:
-        part = operation.recording
-        inside = tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
+        inside = contacts_of(operation, contacts)
         detections, matchings = [], []
         for detector in detectors:
             try:

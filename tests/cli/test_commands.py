@@ -128,6 +128,9 @@ def test_detecting_with_a_hand_set_limit(gate_folder):
     done = cdtool("detect", log, *machine, "-d", "gm", "--limit", "250", "--json")
     (values,) = json.loads(done.out)
     assert values["alarms"][0]["limit"] == 250.0
+    assert values["contacts"][0]["outcome"] == "detected" and values["contacts"][0]["latency_ms"] > 20.0
+    high = cdtool("detect", log, *machine, "-d", "gm", "--limit", "1e6")
+    assert high.status == 0 and "missed" in high.out and "contact at" in high.out
     for wrong in (("--limit", "250"), ("-d", "gm"), ("-d", "gm", "--limit", "many"), ("-d", "gmm", "--limit", "3")):
         assert cdtool("detect", log, *machine, *wrong).status == 2
 

@@ -32,7 +32,9 @@ class Bench:
     detect: Callable[[Recording, str], Detection]
 
     def detected(self, recording: Recording, name: str) -> Detected:
-        return Detected(recording, (self.detect(recording, name),), tuple(find_contacts(recording, RULE)))
+        detection, contacts = self.detect(recording, name), tuple(find_contacts(recording, RULE))
+        matching = match(detection.verdict, contacts, detection.statistic)
+        return Detected(recording, (detection,), contacts, (matching,))
 
     def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
         detections = tuple(self.detect(recording, name) for name in names)

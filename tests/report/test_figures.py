@@ -13,8 +13,7 @@ import pytest
 from cdtool.activation import Activation
 from cdtool.detection import Signal, Status, Verdict
 from cdtool.errors import CdtoolError, UsageError
-from cdtool.evaluation.matching import match
-from cdtool.evaluation.onset import find_contacts
+from cdtool.evaluation.matching import Matching, match
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection
 from cdtool.recording import Recording, Series
@@ -26,7 +25,7 @@ from cdtool.report.style import look_of
 from cdtool.report.trigger_plot import plot_triggers
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.detection import Detected
-from tests.report.conftest import NAMES, RULE, Bench, contact
+from tests.report.conftest import NAMES, Bench, contact
 from tests.report.hostile import HOSTILE
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -61,7 +60,12 @@ def six_joints() -> Detected:
     alarms, _ = Activation().alarms(statistic, band)
     assert {alarm.joint for alarm in alarms} == {1, 3}
     operation = operations_of(recording)[0]
-    return Detected(recording, (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),), ())
+    return Detected(
+        recording,
+        (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),),
+        (),
+        (Matching((), alarms),),
+    )
 
 
 def test_a_detection_names_latency_alarm_onset_and_what_was_not_assessable(bench: Bench, simulated, tmp_path):
@@ -93,11 +97,17 @@ def test_a_run_without_alarm_has_neither_zoom_nor_latency(bench: Bench, simulate
     assert "[ms]" not in shown
 
 
+def judged_anew(found: Detected, detection: Detection) -> Detected:
+    """The same log with another detection, matched with its contacts."""
+    matching = match(detection.verdict, found.contacts, detection.statistic)
+    return replace(found, detections=(detection,), matchings=(matching,))
+
+
 def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simulated, tmp_path):
     found = bench.detected(simulated("stiff", 1), "momentum")
     detection = found.detections[0]
     silent = replace(detection, verdict=Verdict("no alarm"))
-    plot_detected(replace(found, detections=(silent,)), tmp_path / "missed.svg")
+    plot_detected(judged_anew(found, silent), tmp_path / "missed.svg")
     assert "missed" in joined(tmp_path / "missed.svg")
     assert "not assessable: missing samples" not in joined(tmp_path / "missed.svg")
     status = np.full_like(detection.statistic.status, Status.GAP)
@@ -106,7 +116,7 @@ def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simu
         statistic=replace(detection.statistic, status=status),
         verdict=Verdict("not assessable", reason="missing samples 100 %"),
     )
-    plot_detected(replace(found, detections=(blind,)), tmp_path / "blind.svg")
+    plot_detected(judged_anew(found, blind), tmp_path / "blind.svg")
     shown = joined(tmp_path / "blind.svg")
     assert "not assessable: missing samples 100 %" in shown
     assert "missed" not in shown
@@ -230,10 +240,9 @@ def test_no_text_of_any_figure_is_read_as_mathematics(bench: Bench, simulated, r
 
     recording = simulated("stiff", 1)
     found = bench.detected(recording, "momentum")
-    matching = match(found.detections[0].verdict, find_contacts(recording, RULE), found.detections[0].statistic)
     with drawing():
         figures = [
-            detection_plot._figure(found, (matching,)),
+            detection_plot._figure(found),
             trigger_plot._figure(bench.trace(recording, "stiff")),
             latency_plot._figure(results),
         ]
@@ -250,8 +259,8 @@ def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, res
     six = replace(six_joints, recording=replace(six_joints.recording, name="n" * 300))
     with drawing():
         figures = [
-            detection_plot._figure(found, [detection_plot._matching(found.detections[0], found.contacts)]),
-            detection_plot._figure(six, [detection_plot._matching(six.detections[0], ())]),
+            detection_plot._figure(found),
+            detection_plot._figure(six),
             trigger_plot._figure(bench.trace(recording, "g" * 300)),
             latency_plot._figure(results),
         ]
