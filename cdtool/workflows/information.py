@@ -15,6 +15,7 @@ from cdtool.motion import motion_class
 from cdtool.operations import operations_of
 from cdtool.recording import Finding, FloatArray, Recording, Series
 from cdtool.workflows.accelerometer_check import accelerometer_findings
+from cdtool.workflows.clock_guess import guess_clock
 from cdtool.workflows.runs import read_log
 
 
@@ -50,10 +51,19 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
     source = survey(Path(log))
     if machine is None:
+        clock = guess_clock(source)
+        table_time = clock.time if clock else None
         channels = [
-            _describe(name, column.unit or "", column.values, column.time) for name, column in source.columns.items()
+            _describe(name, column.unit or "", column.values, column.time if column.time is not None else table_time)
+            for name, column in source.columns.items()
         ]
-        return Info(str(log), source.format, source.details, tuple(channels), source.findings)
+        findings = [*source.findings, *(clock.findings if clock else ())]
+        findings += [
+            Finding(f"{channel.missing} of {channel.samples} values are missing (NaN)", channel.name)
+            for channel in channels
+            if channel.missing
+        ]
+        return Info(str(log), source.format, source.details, tuple(channels), tuple(findings))
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     recording = read_log(log, machine_file)
     channels = [

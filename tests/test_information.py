@@ -1,0 +1,65 @@
+"""What `cdtool info` finds without a machine file: the clock, gaps, missing values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from tests.data_folder import data, needs_data
+
+
+def write(path: Path, header: str, columns: list[np.ndarray]) -> Path:
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "unit"),
+    [("t,v", 1.0, "s"), ("Time,v", 1e3, "ms"), ("stamp,v", 1e6, "us"), ("time [ms],v", 1e3, "ms"), ("a,v", 1e9, "ns")],
+)
+def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_said(tmp_path, header, factor, unit):
+    time = np.arange(2000) * 1e-3
+    info = cdtool.info(write(tmp_path / "a.csv", header, [time * factor, np.sin(time)]))
+    assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 2)
+    assert info.channels[1].duration_s == pytest.approx(1.999)
+    assert any(f"taken to be the clock, in {unit}" in item.message for item in info.findings)
+
+
+def test_gaps_backward_time_and_missing_values_are_all_told_at_once(tmp_path):
+    time = np.arange(2000) * 1e-3
+    time[1000:] += 0.4
+    time[500] = 0.1
+    values = np.sin(time)
+    values[[7, 8]] = np.nan
+    info = cdtool.info(write(tmp_path / "a.csv", "t,v", [time, values]))
+    told = " ".join(map(str, info.findings))
+    for words in ("1 time stamps run backward (line 502)", "gaps after 0.999 s (401 ms)", "v: 2 of 2000 values"):
+        assert words in told
+
+
+def test_without_a_clock_no_rate_is_made_up(tmp_path):
+    rng = np.random.default_rng(1)
+    info = cdtool.info(write(tmp_path / "a.csv", "a,b", [rng.normal(size=50), rng.normal(size=50)]))
+    assert [channel.rate_hz for channel in info.channels] == [None, None]
+
+
+def test_a_counter_named_time_does_not_hide_the_clock(tmp_path):
+    time = np.arange(100) * 0.04
+    info = cdtool.info(write(tmp_path / "a.csv", "time,timestamp,v", [np.arange(100.0), time + 5.0, np.sin(time)]))
+    assert info.channels[2].rate_hz == pytest.approx(25.0)
+
+
+@needs_data("ur3e/L0L1.csv")
+def test_the_real_clock_of_a_wide_robot_log_is_found():
+    info = cdtool.info(data("ur3e/L0L1.csv"))
+    assert info.channels[0].rate_hz == pytest.approx(25.0, rel=0.05)
+
+
+@needs_data("ur10e/no_torque.csv")
+def test_a_log_without_a_header_has_a_clock_too():
+    info = cdtool.info(data("ur10e/no_torque.csv"))
+    assert info.channels[3].rate_hz == pytest.approx(100.0)
+    assert info.channels[3].duration_s == pytest.approx(5.664)
