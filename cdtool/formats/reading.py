@@ -37,10 +37,13 @@ _KNOWN_CONTENTS = {
 def choose_format(path: Path) -> Format:
     """The format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
     head = _head(path)
-    formats: list[Format] = [
-        FORMATS.load(name)() for name in FORMATS.names(plugins=path.suffix.lower() not in _suffixes())
-    ]
-    by_suffix = [item for item in formats if path.suffix.lower() in item.suffixes]
+    suffix = path.suffix.lower()
+    for name in FORMATS.names():  # one by one: mostly the first fits, and the others need not be loaded
+        likely: Format = FORMATS.load(name)()
+        if suffix in likely.suffixes and likely.sniff(path):
+            return likely
+    formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+    by_suffix = [item for item in formats if suffix in item.suffixes]
     # Almost any text can pass for a table: one that claims to be of another format must hold numbers.
     claimed = by_suffix and all(item.name != "csv" for item in by_suffix)
     for item in [*by_suffix, *formats]:
