@@ -73,5 +73,11 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
         sys.exit(ExitStatus.OK)
+    except OSError as fault:
+        from cdtool.cli.console import print_error
+
+        where = f"{fault.filename}: " if fault.filename else ""
+        print_error(CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space"))
+        sys.exit(ExitStatus.UNUSABLE)
     except KeyboardInterrupt:
         sys.exit(130)

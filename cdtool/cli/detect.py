@@ -11,7 +11,7 @@ import typer
 
 from cdtool.cli.console import leave, number, plain, print_error, print_json, print_skipped, progress, table
 from cdtool.cli.options import DebounceOption, JsonOption, MachineOption, OperationsOption
-from cdtool.errors import CdtoolError, ExitStatus, UsageError
+from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ def detect(
 
                     plot_detected(found, plot_names[log])
             except CdtoolError as fault:
-                if len(logs) == 1:
+                # What is wrong with the call or the signature is wrong for every log.
+                if len(logs) == 1 or isinstance(fault, UsageError | SignatureError):
                     raise
                 skipped.append(Skipped(str(log), str(fault)))
             if advance:
@@ -97,11 +98,10 @@ def detect(
         print_json([_as_json(*item) for item in pairs])
     else:
         _show([pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)])
-    if not as_json:
         _show_not_judged([detection for _, found in done for detection in found.detections])
-    for log, _ in done:
-        if log in plot_names and not as_json:
-            typer.echo(f"plot written to {plain(plot_names[log])}")
+        for log, _ in done:
+            if log in plot_names:
+                typer.echo(f"plot written to {plain(plot_names[log])}")
     leave(skipped)
 
 

@@ -134,3 +134,19 @@ def test_names_from_files_cannot_command_the_terminal(detect, tmp_path):
     done = detect(evil)
     assert done.status == 2
     assert "\x1b" not in done.err and "\u202e" not in done.err
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, gate_folder, feekf_signature):
+    blocked = written(tmp_path / "file", "in the way")
+    done = cdtool("simulate", "gate", "--free", 1, "-o", blocked / "gate")
+    assert done.status == 2 and done.err.count("\n") == 1 and "file" in done.err
+    logs = sorted((gate_folder / "stiff").glob("*.csv"))
+    arguments = ("-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    done = cdtool("detect", *logs, *arguments, "--plot", blocked / "plots")
+    assert done.status == 2 and done.err.count("\n") == 1 and "file" in done.err
+
+
+def test_a_wrong_signature_is_told_once_however_many_logs_there_are(tmp_path, gate_folder):
+    logs = sorted((gate_folder / "stiff").glob("*.csv"))
+    done = cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", tmp_path / "none.json")
+    assert done.status == 2 and done.err.count("\n") == 1 and "no such file" in done.err
