@@ -123,7 +123,9 @@ def _update(
         reasons = [{"recording": item.recording, "reason": item.reason} for item in refused]
         print_json({"file": str(file), "added": list(added), "refused": reasons})
     else:
-        typer.echo(f"{len(added)} runs added to {plain(file)}, {len(refused)} refused; {len(signature.runs)} in all")
+        many = "run" if len(added) == 1 else "runs"
+        counts = f"{len(refused)} refused; {len(signature.runs)} in all"
+        typer.echo(f"{len(added)} {many} added to {plain(file)}, {counts}")
     if not added:
         raise typer.Exit(ExitStatus.UNUSABLE)
     leave(refused)

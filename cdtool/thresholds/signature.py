@@ -216,8 +216,8 @@ class Signature:
     def _check_number(self, runs: int) -> None:
         if runs < 2 or (runs < ENOUGH_RUNS and not self.force):
             raise SignatureError(
-                f"{runs} impact-free runs of one class: {ENOUGH_RUNS - runs} more are needed (at least {ENOUGH_RUNS})",
-                "add runs, or --force to learn from fewer (never from fewer than 2)",
+                f"{runs} impact-free {'run' if runs == 1 else 'runs'} of one class: {ENOUGH_RUNS - runs} more are needed",
+                f"add runs to have {ENOUGH_RUNS}, or --force to learn from fewer, but never from fewer than 2",
             )
 
     def _common_class(self, recordings: Sequence[Recording]) -> MotionClass:

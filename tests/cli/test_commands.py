@@ -161,7 +161,7 @@ def test_updating_adds_free_runs_and_refuses_impacts_and_repeats(gate_folder, fe
     machine = ("-m", gate_folder / "machine.toml")
     logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
     done = cdtool("learn-signature", *logs, *machine, "--update", signature)
-    assert done.status == 3 and "1 runs added" in done.out
+    assert done.status == 3 and "1 run added" in done.out
     assert "not an impact-free run" in done.err and "in the signature already" in done.err
     before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
     assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
