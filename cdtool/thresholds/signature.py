@@ -215,8 +215,9 @@ class Signature:
 
     def _check_number(self, runs: int) -> None:
         if runs < 2 or (runs < ENOUGH_RUNS and not self.force):
+            many = "run" if runs == 1 else "runs"
             raise SignatureError(
-                f"{runs} impact-free {'run' if runs == 1 else 'runs'} of one class: {ENOUGH_RUNS - runs} more are needed",
+                f"{runs} impact-free {many} of one class: {ENOUGH_RUNS - runs} more are needed",
                 f"add runs to have {ENOUGH_RUNS}, or --force to learn from fewer, but never from fewer than 2",
             )
 
