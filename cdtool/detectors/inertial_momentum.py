@@ -17,7 +17,7 @@ from cdtool.detectors.base import (
     require_channels,
     require_positive,
 )
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
@@ -87,17 +87,15 @@ class InertialMomentum:
         k1, k2 = 2.0 * self.damping * self.crossover, self.crossover**2
         fused = np.empty(len(time))
         arrays = (np.ascontiguousarray(item) for item in (speed, acceleration, missing))
-        observed = _fuse(time, *arrays, k1, k2, standstill_speed, _STANDSTILL_WINDOW, fused)
-        if observed >= _STANDSTILL_AT_LEAST or len(time) == 0:
-            return fused, -np.inf
-        slowest = float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
-        return fused, float(time[0]) + 3.0 / slowest
+        settle = 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
+        rest = (standstill_speed, _STANDSTILL_WINDOW, _STANDSTILL_AT_LEAST)
+        return fused, float(_fuse(time, *arrays, k1, k2, settle, *rest, fused))
 
 
 @kernel(
-    "float64(Array(float64, 1, 'C', readonly=True), Array(float64, 1, 'C', readonly=True), "
-    "Array(float64, 1, 'C', readonly=True), Array(b1, 1, 'C', readonly=True), "
-    "float64, float64, float64, float64, float64[::1])"
+    f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
+    "Array(b1, 1, 'C', readonly=True), "
+    "float64, float64, float64, float64, float64, float64, float64[::1])"
 )
 def _fuse(
     time: FloatArray,
@@ -106,11 +104,13 @@ def _fuse(
     missing: BoolArray,
     k1: float,
     k2: float,
+    settle: float,
     standstill_speed: float,
     window: float,
+    at_least: float,
     fused: FloatArray,
 ) -> float:
-    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns the standstill seen at the start [s]."""
+    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns when it may be trusted [s]."""
     w = 0.0
     z = 0.0
     started = False
@@ -118,7 +118,7 @@ def _fuse(
     begin = 0.0
     total = 0.0
     count = 0
-    observed = 0.0
+    trusted = np.inf
     last = 0
     for k in range(len(time)):
         fused[k] = w
@@ -127,6 +127,7 @@ def _fuse(
         if not started:
             started = True
             begin = time[k]
+            trusted = begin + settle
             w = speed[k]
             last = k
         if resting:
@@ -134,7 +135,8 @@ def _fuse(
             if resting:
                 total += acceleration[k]
                 count += 1
-                observed = time[k] - begin
+                if time[k] - begin >= at_least:
+                    trusted = min(trusted, time[k])  # from here on the bias is known, and not before
                 w = speed[k]
                 z = -total / count
                 fused[k] = w
@@ -149,4 +151,4 @@ def _fuse(
         z = scale * ((1.0 + k1 * half) * right_z - k2 * half * right_w)
         fused[k] = w
         last = k
-    return observed
+    return trusted
