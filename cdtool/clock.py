@@ -15,6 +15,8 @@ from cdtool.recording import BoolArray, Finding, FloatArray, Series
 
 # A held value older than this many of its own periods is missing, not valid.
 HOLD_PERIODS = 5.0
+# Its period is the median of this many steps before it: the rate so far, whatever comes later.
+_RECENT_STEPS = 9
 # A pause of more than this many periods between samples is a gap.
 GAP_PERIODS = 2.5
 # Above this share of repeated stamps the clock is coarse, not faulty.
@@ -117,8 +119,18 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     at = np.searchsorted(series.time, clock, side="right") - 1
     held = series.values[np.maximum(at, 0)]
     age = clock - series.time[np.maximum(at, 0)]
-    oldest = HOLD_PERIODS * series.period if len(series) > 1 else np.inf
+    oldest = HOLD_PERIODS * _recent_period(series.time)[np.maximum(at, 0)]
     return np.where(((at < 0) | (age > oldest))[:, np.newaxis], np.nan, held)
+
+
+def _recent_period(time: FloatArray) -> FloatArray:
+    """At each sample the median of its last steps [s]; infinite at the first, which has none."""
+    period = np.full(len(time), np.inf)
+    if len(time) > 1:
+        steps = np.diff(time)
+        before = np.concatenate((np.full(_RECENT_STEPS - 1, steps[0]), steps))
+        period[1:] = np.median(np.lib.stride_tricks.sliding_window_view(before, _RECENT_STEPS), axis=1)
+    return period
 
 
 def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:

@@ -99,3 +99,21 @@ def test_gaps_jitter_and_missing_values_are_told():
     told = " ".join(str(item) for item in gap_findings(series(time, values), "speed"))
     assert "1 gaps after 0.099 s (101 ms)" in told
     assert "1 of 200 values are missing" in told
+
+
+def test_how_long_a_value_is_held_depends_on_the_rate_so_far_and_not_on_a_later_one():
+    """A log that starts slowly and goes on fast: its slow samples are not stale because of what comes later."""
+    slow, fast = np.arange(20) * 0.01, 0.2 + np.arange(2000) * 1e-3
+    time = np.concatenate((slow, fast))
+    values = np.arange(len(time), dtype=float)
+    clock = np.arange(0.0, 0.19, 1e-3)
+    whole = previous_value(series(time, values), clock)
+    part = previous_value(series(slow, values[:20]), clock)
+    np.testing.assert_array_equal(whole, part)
+    assert np.isfinite(whole).all()
+
+
+def test_after_a_pause_the_held_value_expires_again_by_the_recent_rate():
+    time = np.concatenate((np.arange(100) * 1e-3, 5.0 + np.arange(100) * 1e-3))
+    held = previous_value(series(time, np.arange(200.0)), np.array([0.1, 0.2, 5.05, 5.2]))
+    np.testing.assert_array_equal(np.isfinite(held[:, 0]), [True, False, True, False])
