@@ -95,14 +95,19 @@ def test_a_bad_run_is_left_out_by_name_and_the_status_is_3(gate_folder, tmp_path
     assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
 
 
-def test_a_stray_run_of_another_speed_is_left_out_and_the_others_are_learned(gate_folder, tmp_path):
+def write_at_half_speed(gate_folder: Path, path: Path) -> None:
+    """The first free run with measured and reference speed halved."""
     lines = (gate_folder / "free" / "01.csv").read_text().splitlines()
     slow = [lines[0]]
     for line in lines[1:]:
         cells = line.split(",")
         cells[2], cells[6] = f"{float(cells[2]) / 2:.3f}", f"{float(cells[6]) / 2:.3f}"
         slow.append(",".join(cells))
-    (tmp_path / "slow.csv").write_text("\n".join(slow) + "\n")
+    path.write_text("\n".join(slow) + "\n")
+
+
+def test_a_stray_run_of_another_speed_is_left_out_and_the_others_are_learned(gate_folder, tmp_path):
+    write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     logs = sorted((gate_folder / "free").glob("*.csv"))
     machine = ("-m", gate_folder / "machine.toml")
     done = cdtool("learn-signature", *logs, tmp_path / "slow.csv", *machine, "-d", "gm", "-o", tmp_path / "s.json")
@@ -144,13 +149,7 @@ def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp
 
 
 def test_a_log_of_another_speed_is_not_assessable_not_silent(gate_folder, feekf_signature, tmp_path):
-    lines = (gate_folder / "free" / "01.csv").read_text().splitlines()
-    slow = [lines[0]]
-    for line in lines[1:]:
-        cells = line.split(",")
-        cells[2], cells[6] = f"{float(cells[2]) / 2:.3f}", f"{float(cells[6]) / 2:.3f}"
-        slow.append(",".join(cells))
-    (tmp_path / "slow.csv").write_text("\n".join(slow) + "\n")
+    write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
     assert done.status == 0 and "not assessable" in done.out and "no signature for its class" in done.out
 
