@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import BoolArray, FloatArray
 
 StatusArray = npt.NDArray[np.uint8]
+
+# The one column of a signal that belongs to no single joint (an energy, say).
+WHOLE_MACHINE = ("whole machine",)
 
 
 class Status(IntEnum):
@@ -38,7 +42,8 @@ class Signal:
     """Collision detection signal: `time` (n,) s, `values` and `status` (n, J), `unit`.
 
     `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive
-    always opposes the motion.
+    always opposes the motion. `joints` names the columns: the machine's joints, those of them that are watched, or one
+    name for a signal of the whole machine. A detector may leave it empty: then they are the recording's joints.
     """
 
     time: FloatArray
@@ -46,12 +51,31 @@ class Signal:
     status: StatusArray
     unit: str
     signed: bool = True
+    joints: tuple[str, ...] = ()
 
     @property
     def valid(self) -> BoolArray:
         """(n, J), True where the value may be judged."""
         valid: BoolArray = self.status == Status.VALID
         return valid
+
+    def watching(self, joints: Sequence[str]) -> Signal:
+        """Only the columns of these joints, in their order here; all of them where none is named.
+
+        A signal of the whole machine stays as it is. Raises ConfigurationError for an unknown joint.
+        """
+        if not joints or self.joints == WHOLE_MACHINE:
+            return self
+        for joint in joints:
+            if joint not in self.joints:
+                raise ConfigurationError(f"unknown joint '{joint}'", nearest(joint, self.joints))
+        columns = [i for i, joint in enumerate(self.joints) if joint in joints]
+        return replace(
+            self,
+            values=np.ascontiguousarray(self.values[:, columns]),
+            status=np.ascontiguousarray(self.status[:, columns]),
+            joints=tuple(self.joints[i] for i in columns),
+        )
 
     def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
         """Share of the samples for each reason not to judge, over all joints, from `start` to `end` [s]."""
@@ -75,7 +99,10 @@ class Band:
 
 @dataclass(frozen=True)
 class Alarm:
-    """The statistic left its band: time [s] of the sample whose processing raised the alarm, debounce included."""
+    """The statistic left its band: time [s] of the sample whose processing raised the alarm, debounce included.
+
+    `joint` is the column of the signal; the signal's `joints` have its name.
+    """
 
     time: float
     joint: int

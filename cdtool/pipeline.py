@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,13 @@ class Detection:
     verdict: Verdict
 
     @property
+    def leading(self) -> int:
+        """The statistic's column of the joint that leads the motion; the first where that one is not watched."""
+        recording = self.operation.recording
+        name = recording.joints[self.operation.motion.joint]
+        return self.statistic.joints.index(name) if name in self.statistic.joints else 0
+
+    @property
     def assessed_seconds(self) -> float:
         """For how long the operation was watched [s]: the time of the valid samples of its best-watched joint."""
         if len(self.statistic.time) < 2:
@@ -49,7 +56,7 @@ class Detection:
     def not_judged(self) -> list[Stretch]:
         """The stretches in which the leading joint's signal could not be judged, in order of time."""
         joint = self.operation.motion.joint
-        status, time = self.statistic.status[:, joint], self.statistic.time
+        status, time = self.statistic.status[:, self.leading], self.statistic.time
         edges = np.flatnonzero(np.diff(status)) + 1
         starts, ends = [0, *edges.tolist()], [*(edges - 1).tolist(), len(status) - 1]
         found = [(a, b) for a, b in zip(starts, ends, strict=True) if len(status) and status[a] != Status.VALID]
@@ -65,9 +72,13 @@ class Detection:
         ]
 
 
-def run_detector(operation: Operation, machine: Any, detector: Detector) -> Signal:
-    """The detector's signal of an operation; ground truth is taken away before it looks."""
-    return detector.signal(operation.recording.without_ground_truth(), machine)
+def run_detector(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str] = ()) -> Signal:
+    """The detector's signal of an operation, of the watched joints (none named: all of them).
+
+    Ground truth is taken away before it looks. Raises RecordingError, or ConfigurationError for an unknown joint.
+    """
+    signal = detector.signal(operation.recording.without_ground_truth(), machine)
+    return replace(signal, joints=signal.joints or operation.recording.joints).watching(watched)
 
 
 def detect_operation(
@@ -76,18 +87,19 @@ def detect_operation(
     detector: Detector,
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
+    watched: Sequence[str] = (),
 ) -> Detection:
-    """Run the detector and hold it against the threshold of the operation's class.
+    """Run the detector and hold it against the threshold of the operation's class, joint by watched joint.
 
     Of several signatures the one of the operation's direction and speed serves; where none does, the verdict is "not
     assessable". Raises RecordingError where the recording lacks a channel that the detector needs.
     """
-    signal = run_detector(operation, machine, detector)
+    signal = run_detector(operation, machine, detector, watched)
     threshold, refused = choose_threshold(operation, thresholds)
     if threshold is None:
         nothing = np.full(signal.values.shape, np.nan)
         status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
-        statistic = Signal(signal.time, signal.values, status, signal.unit, signal.signed)
+        statistic = replace(signal, status=status)
         verdict = Verdict("not assessable", reason=refused)
         return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
     statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)

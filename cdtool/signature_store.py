@@ -14,7 +14,7 @@ from cdtool.errors import SignatureError, UsageError
 from cdtool.machine_file import fingerprint
 from cdtool.thresholds.signature import FittedSignature
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _KIND = "cdtool signature"
 _LOCK_SECONDS = 60.0
 
@@ -40,12 +40,16 @@ class SignatureFile:
     detector: str
     gains: Mapping[str, float]
     unit: str
-    joints: tuple[str, ...]
     debounce: int | None
     current: tuple[FittedSignature, ...]
     first: tuple[FittedSignature, ...]
     runs: tuple[LearnedRun, ...]
     source: str = ""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that are watched: the columns of the signatures."""
+        return self.current[0].joints
 
     def check(self, machine: Any, detector: Any) -> None:
         """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
@@ -144,7 +148,6 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "machine": {"name": signature.machine, "fingerprint": signature.machine_fingerprint},
         "detector": {"name": signature.detector, "gains": dict(signature.gains)},
         "unit": signature.unit,
-        "joints": list(signature.joints),
         "debounce": signature.debounce,
         "runs": [asdict(run) for run in signature.runs],
         "current": [item.to_dict() for item in signature.current],
@@ -159,7 +162,6 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         detector=str(values["detector"]["name"]),
         gains={str(name): float(value) for name, value in values["detector"]["gains"].items()},
         unit=str(values["unit"]),
-        joints=tuple(values["joints"]),
         debounce=None if values["debounce"] is None else int(values["debounce"]),
         current=tuple(FittedSignature.from_dict(item) for item in values["current"]),
         first=tuple(FittedSignature.from_dict(item) for item in values["first"]),

@@ -31,7 +31,7 @@ def learned(gate, simulated) -> SignatureFile:
     )
     runs = tuple(LearnedRun(item.name, item.digest) for item in recordings)
     return SignatureFile(
-        "gate", fingerprint(gate), "momentum", {"bandwidth": 10.0}, "N", ("gate",), None, (fitted,), (fitted,), runs
+        "gate", fingerprint(gate), "momentum", {"bandwidth": 10.0}, "N", None, (fitted,), (fitted,), runs
     )
 
 
@@ -43,7 +43,7 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
-    assert values["schema_version"] == 1 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+    assert values["schema_version"] == 2 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
 
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
@@ -65,7 +65,7 @@ def test_another_machine_detector_or_gain_is_refused(learned, gate):
         ("[1, 2]", "not a signature file"),
         ('{"kind": "other"}', "not a signature file"),
         ('{"kind": "cdtool signature", "schema_version": 99}', "schema_version is 99"),
-        ('{"kind": "cdtool signature", "schema_version": 1}', "damaged"),
+        ('{"kind": "cdtool signature", "schema_version": 2}', "damaged"),
         ("\x00\x01", "not a signature file"),
     ],
 )

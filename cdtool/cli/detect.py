@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.cli.console import leave, number, plain, print_error, print_json, print_skipped, progress, table
-from cdtool.cli.options import DebounceOption, JsonOption, MachineOption, OperationsOption
+from cdtool.cli.options import DebounceOption, JointsOption, JsonOption, MachineOption, OperationsOption, joint_names
 from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
@@ -33,6 +33,7 @@ def detect(
         str, typer.Option("--limit", help="Instead: |signal| below this; one value, or one a joint, as 40,inf,40.")
     ] = "",
     detector: Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")] = None,
+    joints: JointsOption = "",
     operations: OperationsOption = "whole",
     debounce: DebounceOption = None,
     onset_above: Annotated[
@@ -69,6 +70,7 @@ def detect(
                     signature=signature,
                     detector=detector,
                     limit=limits,
+                    joints=joint_names(joints),
                     operations=operations,
                     debounce=debounce,
                     onset=OnsetRule(above=onset_above, back_to=onset_back_to),
@@ -137,7 +139,7 @@ def _show(rows: list[tuple[Detection, Matching]]) -> None:
 
 
 def _rows_of(detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
-    name, joints = detection.operation.name, detection.operation.recording.joints
+    name, joints = detection.operation.name, detection.statistic.joints
     latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
     for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
@@ -170,7 +172,7 @@ def _show_not_judged(detections: list[Detection]) -> None:
 
 
 def _as_json(log: Path, found: Detected, detection: Detection, matching: Matching) -> dict[str, Any]:
-    joints = detection.operation.recording.joints
+    joints = detection.statistic.joints
     return {
         "log": str(log),
         "operation": detection.operation.name,

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
-from cdtool.cli.options import DebounceOption, JobsOption, JsonOption, MachineOption, OperationsOption
+from cdtool.cli.options import (
+    DebounceOption,
+    JobsOption,
+    JointsOption,
+    JsonOption,
+    MachineOption,
+    OperationsOption,
+    joint_names,
+)
 from cdtool.errors import ExitStatus, UsageError
 
 if TYPE_CHECKING:
@@ -38,7 +46,13 @@ def learn_signature(
         float | None,
         typer.Option("--safety-factor", "-k", help="Standard deviations from mean to limit. Default: 5.5."),
     ] = None,
-    sides: Annotated[str, typer.Option("--sides", help="one (the side that opposes the motion) or two.")] = "one",
+    sides: Annotated[
+        str | None,
+        typer.Option(
+            "--sides", help="one (that opposes the motion) or two. Default: one for an axis, two for a robot."
+        ),
+    ] = None,
+    joints: JointsOption = "",
     align: Annotated[
         str, typer.Option("--align", help="time_then_position (time while accelerating), time, or position.")
     ] = "time_then_position",
@@ -73,6 +87,7 @@ def learn_signature(
             machine,
             detector,
             rule=settings,
+            joints=joint_names(joints),
             operations=operations,
             debounce=debounce,
             jobs=jobs,

@@ -14,9 +14,17 @@ OperationsOption = Annotated[
         "--operations", help="How to cut a log into strokes: whole (one a file), motion, or trigger (a channel)."
     ),
 ]
+JointsOption = Annotated[
+    str, typer.Option("--joints", help="Joints to watch, separated by commas. Default: all of the machine file.")
+]
 DebounceOption = Annotated[
     int | None,
     typer.Option("--debounce", help="Samples in succession outside the band that raise an alarm. Default: 9 ms."),
 ]
 JobsOption = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Logs read and analysed side by side.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def joint_names(text: str) -> tuple[str, ...]:
+    """The names in a comma-separated list."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())

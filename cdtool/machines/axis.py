@@ -56,6 +56,7 @@ class Axis:
     stick_speed: tuple[float, ...]
 
     load_units: ClassVar[Mapping[str, str]]
+    default_sides: ClassVar[str] = "one"  # an obstacle on the track opposes the motion
     inertia_key: ClassVar[str]
     ratio_unit: ClassVar[str]
 

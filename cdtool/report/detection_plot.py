@@ -131,7 +131,7 @@ def _name_rows(rows: list[Axes], found: Detected, joints: list[int]) -> None:
     unit = unit_label(found.detections[0].statistic.unit) if found.detections else "–"
     for axes, joint in zip(rows, joints, strict=False):
         several = len(found.recording.joints) > 1
-        axes.set_ylabel(f"{label(found.recording.joints[joint], 16)}\n[{unit}]" if several else f"signal [{unit}]")
+        axes.set_ylabel(f"{label(found.joints[joint], 16)}\n[{unit}]" if several else f"signal [{unit}]")
     rows[len(joints)].set_ylabel("trigger")
     if len(rows) > len(joints) + 1:
         rows[-1].set_ylabel(f"load cell [{unit_label(found.recording['force'].unit)}]")
@@ -194,7 +194,7 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
 def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:
     """The joints that alarm, and those that are drawn."""
     alarming = sorted({alarm.joint for item in found.detections for alarm in item.verdict.alarms})
-    leading = sorted({item.operation.motion.joint for item in found.detections})
+    leading = sorted({item.leading for item in found.detections})
     return alarming, (alarming or leading)[:_MOST_PANELS]
 
 

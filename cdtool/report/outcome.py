@@ -31,7 +31,7 @@ def outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> st
         words.append(f"{len(found.detections)} operations")
     if len(alarming) > len(joints):
         words.append(f"{len(joints)} of {len(alarming)} alarming joints shown")
-    elif len(found.recording.joints) > len(joints):
+    elif len(found.joints) > len(joints):
         which = "those that alarm" if alarming else "the leading one"
-        words.append(f"{len(joints)} of {len(found.recording.joints)} joints shown: {which}")
+        words.append(f"{len(joints)} of {len(found.joints)} joints shown: {which}")
     return "  ·  ".join(words)

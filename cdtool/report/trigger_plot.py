@@ -41,7 +41,7 @@ class _Row:
         alarms = self.detection.verdict.alarms
         if self.match and self.match.alarm:
             return self.match.alarm.joint
-        return alarms[0].joint if alarms else self.detection.operation.motion.joint
+        return alarms[0].joint if alarms else self.detection.leading
 
     @property
     def trigger(self) -> float | None:
@@ -100,8 +100,8 @@ def _draw_row(axes: Axes, row: _Row, span: Span, legend: Legend) -> None:
         axes.axvspan(row.trigger, span[1], color=colour, alpha=0.25, linewidth=0, zorder=1.5)
         axes.axvline(row.trigger, color=colour, linewidth=2.2, zorder=4)
         legend.add("trigger")
-    joints = detection.operation.recording.joints
-    joint = f" {label(joints[row.joint], 14)}" if len(joints) > 1 else ""
+    names = detection.statistic.joints
+    joint = f" {label(names[row.joint], 14)}" if len(detection.operation.recording.joints) > 1 else ""
     _name(axes, f"{label(detection.detector, 24)}\n[{unit_label(detection.statistic.unit)}]{joint}")
     verdict, detail = _verdict(row)
     axes.annotate(

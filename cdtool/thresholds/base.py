@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
@@ -47,4 +48,4 @@ def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[S
     status = signal.status.copy()
     unknown = (np.isnan(lower) | np.isnan(upper)) & (status == Status.VALID)
     status[unknown] = Status.NO_LIMIT
-    return Signal(signal.time, signal.values, status, signal.unit, signal.signed), Band(lower, upper)
+    return replace(signal, status=status), Band(lower, upper)

@@ -16,7 +16,7 @@ from cdtool.thresholds.base import with_limits
 
 @dataclass(frozen=True)
 class FittedLimit:
-    """lower < i < upper, the same at every sample; one value a joint, infinite = no limit on that side or joint."""
+    """lower < i < upper, the same at every sample; one value for all joints or one a joint, infinite = no limit."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -24,7 +24,7 @@ class FittedLimit:
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """The signal and its constant band; raises UsageError where the number of joints differs."""
         joints = signal.values.shape[1]
-        if len(self.lower) != joints:
+        if len(self.lower) not in (1, joints):
             raise UsageError(
                 f"{recording.name}: {len(self.lower)} limits for {joints} joints",
                 "give one limit, or one a joint",
@@ -70,11 +70,9 @@ class Limit:
         return FittedLimit(tuple(map(float, lower)), tuple(map(float, upper)))
 
     @staticmethod
-    def given(limits: Sequence[float], joints: int) -> FittedLimit:
+    def given(limits: Sequence[float]) -> FittedLimit:
         """Hand-set limits |i| < limit: one for all joints or one a joint (infinite: that joint is not watched)."""
-        values = tuple(limits) * joints if len(limits) == 1 else tuple(limits)
-        if len(values) != joints:
-            raise UsageError(f"{len(values)} limits for {joints} joints", "give one limit, or one a joint")
+        values = tuple(limits)
         if not all(value > 0.0 for value in values):
             raise UsageError(f"limits are {list(values)}", "numbers above 0 are needed (inf: not watched)")
         return FittedLimit(tuple(-value for value in values), values)

@@ -42,11 +42,18 @@ class FittedSignature:
     sides: str
     safety_factor: float
     signed: bool
+    joints: tuple[str, ...]
     by_time: Curve
     by_position: Curve
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and its band on the signal's clock; raises RecordingError without speed and position."""
+        """The signal and its band on the signal's clock; raises RecordingError without speed and position.
+
+        Raises SignatureError where the signal is of other joints than those that were learned.
+        """
+        if signal.joints != self.joints:
+            learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
+            raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
         where = self._progress(recording, signal.time)
         shape = signal.values.shape
         lower, upper = np.full(shape, np.nan), np.full(shape, np.nan)
@@ -95,6 +102,7 @@ class FittedSignature:
             "sides": self.sides,
             "safety_factor": self.safety_factor,
             "signed": self.signed,
+            "joints": list(self.joints),
             "by_time": self.by_time.to_dict(),
             "by_position": self.by_position.to_dict(),
         }
@@ -109,6 +117,7 @@ class FittedSignature:
             sides=_known("sides", values["sides"], SIDES),
             safety_factor=float(values["safety_factor"]),
             signed=bool(values["signed"]),
+            joints=tuple(map(str, values["joints"])),
             by_time=Curve.from_dict(values["by_time"]),
             by_position=Curve.from_dict(values["by_position"]),
         )
@@ -142,12 +151,13 @@ class Signature:
 
     `rule` "pooled": spread over neighbours within the window, the mean's deviation from its smoothed course included;
     "thesis": mean + 1 standard deviation, point by point, which alarms in almost every run. `sides` "one" watches the
-    side on which an obstacle opposes the motion. Grid and window of the position in load units (m or rad). Fails with
-    another speed, payload or path, with temperature steps, in the first metres after a long stop, with few runs.
+    side on which an obstacle opposes the motion, "two" both; None leaves it to the machine (see `for_machine`). Grid
+    and window of the position in load units (m or rad). Fails with another speed, payload or path, with temperature
+    steps, in the first metres after a long stop, with few runs.
     """
 
     safety_factor: float | None = None
-    sides: str = "one"
+    sides: str | None = None
     alignment: str = "time_then_position"
     rule: str = "pooled"
     position_step: float = 2e-3
@@ -159,7 +169,8 @@ class Signature:
 
     def __post_init__(self) -> None:
         _known("rule", self.rule, RULES)
-        _known("sides", self.sides, SIDES)
+        if self.sides is not None:
+            _known("sides", self.sides, SIDES)
         _known("alignment", self.alignment, ALIGNMENTS)
         if self.safety_factor is not None and not self.safety_factor > 0.0:
             raise UsageError(f"safety factor is {self.safety_factor}", "a number above 0 is needed")
@@ -172,6 +183,10 @@ class Signature:
         if self.safety_factor is not None:
             return self.safety_factor
         return 1.0 if self.rule == "thesis" else 5.5
+
+    def for_machine(self, default_sides: str) -> Signature:
+        """The rule with the machine's own sides where none are given: one for an axis, two for a robot."""
+        return self if self.sides else replace(self, sides=default_sides)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
@@ -203,9 +218,10 @@ class Signature:
             motion=motion,
             alignment=self.alignment,
             rule=self.rule,
-            sides=self.sides,
+            sides=self.sides or "one",
             safety_factor=self.factor,
             signed=pairs[0][1].signed,
+            joints=pairs[0][1].joints,
             by_time=by_time.learned(np.array(samples[0])),
             by_position=by_position.learned(np.array(samples[1])),
         )

@@ -102,13 +102,18 @@ def _learn(
     machine = setup.machine_file.machine
     for detector in detectors:
         if setup.threshold == "signature":
-            fitted, _, left_out = fit_signatures(operations, machine, detector, setup.signature, unread)
+            fitted, _, left_out = fit_signatures(
+                operations, machine, detector, setup.signature, unread, watched=setup.watched
+            )
             thresholds[detector.name] = fitted
             skipped += left_out
         else:
             if not operations:
                 raise SignatureError(f"no run to learn {detector.name} from", "check with cdtool info")
-            pairs = [(op.recording.without_ground_truth(), run_detector(op, machine, detector)) for op in operations]
+            pairs = [
+                (op.recording.without_ground_truth(), run_detector(op, machine, detector, setup.watched))
+                for op in operations
+            ]
             thresholds[detector.name] = (
                 THRESHOLDS.load(setup.threshold)(safety_factor=setup.signature.factor).fit(pairs),
             )
@@ -138,6 +143,7 @@ def _provenance(
         "window_s": setup.window,
         "onset": setup.onset.described,
         "operations": setup.operations,
+        "watched_joints": list(setup.watched or setup.machine_file.machine.joints),
         "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
         "short_names": {detector.name: detector.short_name for detector in detectors},
         "logs_sha256": {shown_path(Path(source), base): digest for source, digest in sorted(digests.items())},

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import ConfigurationError
+from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
@@ -28,6 +28,7 @@ class BenchmarkFile:
     path: Path
     machine_file: MachineFile
     detectors: tuple[str, ...]
+    watched: tuple[str, ...]
     operations: str
     window: float
     threshold: str
@@ -54,7 +55,7 @@ def read_benchmark_file(path: str | Path) -> BenchmarkFile:
     names = tuple(machine_file.detector(name).name for name in root.texts("detectors"))
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
-    signature, debounce = _signature(root.table("signature"))
+    signature, debounce = _signature(root.table("signature"), machine_file.machine.default_sides)
     learn = _logs(root.table("learn", required=True), base)
     holdout = _logs(root.table(HOLDOUT), base) if HOLDOUT in root else ()
     groups = root.table("impacts")
@@ -67,6 +68,7 @@ def read_benchmark_file(path: str | Path) -> BenchmarkFile:
         path=file,
         machine_file=machine_file,
         detectors=names,
+        watched=_watched(root, machine_file.machine.joints),
         operations=root.choice("operations", HOW_TO_CUT, "whole"),
         window=root.number("window_s", 1.0, above=0.0),
         threshold=root.choice("threshold", THRESHOLDS.names(), "signature"),
@@ -89,10 +91,18 @@ def _logs(table: Table, base: Path) -> tuple[Path, ...]:
     return logs
 
 
-def _signature(table: Table) -> tuple[Signature, int | None]:
+def _watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
+    watched = table.texts("joints", ())
+    for joint in watched:
+        if joint not in joints:
+            raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
+    return watched
+
+
+def _signature(table: Table, default_sides: str) -> tuple[Signature, int | None]:
     settings: dict[str, Any] = {
         "rule": table.choice("rule", RULES, "pooled"),
-        "sides": table.choice("sides", SIDES, "one"),
+        "sides": table.choice("sides", SIDES, default_sides),
         "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
         "position_step": table.number("position_step", Signature.position_step, above=0.0),
         "position_window": table.number("position_window", Signature.position_window, above=0.0),

@@ -17,7 +17,7 @@ from cdtool.recording import Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.runs import load_operations
+from cdtool.workflows.runs import check_joints, load_operations
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,11 @@ class Detected:
     contacts: tuple[Contact, ...]
     matchings: tuple[Matching, ...]
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of the signal's columns: the joints that are watched."""
+        return self.detections[0].statistic.joints if self.detections else self.recording.joints
+
 
 def detect(
     log: str | Path,
@@ -40,6 +45,7 @@ def detect(
     signature: str | Path | None = None,
     detector: str | None = None,
     limit: Sequence[float] = (),
+    joints: Sequence[str] = (),
     operations: str = "whole",
     debounce: int | None = None,
     onset: OnsetRule | None = None,
@@ -47,6 +53,7 @@ def detect(
 ) -> Detected:
     """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
 
+    With limits, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
     Raises UsageError where neither or both are given, SignatureError where the signature does not belong,
     RecordingError where the log cannot be read.
     """
@@ -58,16 +65,21 @@ def detect(
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
-        thresholds = stored.current
+        if joints:
+            raise UsageError("joints belong to a limit", "a signature watches the joints that it was learned for")
+        thresholds, joints = stored.current, stored.joints
         debounce = stored.debounce if debounce is None else debounce
     else:
         if detector is None:
             raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
         instance = machine_file.detector(detector)
-        thresholds = (Limit.given(limit, len(machine_file.machine.joints)),)
+        check_joints(joints, machine_file.machine)
+        thresholds = (Limit.given(limit),)
     activation = Activation(debounce)
     recording, parts = load_operations(Path(log), machine_file, operations)
-    detections = tuple(detect_operation(part, machine_file.machine, instance, thresholds, activation) for part in parts)
+    detections = tuple(
+        detect_operation(part, machine_file.machine, instance, thresholds, activation, joints) for part in parts
+    )
     contacts = _contacts(recording, onset or OnsetRule())
     matchings = tuple(
         match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window) for item in detections

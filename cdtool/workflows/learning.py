@@ -23,7 +23,7 @@ from cdtool.signature_store import (
     with_run,
 )
 from cdtool.thresholds.signature import SPEED_TOLERANCE, FittedSignature, Signature
-from cdtool.workflows.runs import Progress, load_runs
+from cdtool.workflows.runs import Progress, check_joints, load_runs
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ def learn_signature(
     detector: str,
     *,
     rule: Signature | None = None,
+    joints: Sequence[str] = (),
     operations: str = "whole",
     debounce: int | None = None,
     jobs: int = 1,
@@ -49,14 +50,21 @@ def learn_signature(
 ) -> Learned:
     """Learn the normal band of one detector from impact-free logs: one signature for each class of motion.
 
-    `rule` holds the signature's settings (safety factor, sides, alignment, force ...). Raises SignatureError where runs
+    `rule` holds the signature's settings (safety factor, sides, alignment, force ...); `joints` are those to watch, all
+    where none is named. Raises SignatureError where runs
     are too few, CdtoolError where nothing can be read. Write the result with `cdtool.signature_store.write_signature`.
     """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     Activation(debounce)  # refuses a wrong debounce before anything is read
+    check_joints(joints, machine_file.machine)
     runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
     fitted, used, skipped = fit_signatures(
-        runs.operations, machine_file.machine, machine_file.detector(detector), rule or Signature(), runs.skipped
+        runs.operations,
+        machine_file.machine,
+        machine_file.detector(detector),
+        rule or Signature(),
+        runs.skipped,
+        watched=joints,
     )
     signature = signature_file(machine_file, detector, debounce, fitted, used)
     counts = tuple((item.motion, item.runs) for item in fitted)
@@ -64,14 +72,20 @@ def learn_signature(
 
 
 def fit_signatures(
-    operations: Sequence[Operation], machine: Any, detector: Any, rule: Signature, unread: Sequence[Skipped] = ()
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    rule: Signature,
+    unread: Sequence[Skipped] = (),
+    watched: Sequence[str] = (),
 ) -> tuple[tuple[FittedSignature, ...], list[Operation], list[Skipped]]:
     """A signature for each class, the runs used and those left out; raises SignatureError."""
+    rule = rule.for_machine(machine.default_sides)
     skipped: list[Skipped] = []
     pairs: list[tuple[Operation, Signal]] = []
     for operation in operations:
         try:
-            pairs.append((operation, run_detector(operation, machine, detector)))
+            pairs.append((operation, run_detector(operation, machine, detector, watched)))
         except CdtoolError as fault:
             skipped.append(Skipped(operation.name, str(fault)))
     if not pairs:
@@ -110,7 +124,6 @@ def signature_file(
         detector=instance.name,
         gains=asdict(instance),
         unit=instance.unit(machine_file.machine),
-        joints=machine_file.machine.joints,
         debounce=debounce,
         current=fitted,
         first=fitted,
@@ -160,7 +173,8 @@ def _with_operation(
     run = _learned_run(operation)
     if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in signature.runs):
         raise SignatureError("this run is in the signature already")
-    detection = detect_operation(operation, machine, detector, signature.current, Activation(signature.debounce))
+    activation = Activation(signature.debounce)
+    detection = detect_operation(operation, machine, detector, signature.current, activation, signature.joints)
     if detection.verdict.outcome == "alarm":
         raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")
     if detection.verdict.outcome == "not assessable":
@@ -169,7 +183,8 @@ def _with_operation(
         i for i, item in enumerate(signature.current) if item.motion.matches(operation.motion, SPEED_TOLERANCE)
     )
     recording = operation.recording.without_ground_truth()
-    updated = signature.current[index].with_run(recording, run_detector(operation, machine, detector), forget)
+    signal = run_detector(operation, machine, detector, signature.joints)
+    updated = signature.current[index].with_run(recording, signal, forget)
     return with_run(signature, index, updated, run)
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
+from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
@@ -113,6 +113,13 @@ def shown_path(path: Path, base: Path | None = None) -> str:
     if base is not None and path.is_relative_to(base):
         return path.relative_to(base).as_posix()
     return path.as_posix()
+
+
+def check_joints(joints: Sequence[str], machine: Any) -> None:
+    """Raise UsageError, before anything is read, where one of the joints to watch is not the machine's."""
+    for joint in joints:
+        if joint not in machine.joints:
+            raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
 
 
 def told(recording: Recording) -> list[Skipped]:

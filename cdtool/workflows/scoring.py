@@ -114,7 +114,12 @@ def score_log(
         for detector in detectors:
             try:
                 detection = detect_operation(
-                    operation, setup.machine_file.machine, detector, thresholds[detector.name], activation
+                    operation,
+                    setup.machine_file.machine,
+                    detector,
+                    thresholds[detector.name],
+                    activation,
+                    setup.watched,
                 )
             except CdtoolError as fault:
                 scored.skipped.append(Skipped(operation.name, str(fault)))
@@ -134,7 +139,7 @@ def contact_results(trace: Trace) -> list[ContactResult]:
             recording=recording.name,
             group=trace.group,
             detector=detection.detector,
-            joint=recording.joints[found.alarm.joint] if found.alarm else None,
+            joint=detection.statistic.joints[found.alarm.joint] if found.alarm else None,
             onset_s=found.contact.start,
             onset_uncertainty_s=found.contact.uncertainty,
             alarm_s=found.alarm.time if found.alarm else None,
@@ -152,9 +157,10 @@ def contact_results(trace: Trace) -> list[ContactResult]:
 
 def false_alarm_results(trace: Trace) -> list[FalseAlarmResult]:
     """A row for each alarm without a contact."""
-    recording = trace.operation.recording
     return [
-        FalseAlarmResult(recording.name, trace.group, detection.detector, recording.joints[alarm.joint], alarm.time)
+        FalseAlarmResult(
+            trace.operation.name, trace.group, detection.detector, detection.statistic.joints[alarm.joint], alarm.time
+        )
         for detection, matching in zip(trace.detections, trace.matchings, strict=True)
         for alarm in matching.false_alarms
     ]

@@ -54,8 +54,8 @@ def six_joints() -> Detected:
     recording = Recording("arm", "arm.csv", names, channels)
     status = np.zeros(torque.shape, dtype=np.uint8)
     status[1000:1200] = Status.GAP
-    statistic, band = Limit.given((40, 40, 40, 40, float("inf"), 40), 6).evaluate(
-        recording, Signal(time, torque, status, "N m")
+    statistic, band = Limit.given((40, 40, 40, 40, float("inf"), 40)).evaluate(
+        recording, Signal(time, torque, status, "N m", joints=names)
     )
     alarms, _ = Activation().alarms(statistic, band)
     assert {alarm.joint for alarm in alarms} == {1, 3}

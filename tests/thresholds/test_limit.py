@@ -18,16 +18,16 @@ def signal(values: np.ndarray) -> Signal:
 
 
 def test_one_limit_serves_all_joints_and_infinity_leaves_a_joint_unwatched():
-    _, band = Limit.given([40.0], 2).evaluate(RECORDING, signal(np.zeros((3, 2))))
+    _, band = Limit.given([40.0]).evaluate(RECORDING, signal(np.zeros((3, 2))))
     assert (band.upper == 40.0).all() and (band.lower == -40.0).all()
-    _, band = Limit.given([np.inf, 10.0], 2).evaluate(RECORDING, signal(np.zeros((3, 2))))
+    _, band = Limit.given([np.inf, 10.0]).evaluate(RECORDING, signal(np.zeros((3, 2))))
     assert (band.upper == [np.inf, 10.0]).all()
 
 
 @pytest.mark.parametrize("limits", [[1.0, 2.0, 3.0], [-1.0], [np.nan], [0.0]])
 def test_limits_that_do_not_fit_are_refused(limits):
     with pytest.raises(UsageError, match="limits"):
-        Limit.given(limits, 2)
+        Limit.given(limits).evaluate(RECORDING, signal(np.zeros((3, 2))))
 
 
 def test_fitted_limits_are_the_mean_extremes_and_their_spread():
