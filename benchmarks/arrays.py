@@ -36,14 +36,18 @@ def gate() -> LinearAxis:
     return LinearAxis.from_table(Table(values, "benchmark"))
 
 
+def viscous(machine: LinearAxis) -> float:
+    """Load side, N s/m."""
+    return float(machine.viscous_friction[0] / machine.transmission_ratio[0] ** 2)
+
+
 def clean(samples: int, machine: LinearAxis) -> Run:
     """Uniform 1 kHz, nothing missing, the accelerometer on the same clock."""
     rng = np.random.default_rng(2)
     time = np.arange(samples) * PERIOD
     speed = np.interp(time, *_STROKES, period=_PERIOD)
     acceleration = np.gradient(speed, PERIOD)
-    axis = machine.axes[0]
-    force = axis.inertia * acceleration + axis.viscous * speed + rng.normal(0.0, 20.0, samples)
+    force = machine.nominal_inertia[0] * acceleration + viscous(machine) * speed + rng.normal(0.0, 20.0, samples)
     speed += rng.normal(0.0, 1e-3, samples)
     acceleration += rng.normal(0.0, 0.1, samples)
     return Run(time, force, speed, time, acceleration)

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from arrays import PERIOD, Array, Run, awkward, clean, gate, stretch
+from arrays import PERIOD, Array, Run, awkward, clean, gate, stretch, viscous
 from timing import interleaved, main, ratio, table, verdict
 
 from cdtool.detectors import friction_ekf as detector_module
-from cdtool.detectors.friction_ekf import FrictionEkf
+from cdtool.detectors.friction_ekf import FrictionEkf, Motion
+from cdtool.dynamics import JointEquation
 from cdtool.machines.linear_axis import LinearAxis
 
 SAMPLES = 1_000_000
@@ -88,22 +89,10 @@ def _against_filterpy(
 
 
 def _cdtool(detector: FrictionEkf, run: Run, machine: LinearAxis) -> Estimate:
-    axis = machine.axes[0]
     missing = np.isnan(run.speed).view(np.uint8)
-
-    def estimate() -> tuple[Array, Statuses]:
-        return detector.estimate(
-            run.time,
-            run.force,
-            run.speed,
-            missing,
-            run.acceleration_time,
-            run.acceleration,
-            axis.inertia,
-            axis.viscous,
-        )
-
-    return estimate
+    motion = Motion(run.time, run.speed, run.speed, missing, run.acceleration_time, run.acceleration)
+    equation = JointEquation(machine.nominal_inertia, run.force, viscous(machine))
+    return lambda: detector.estimate(motion, equation)
 
 
 def _compile(folder: Path) -> ctypes.CDLL | None:
@@ -118,9 +107,8 @@ def _compile(folder: Path) -> ctypes.CDLL | None:
 
 
 def _c(library: ctypes.CDLL, detector: FrictionEkf, run: Run, machine: LinearAxis) -> Estimate:
-    axis = machine.axes[0]
     missing = np.isnan(run.speed).view(np.uint8)
-    gains = _gains(detector, axis.inertia, axis.viscous)
+    gains = _gains(detector, float(machine.nominal_inertia[0]), viscous(machine))
     numbers = [ctypes.c_double(value) for value in gains]
 
     def at(array: npt.NDArray[np.float64] | Statuses) -> ctypes.c_void_p:
@@ -168,8 +156,9 @@ def _filterpy(detector: FrictionEkf, run: Run, machine: LinearAxis, joint: bool)
     """The same model stepped by filterpy: predict, then two scalar updates as cdtool does, or one of both values."""
     from filterpy.kalman import ExtendedKalmanFilter
 
-    axis = machine.axes[0]
-    inertia, viscous, q_d, q_a, q_v, r_a, r_v, initial, *_ = _gains(detector, axis.inertia, axis.viscous)
+    inertia, known_friction, q_d, q_a, q_v, r_a, r_v, initial, *_ = _gains(
+        detector, float(machine.nominal_inertia[0]), viscous(machine)
+    )
     see_a, see_v = np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]])
     see_both = np.vstack((see_a, see_v))
 
@@ -180,7 +169,7 @@ def _filterpy(detector: FrictionEkf, run: Run, machine: LinearAxis, joint: bool)
 
     def step() -> Array:
         kalman = Filter(dim_x=3, dim_z=2 if joint else 1)
-        kalman.x = np.array([viscous, run.acceleration[0], run.speed[0]])
+        kalman.x = np.array([known_friction, run.acceleration[0], run.speed[0]])
         kalman.P = np.diag([initial, r_a, r_v])
         kalman.Q = np.diag([q_d * PERIOD, q_a, q_v])
         noise = np.diag([r_a, r_v])

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from arrays import PERIOD, Array, Run, clean, gate, recording
+from arrays import PERIOD, Array, Run, clean, gate, recording, viscous
 from timing import Spread, interleaved, main, ratio, table, verdict
 
 from cdtool.detectors.base import _observe, drive_on_speed_clock
@@ -57,12 +57,12 @@ def _lfilter(run: Run, machine: LinearAxis, bandwidth: float) -> Callable[[], Ar
     """res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T)."""
     from scipy.signal import lfilter
 
-    axis = machine.axes[0]
+    inertia, friction = float(machine.nominal_inertia[0]), viscous(machine)
     a = np.exp(-bandwidth * PERIOD)
 
     def residual() -> Array:
-        p = axis.inertia * run.speed
-        u = run.force - axis.viscous * run.speed
+        p = inertia * run.speed
+        u = run.force - friction * run.speed
         mean = 0.5 * (u[1:] + u[:-1])
         x = mean - np.diff(p) / PERIOD
         filtered: Array = lfilter([1.0 - a], [1.0, -a], x)
@@ -80,9 +80,9 @@ def _lfilter_only(run: Run, bandwidth: float) -> Callable[[], Array]:
 
 
 def _core(run: Run, machine: LinearAxis, bandwidth: float) -> Callable[[], object]:
-    drive = drive_on_speed_clock(recording(run))
-    net_force = machine.drive_force_minus_known(drive.torque, drive.speed, drive.speed)[:, 0]
-    momentum = machine.axes[0].inertia * drive.speed[:, 0]
+    drive = drive_on_speed_clock(recording(run), machine)
+    net, momenta = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
+    net_force, momentum = net[:, 0], momenta[:, 0]
     missing = drive.missing[:, 0]
 
     def residual() -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cdtool.errors import ConfigurationError
@@ -43,9 +44,8 @@ def read(tmp_path: Path, text: str):
 
 def test_the_example_of_the_documentation_is_read(tmp_path):
     file = read(tmp_path, MACHINE + CHANNELS)
-    axis = file.machine.axes[0]
-    assert axis.inertia == pytest.approx(620.0 + 9.5e-4 / 1.3333e-3**2)
-    assert axis.viscous == pytest.approx(2.67e-4 / 1.3333e-3**2)
+    assert file.machine.nominal_inertia[0] == pytest.approx(620.0 + 9.5e-4 / 1.3333e-3**2)
+    assert file.machine.friction(np.array([[2.0]]))[0, 0] == pytest.approx(2.0 * 2.67e-4 / 1.3333e-3**2)
     by_name = {source.channel: source for source in file.columns.sources}
     assert by_name["torque"].factor == (0.56,) and by_name["torque"].unit == "N m"
     assert by_name["speed"].factor == pytest.approx((2.0 * math.pi / 60.0,))
@@ -103,7 +103,7 @@ def test_missing_and_broken_files_are_one_line(tmp_path):
 def test_load_coordinates_take_masses_only(tmp_path):
     text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95.1\nviscous_friction = 204.3\n'
     file = read(tmp_path, text)
-    assert file.machine.axes[0].inertia == 95.1 and file.machine.axes[0].viscous == 204.3
+    assert file.machine.nominal_inertia[0] == 95.1 and file.machine.viscous_friction == (204.3,)
     with pytest.raises(ConfigurationError, match=r"machine\.motor_inertia.*no meaning"):
         read(tmp_path, text + "motor_inertia = 1e-3\n")
 
@@ -111,7 +111,7 @@ def test_load_coordinates_take_masses_only(tmp_path):
 def test_many_joints_take_one_value_or_one_each(tmp_path):
     text = MACHINE.replace('name = "gate"', 'name = "portal"\njoints = ["x", "y"]').replace("620.0", "[620.0, 30.0]")
     file = read(tmp_path, text + '[channels]\ntime = { rate_hz = 1000 }\nspeed = { columns = [1, 2], unit = "rpm" }\n')
-    assert [axis.inertia for axis in file.machine.axes] == pytest.approx([1154.4, 564.4], abs=0.2)
+    assert file.machine.nominal_inertia == pytest.approx([1154.4, 564.4], abs=0.2)
     assert file.columns.time.rate == 1000.0
     with pytest.raises(ConfigurationError, match="one a joint"):
         read(tmp_path, text.replace("[620.0, 30.0]", "[620.0, 30.0, 1.0]"))

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
+from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -27,11 +28,11 @@ class Detector(Protocol):
     needs: ClassVar[tuple[str, ...]]
     signed: ClassVar[bool]
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """Unit of the signal for that machine."""
         ...
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """The collision detection signal of a recording on the load side; raises RecordingError."""
         ...
 
@@ -49,9 +50,15 @@ def require_positive(detector: object, *names: str) -> None:
             raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed")
 
 
-def require_channels(detector: Detector, recording: Recording) -> None:
-    """Raise RecordingError, naming the channel, where one that the detector needs is absent."""
-    for channel in detector.needs:
+def require_channels(detector: Detector, recording: Recording, machine: Machine) -> None:
+    """Raise RecordingError, naming the channel, where one that the detector needs is absent.
+
+    A detector that uses a model of a coupled machine needs its position too: M, C and g depend on the pose.
+    """
+    needs = detector.needs
+    if machine.coupled and "torque" in needs and len(needs) > 1:
+        needs = tuple(dict.fromkeys((*needs, "position")))
+    for channel in needs:
         if channel not in recording:
             raise RecordingError(
                 f"{recording.name}: {detector.name} needs the channel '{channel}'",
@@ -61,31 +68,46 @@ def require_channels(detector: Detector, recording: Recording) -> None:
 
 @dataclass(frozen=True)
 class Drive:
-    """Torque and speed on the speed's clock: `torque` and `speed` (n, J) with the last value held where one is missing.
+    """Torque, position and speed (n, J) on the speed's clock, with the last value held where one is missing.
 
-    `missing` (n, J) tells where the torque or the speed has no sample; `speed_missing` the speed alone.
+    `missing` (n, J) tells where anything has no sample; `speed_missing` where the motion is not known. Of a coupled
+    machine all joints' motion is missing where one joint's is, since each feels the others. A machine that is not
+    coupled needs no position: it is 0 there.
     """
 
     time: FloatArray
     torque: FloatArray
+    position: FloatArray
     speed: FloatArray
     missing: BoolArray
     speed_missing: BoolArray
 
 
-def drive_on_speed_clock(recording: Recording) -> Drive:
-    """Torque by previous value on the clock of the speed (a torque is held between its samples, never interpolated)."""
+def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
+    """Everything by previous value on the clock of the speed: held between its samples, never interpolated."""
     speed = recording["speed"]
     torque = previous_value(recording["torque"], speed.time)
     torque_missing = ~np.isfinite(torque)
-    speed_missing = ~np.isfinite(speed.values)
+    motion_missing = ~np.isfinite(speed.values)
+    position: FloatArray = np.broadcast_to(0.0, torque.shape)
+    if machine.coupled:
+        angles = previous_value(recording["position"], speed.time)
+        lost = ~np.isfinite(angles)
+        position = hold_last(angles, lost)
+        motion_missing = for_every_joint(motion_missing | lost)
     return Drive(
         speed.time,
         hold_last(torque, torque_missing),
-        hold_last(speed.values, speed_missing),
-        torque_missing | speed_missing,
-        speed_missing,
+        position,
+        hold_last(speed.values, ~np.isfinite(speed.values)),
+        torque_missing | motion_missing,
+        motion_missing,
     )
+
+
+def for_every_joint(missing: BoolArray) -> BoolArray:
+    """(n, J): True for all joints of a sample where it is for one."""
+    return np.broadcast_to(np.any(missing, axis=1, keepdims=True), missing.shape)
 
 
 def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:

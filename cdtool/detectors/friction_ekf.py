@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
-from cdtool.detectors.base import drive_on_speed_clock, gain, require_channels, require_positive
+from cdtool.detectors.base import (
+    drive_on_speed_clock,
+    for_every_joint,
+    gain,
+    hold_last,
+    require_channels,
+    require_positive,
+)
+from cdtool.detectors.friction_ekf_arm_kernel import run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import run_filter
+from cdtool.dynamics import JointEquation, Machine
 from cdtool.recording import FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
@@ -22,10 +32,27 @@ _GLITCH = 0.02
 
 
 @dataclass(frozen=True)
+class Motion:
+    """What is measured of one joint: `speed` and `position` (n,) at `time`, NaN = no sample, `acceleration` at its own.
+
+    `missing` (n,): any input has no sample.
+    """
+
+    time: FloatArray
+    speed: FloatArray
+    position: FloatArray
+    missing: StatusArray
+    acceleration_time: FloatArray
+    acceleration: FloatArray
+
+
+@dataclass(frozen=True)
 class FrictionEkf:
     """Virtual viscous friction d from m a = F - d v, state x = (d, a, v), measured (a, v) (thesis 5.5-5.8 corrected).
 
-    Needs: torque, speed, acceleration. Unit: N s/m (linear) or N m s/rad (rotary), positive where something opposes the
+    A planar arm's joint has its angle as a fourth state, measured too (6.34-6.44 corrected); for a joint of another
+    robot the other joints' coupling is a known input. Needs: torque, speed, acceleration (and position, where joints
+    are coupled). Unit: N s/m (linear) or N m s/rad (rotary), positive where something opposes the
     motion. Load-side units, sequential scalar updates in Joseph form, no matrix inverse. Not applicable below
     `minimum_speed`: there the friction cannot be observed; after re-entry it is starting up until the integral of its
     bandwidth over time reaches 3. Its bandwidth falls in proportion to the speed. After the speed changes sign the
@@ -37,6 +64,8 @@ class FrictionEkf:
     friction_drift: float = gain(220.0, "N s/m per sqrt(s)", "how fast the friction may change: the square is q_d")
     drift_acceleration: float = gain(9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)")
     drift_speed: float = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)")
+    sigma_position: float = gain(1e-3, "rad", "noise of the angle (standard deviation); planar arm")
+    drift_position: float = gain(1e-4, "rad per sample", "unmodelled angle (standard deviation); planar arm")
     minimum_speed: float = gain(0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed")
 
     name: ClassVar[str] = "friction_ekf"
@@ -53,73 +82,75 @@ class FrictionEkf:
             "friction_drift",
             "drift_acceleration",
             "drift_speed",
+            "sigma_position",
+            "drift_position",
             "minimum_speed",
         )
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """N s/m or N m s/rad."""
         return f"{machine.force_unit} s/{machine.load_units['position']}"
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Virtual friction (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording)
+        require_channels(self, recording, machine)
         machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording)
+        drive = drive_on_speed_clock(recording, machine)
         acceleration = recording["acceleration"]
-        # The virtual friction stands for all viscous friction; what else the machine file knows is taken off.
-        force = machine.drive_force_minus_known(drive.torque, drive.speed, np.zeros_like(drive.speed))
+        others = previous_value(acceleration, drive.time)
+        lost = ~np.isfinite(others)
+        equations = machine.joint_equations(drive.torque, drive.position, drive.speed, hold_last(others, lost))
         measured = np.where(drive.speed_missing, np.nan, drive.speed)
-        missing = drive.missing
-        friction = np.zeros(force.shape)
-        status = np.zeros(force.shape, dtype=np.uint8)
-        for j, axis in enumerate(machine.axes):
-            friction[:, j], status[:, j] = self.estimate(
+        missing = drive.missing | for_every_joint(lost) if machine.coupled else drive.missing
+        friction = np.zeros(measured.shape)
+        status = np.zeros(measured.shape, dtype=np.uint8)
+        for j, equation in enumerate(equations):
+            motion = Motion(
                 drive.time,
-                np.ascontiguousarray(force[:, j]),
                 np.ascontiguousarray(measured[:, j]),
+                np.where(drive.speed_missing[:, j], np.nan, drive.position[:, j]),
                 np.ascontiguousarray(missing[:, j]).view(np.uint8),
                 acceleration.time,
                 np.ascontiguousarray(acceleration.values[:, j]),
-                axis.inertia,
-                axis.viscous,
             )
+            friction[:, j], status[:, j] = self.estimate(motion, equation)
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
-    def estimate(
-        self,
-        time: FloatArray,
-        force: FloatArray,
-        speed: FloatArray,
-        missing: StatusArray,
-        acceleration_time: FloatArray,
-        acceleration: FloatArray,
-        inertia: float,
-        viscous: float,
-    ) -> tuple[FloatArray, StatusArray]:
+    def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
         """One joint: friction (n,) and status (n,); every accelerometer sample is used once, at its own time."""
-        friction = np.zeros(len(time))
-        status = np.zeros(len(time), dtype=np.uint8)
-        run_filter(
-            time,
-            force,
-            speed,
-            missing,
-            acceleration_time,
-            acceleration,
-            inertia,
-            viscous,
-            self.friction_drift**2,
-            self.drift_acceleration**2,
-            self.drift_speed**2,
-            self.sigma_acceleration**2,
-            self.sigma_speed**2,
-            self.friction_drift**2 * _INITIAL_DRIFT_TIME,
-            self.minimum_speed,
-            _ACCELERATION_HOLD,
-            _GLITCH,
-            friction,
-            status,
-        )
+        friction = np.zeros(len(motion.time))
+        status = np.zeros(len(motion.time), dtype=np.uint8)
+        process = (self.friction_drift**2, self.drift_acceleration**2, self.drift_speed**2)
+        noise = (self.sigma_acceleration**2, self.sigma_speed**2)
+        limits = (self.friction_drift**2 * _INITIAL_DRIFT_TIME, self.minimum_speed, _ACCELERATION_HOLD, _GLITCH)
+        sensor = (motion.missing, motion.acceleration_time, motion.acceleration)
+        force = np.ascontiguousarray(equation.force)
+        link = equation.pendulum
+        if link is None:
+            body = (np.ascontiguousarray(equation.inertia), equation.viscous)
+            run_filter(motion.time, force, motion.speed, *sensor, *body, *process, *noise, *limits, friction, status)
+        else:
+            run_arm_filter(
+                motion.time,
+                force,
+                motion.speed,
+                motion.position,
+                link.other_position,
+                link.other_speed,
+                link.other_acceleration,
+                *sensor,
+                float(equation.inertia[0]),
+                equation.viscous,
+                link.gravity,
+                link.coupling,
+                *process,
+                self.drift_position**2,
+                *noise,
+                self.sigma_position**2,
+                *limits,
+                friction,
+                status,
+            )
         return friction, status
 
     def steady_state(self, inertia: float, speed: float, friction: float, period: float) -> tuple[FloatArray, float]:

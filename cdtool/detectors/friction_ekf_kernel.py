@@ -77,8 +77,8 @@ _READ = "Array(float64, 1, 'C', readonly=True)"
 
 
 @kernel(
-    f"void({_READ}, {_READ}, {_READ}, Array(uint8, 1, 'C', readonly=True), {_READ}, {_READ}, "
-    f"{', '.join(['float64'] * 11)}, float64[::1], uint8[::1])"
+    f"void({_READ}, {_READ}, {_READ}, Array(uint8, 1, 'C', readonly=True), {_READ}, {_READ}, {_READ}, "
+    f"{', '.join(['float64'] * 10)}, float64[::1], uint8[::1])"
 )
 def run_filter(
     time: FloatArray,
@@ -87,7 +87,7 @@ def run_filter(
     missing: StatusArray,
     acceleration_time: FloatArray,
     acceleration: FloatArray,
-    inertia: float,
+    inertia: FloatArray,
     viscous: float,
     q_d: float,
     q_a: float,
@@ -103,7 +103,7 @@ def run_filter(
 ) -> None:
     """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
 
-    `speed` and `acceleration` may hold NaN (no sample), `force` may not; `missing`: force or speed is missing.
+    `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not; `missing`: force or speed is missing.
     """
     reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)
@@ -122,8 +122,10 @@ def run_filter(
     last_applicable = -np.inf
     forward = True
     against = 0
-    inverse_inertia = 1.0 / inertia
-    bandwidth_scale = np.sqrt(q_d / (r_a + q_a)) * inverse_inertia
+    # A constant inertia is looked up once; of one that changes with the pose the last one holds, like the force.
+    varies = len(inertia) > 1
+    inverse_inertia = 1.0 / inertia[0] if len(inertia) else 0.0
+    bandwidth_scale = np.sqrt(q_d / (r_a + q_a))
     for k in range(len(time)):
         seen = np.isfinite(speed[k])
         if started and time[k] - last_speed_time > 1.0:
@@ -150,6 +152,8 @@ def run_filter(
             now = time[k]
             last_speed_time = now
             held_force = force[k]
+            if varies:
+                inverse_inertia = 1.0 / inertia[k]
             friction[k] = d
             status[k] = 1 if applicable else 2
             continue
@@ -199,12 +203,14 @@ def run_filter(
                     forward = not forward
                     against = 0
                     settled = 0.0  # after a rebound the estimate has the wrong sign for a while
-                settled += bandwidth_scale * abs(speed[k]) * np.sqrt(since)
+                settled += bandwidth_scale * inverse_inertia * abs(speed[k]) * np.sqrt(since)
                 last_applicable = time[k]
             elif time[k] - last_applicable > glitch:
                 settled = 0.0
             last_speed_time = time[k]
         held_force = force[k]
+        if varies:
+            inverse_inertia = 1.0 / inertia[k]
         friction[k] = d
         if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
             status[k] = 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     drive_on_speed_clock,
+    for_every_joint,
     gain,
     hold_last,
     observe_momentum,
     require_channels,
     require_positive,
 )
+from cdtool.dynamics import Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -27,9 +29,9 @@ _STANDSTILL_AT_LEAST = 0.1
 
 @dataclass(frozen=True)
 class InertialMomentum:
-    """Complementary filter w = (s a + (k1 s + k2) v) / (s2 + k1 s + k2), then the momentum observer on w.
+    """Complementary filter w = (s a + (k1 s + k2) v) / (s2 + k1 s + k2) a joint, then the momentum observer on w.
 
-    Source: thesis 6.3-6.5, where the left side of 6.5 is a speed; k1 = 2 zeta w_c, k2 = w_c^2. Needs: torque, speed,
+    Source: thesis 6.3-6.5, 6.27-6.32, where the left sides are speeds and one 1/s is missing; k1 = 2 zeta w_c, k2 = w_c^2. Needs: torque, speed,
     acceleration. Unit: N or N m. Start-up: the longer of 3/K and, without a standstill at the start that shows the
     accelerometer's bias, 3 over the filter's slowest pole. Fails: w_c above the drive's resonance pulls the estimate
     back to the late motor speed; w_c below 3 rad/s lets the bias drift in.
@@ -48,30 +50,32 @@ class InertialMomentum:
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth", "crossover", "damping")
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """N or N m."""
         return str(machine.force_unit)
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording)
+        require_channels(self, recording, machine)
         machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording)
+        drive = drive_on_speed_clock(recording, machine)
         acceleration = previous_value(recording["acceleration"], drive.time)
         lost = ~np.isfinite(acceleration)
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
-        for j, axis in enumerate(machine.axes):
+        for j, stick_speed in enumerate(machine.stick_speed):
             fused[:, j], ready[j] = self.fuse(
                 drive.time,
                 drive.speed[:, j],
                 hold_last(acceleration, lost)[:, j],
                 drive.speed_missing[:, j],
-                axis.stick_speed,
+                stick_speed,
             )
-        net_force = machine.drive_force_minus_known(drive.torque, drive.speed, fused)
-        inertia = np.array([axis.inertia for axis in machine.axes])
-        residual, status = observe_momentum(drive, net_force, inertia * fused, self.bandwidth, ready)
+        if machine.coupled:
+            lost = for_every_joint(lost)
+            ready[:] = ready.max()
+        net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, fused)
+        residual, status = observe_momentum(drive, net_force, momentum, self.bandwidth, ready)
         status[lost] = Status.GAP
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)
 

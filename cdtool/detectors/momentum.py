@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,14 +15,17 @@ from cdtool.detectors.base import (
     require_channels,
     require_positive,
 )
+from cdtool.dynamics import Machine
 from cdtool.recording import Recording
 
 
 @dataclass(frozen=True)
 class Momentum:
-    """Residual res = K / (s + K) F_c of the momentum p = m v (thesis 2.16-2.19 and 6.3 corrected).
+    """Residual res = K / (s + K) tau_c of the momentum p = M(q) v (thesis 2.16-2.19, 6.3, 6.28 and 6.31 corrected).
 
-    Needs: torque, speed. Unit: N (linear) or N m (rotary), positive where the contact opposes positive travel. Start-up
+    dp/dt = tau - beta - tau_c with beta = g - C'v + friction: no acceleration and no inverse of M is needed. Needs:
+    torque, speed (and position, where joints are coupled). Unit: N or N m, positive where the contact opposes positive
+    travel. Start-up
     3 / K; after a gap longer than that it starts anew. Fails: friction that the machine file does not know stays in the
     residual; a compliant drive or clearance delays what the motor's speed can tell.
     """
@@ -38,17 +41,16 @@ class Momentum:
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth")
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """N or N m."""
         return str(machine.force_unit)
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording)
+        require_channels(self, recording, machine)
         machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording)
-        net_force = machine.drive_force_minus_known(drive.torque, drive.speed, drive.speed)
-        inertia = np.array([axis.inertia for axis in machine.axes])
-        ready = np.full(len(inertia), -np.inf)
-        residual, status = observe_momentum(drive, net_force, inertia * drive.speed, self.bandwidth, ready)
+        drive = drive_on_speed_clock(recording, machine)
+        net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
+        ready = np.full(momentum.shape[1], -np.inf)
+        residual, status = observe_momentum(drive, net_force, momentum, self.bandwidth, ready)
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.dynamics import Machine
 from cdtool.recording import Recording
 
 
@@ -26,13 +27,13 @@ class PureInertia:
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
     signed: ClassVar[bool] = True
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """m/s2 or rad/s2."""
         return str(machine.load_units["acceleration"])
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Deceleration (n, J); raises RecordingError without an acceleration."""
-        require_channels(self, recording)
+        require_channels(self, recording, machine)
         acceleration = recording["acceleration"]
         status = np.where(np.isfinite(acceleration.values), Status.VALID, Status.GAP).astype(np.uint8)
         return Signal(acceleration.time, -acceleration.values, status, self.unit(machine), self.signed)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.dynamics import Machine
 from cdtool.recording import Recording
 
 
@@ -26,13 +27,13 @@ class PureTorque:
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     signed: ClassVar[bool] = True
 
-    def unit(self, machine: Any) -> str:
+    def unit(self, machine: Machine) -> str:
         """N or N m."""
         return str(machine.force_unit)
 
-    def signal(self, recording: Recording, machine: Any) -> Signal:
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Drive force (n, J); raises RecordingError without a torque."""
-        require_channels(self, recording)
+        require_channels(self, recording, machine)
         torque = recording["torque"]
         status = np.where(np.isfinite(torque.values), Status.VALID, Status.GAP).astype(np.uint8)
         return Signal(torque.time, torque.values, status, self.unit(machine), self.signed)

@@ -9,5 +9,6 @@ MACHINES = Registry(
     table={
         "linear_axis": "cdtool.machines.linear_axis:LinearAxis",
         "rotary_axis": "cdtool.machines.rotary_axis:RotaryAxis",
+        "planar_arm": "cdtool.machines.planar_arm:PlanarArm",
     },
 )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from cdtool.machines.axis import Axis
+from cdtool.machines.joint_machine import LINEAR_UNITS
 
 
 @dataclass(frozen=True)
@@ -16,11 +16,10 @@ class LinearAxis(Axis):
     With coordinates = "load" friction is given at the load [N s/m, N].
     """
 
-    load_units: ClassVar[Mapping[str, str]] = {
-        "torque": "N",
-        "speed": "m/s",
-        "position": "m",
-        "acceleration": "m/s2",
-    }
     inertia_key: ClassVar[str] = "load_mass"
     ratio_unit: ClassVar[str] = "m/rad"
+
+    @property
+    def load_units(self) -> dict[str, str]:
+        """N, m/s, m, m/s2."""
+        return LINEAR_UNITS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,11 +15,4 @@ class RotaryAxis(Axis):
     Its joints are taken as uncoupled: on a robot only detectors without a model (pure_torque) are meaningful.
     """
 
-    load_units: ClassVar[Mapping[str, str]] = {
-        "torque": "N m",
-        "speed": "rad/s",
-        "position": "rad",
-        "acceleration": "rad/s2",
-    }
     inertia_key: ClassVar[str] = "load_inertia"
-    ratio_unit: ClassVar[str] = "rad/rad"

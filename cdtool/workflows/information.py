@@ -158,10 +158,12 @@ def _bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list
         return [
             Finding(f"nominal speed below minimum_speed ({detector.minimum_speed:g}): not applicable", "friction_ekf")
         ]
-    axis = machine_file.machine.axes[motion.joint]
+    inertia = float(machine_file.machine.nominal_inertia[motion.joint])
+    if inertia <= 0.0:
+        return []
     force = np.nanmedian(np.abs(recording["torque"].values[:, motion.joint]))
     friction = float(force) / motion.nominal_speed
-    poles, _ = detector.steady_state(axis.inertia, motion.nominal_speed, friction, recording["speed"].period)
+    poles, _ = detector.steady_state(inertia, motion.nominal_speed, friction, recording["speed"].period)
     slow, quick = float(poles[0]), float(poles[1])
     text = f"poles at {motion.nominal_speed:.3g} {recording['speed'].unit}: {slow:.3g} and {quick:.3g} rad/s"
     return [Finding(text, "friction_ekf", "note")]

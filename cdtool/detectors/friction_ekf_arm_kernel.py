@@ -1,0 +1,224 @@
+"""The friction-estimating EKF of a planar arm's joint: four states, scalars unrolled (thesis 6.34-6.44 put right).
+
+State (d, a, v, q). Predict, all from the old state: d, f, v + T a, q + T v, with
+
+    f = (force - d v - gravity cos q - coupling (cos(q - other) a_other + sin(q - other) v_other^2)) / inertia
+
+whose Jacobian's second row is (-v/m, 0, -d/m, df/dq). The covariance is carried as its upper triangle (p11, p12, p13,
+p14, p22, p23, p24, p33, p34, p44); each of the three measurements (a, v, q) is a scalar update in Joseph form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.detection import StatusArray
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recording import FloatArray
+
+Covariance = tuple[float, float, float, float, float, float, float, float, float, float]
+
+_TEN = "UniTuple(float64, 10)"
+_FOUR = "UniTuple(float64, 4)"
+
+
+@kernel(f"{_TEN}({_TEN}, {', '.join(['float64'] * 8)})")
+def predict_covariance(
+    p: Covariance, f21: float, f23: float, f24: float, step: float, q_d: float, q_a: float, q_v: float, q_q: float
+) -> Covariance:
+    """F P F' + Q with F = [[1,0,0,0], [f21,0,f23,f24], [0,step,1,0], [0,0,step,1]], Q = diag(q_d, q_a, q_v, q_q)."""
+    p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
+    a1 = f21 * p11 + f23 * p13 + f24 * p14
+    a2 = f21 * p12 + f23 * p23 + f24 * p24
+    a3 = f21 * p13 + f23 * p33 + f24 * p34
+    a4 = f21 * p14 + f23 * p34 + f24 * p44
+    v3 = step * p23 + p33
+    q3 = step * p33 + p34
+    return (
+        p11 + q_d,
+        a1,
+        step * p12 + p13,
+        step * p13 + p14,
+        f21 * a1 + f23 * a3 + f24 * a4 + q_a,
+        step * a2 + a3,
+        step * a3 + a4,
+        step * (step * p22 + p23) + v3 + q_v,
+        step * v3 + step * p24 + p34,
+        step * q3 + step * p34 + p44 + q_q,
+    )
+
+
+@kernel(f"{_TEN}({_TEN}, {_FOUR}, {_FOUR}, float64)")
+def update_covariance(
+    p: Covariance,
+    column: tuple[float, float, float, float],
+    k: tuple[float, float, float, float],
+    innovation: float,
+) -> Covariance:
+    """Joseph form P - k c' - c k' + k k' S: c is P's column of the measured state, S the innovation's variance.
+
+    It holds for any k, also for one whose first part is forced to zero.
+    """
+    p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
+    c1, c2, c3, c4 = column
+    k1, k2, k3, k4 = k
+    return (
+        p11 - 2.0 * k1 * c1 + k1 * k1 * innovation,
+        p12 - k1 * c2 - c1 * k2 + k1 * k2 * innovation,
+        p13 - k1 * c3 - c1 * k3 + k1 * k3 * innovation,
+        p14 - k1 * c4 - c1 * k4 + k1 * k4 * innovation,
+        p22 - 2.0 * k2 * c2 + k2 * k2 * innovation,
+        p23 - k2 * c3 - c2 * k3 + k2 * k3 * innovation,
+        p24 - k2 * c4 - c2 * k4 + k2 * k4 * innovation,
+        p33 - 2.0 * k3 * c3 + k3 * k3 * innovation,
+        p34 - k3 * c4 - c3 * k4 + k3 * k4 * innovation,
+        p44 - 2.0 * k4 * c4 + k4 * k4 * innovation,
+    )
+
+
+@kernel(
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
+    f"Array(uint8, 1, 'C', readonly=True), {READ_ONLY}, {READ_ONLY}, {', '.join(['float64'] * 15)}, "
+    "float64[::1], uint8[::1])"
+)
+def run_arm_filter(
+    time: FloatArray,
+    force: FloatArray,
+    speed: FloatArray,
+    position: FloatArray,
+    other_position: FloatArray,
+    other_speed: FloatArray,
+    other_acceleration: FloatArray,
+    missing: StatusArray,
+    acceleration_time: FloatArray,
+    acceleration: FloatArray,
+    inertia: float,
+    viscous: float,
+    gravity: float,
+    coupling: float,
+    q_d: float,
+    q_a: float,
+    q_v: float,
+    q_q: float,
+    r_a: float,
+    r_v: float,
+    r_q: float,
+    initial_variance: float,
+    minimum_speed: float,
+    acceleration_hold: float,
+    glitch: float,
+    friction: FloatArray,
+    status: StatusArray,
+) -> None:
+    """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
+
+    `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is missing.
+    """
+    reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
+    samples = len(acceleration)
+    next_sample = 0
+    started = False
+    p: Covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    d, a, v, q = viscous, 0.0, 0.0, 0.0
+    now = last_speed_time = 0.0
+    last_acceleration_time = last_applicable = -np.inf
+    applicable = False
+    settled = 0.0
+    forward = True
+    against = 0
+    held = 0
+    bandwidth_scale = np.sqrt(q_d / (r_a + q_a)) / inertia
+    for k in range(len(time)):
+        seen = np.isfinite(speed[k]) and np.isfinite(position[k])
+        if started and time[k] - last_speed_time > 1.0:
+            started = False  # a long gap: nothing of the old state is worth keeping
+        if not started:
+            while next_sample < samples and acceleration_time[next_sample] <= time[k]:
+                if np.isfinite(acceleration[next_sample]):
+                    a = acceleration[next_sample]
+                    last_acceleration_time = acceleration_time[next_sample]
+                next_sample += 1
+            friction[k] = d
+            if not seen or missing[k]:
+                status[k] = 3
+                continue
+            started = True
+            d, v, q = viscous, speed[k], position[k]
+            p = (initial_variance, 0.0, 0.0, 0.0, r_a, 0.0, 0.0, r_v, 0.0, r_q)
+            settled = 0.0
+            last_applicable = -np.inf
+            forward = v > 0.0
+            against = 0
+            applicable = abs(v) >= minimum_speed
+            now = last_speed_time = time[k]
+            held = k
+            friction[k] = d
+            status[k] = 1 if applicable else 2
+            continue
+        while True:
+            # The next event: an accelerometer sample of its own time, else the speed's time.
+            own_sample = next_sample < samples and acceleration_time[next_sample] <= time[k]
+            until = acceleration_time[next_sample] if own_sample else time[k]
+            step = until - now
+            if step > 0.0:
+                sine, cosine = np.sin(q - other_position[held]), np.cos(q - other_position[held])
+                across, along = other_acceleration[held], other_speed[held] ** 2
+                known = force[held] - gravity * np.cos(q) - coupling * (cosine * across + sine * along)
+                by_angle = gravity * np.sin(q) - coupling * (cosine * along - sine * across)
+                drift = q_d * step if applicable else 0.0
+                p = predict_covariance(p, -v / inertia, -d / inertia, by_angle / inertia, step, drift, q_a, q_v, q_q)
+                d, a, v, q = d, (known - d * v) / inertia, v + step * a, q + step * v
+                now = until
+            if not own_sample:
+                break
+            sample = acceleration[next_sample]
+            if np.isfinite(sample) and step >= 0.0:
+                column = (p[1], p[4], p[5], p[6])
+                innovation = p[4] + r_a
+                k1 = column[0] / innovation if applicable else 0.0
+                gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
+                surprise = sample - a
+                d, a = d + gains[0] * surprise, a + gains[1] * surprise
+                v, q = v + gains[2] * surprise, q + gains[3] * surprise
+                p = update_covariance(p, column, gains, innovation)
+                last_acceleration_time = until
+            next_sample += 1
+        if seen:
+            applicable = abs(speed[k]) >= minimum_speed
+            column = (p[2], p[5], p[7], p[8])
+            innovation = p[7] + r_v
+            k1 = column[0] / innovation if applicable else 0.0
+            gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
+            surprise = speed[k] - v
+            d, a = d + gains[0] * surprise, a + gains[1] * surprise
+            v, q = v + gains[2] * surprise, q + gains[3] * surprise
+            p = update_covariance(p, column, gains, innovation)
+            column = (p[3], p[6], p[8], p[9])
+            innovation = p[9] + r_q
+            k1 = column[0] / innovation if applicable else 0.0
+            gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
+            surprise = position[k] - q
+            d, a = d + gains[0] * surprise, a + gains[1] * surprise
+            v, q = v + gains[2] * surprise, q + gains[3] * surprise
+            p = update_covariance(p, column, gains, innovation)
+            since = time[k] - last_speed_time
+            # Rough bandwidth: ready once its integral over time reaches 3.
+            if applicable:
+                against = against + 1 if (speed[k] > 0.0) != forward else 0
+                if against == reversal_samples:
+                    forward = not forward
+                    against = 0
+                    settled = 0.0  # after a rebound the estimate has the wrong sign for a while
+                settled += bandwidth_scale * abs(speed[k]) * np.sqrt(since)
+                last_applicable = time[k]
+            elif time[k] - last_applicable > glitch:
+                settled = 0.0
+            last_speed_time = time[k]
+        held = k
+        friction[k] = d
+        if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
+            status[k] = 3
+        elif not applicable:
+            status[k] = 2
+        elif settled < 3.0:
+            status[k] = 1

@@ -1,0 +1,134 @@
+"""Machines whose joints move one another: what a planar arm and a robot from a URDF share.
+
+M(q) a + C(q, v) v + g(q) + friction = tau - tau_c (thesis 2.4, friction added), tau_c = J_c' F_c (2.5): what the machine
+exerts on the obstacle. C is the matrix of Christoffel symbols, so that dM/dt = C + C'.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.dynamics import JointEquation
+from cdtool.machines.joint_machine import JointMachine
+from cdtool.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class CoupledMachine(JointMachine, ABC):
+    """Everything over whole recordings at once: position, speed, acceleration and torque are (n, J), load side."""
+
+    coupled: ClassVar[bool] = True
+    default_sides: ClassVar[str] = "two"  # which side of a link a contact is on is not known
+    derives_position: ClassVar[bool] = False
+
+    @abstractmethod
+    def momentum_terms(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """p = M v, C'v and g, each (n, J): momentum [N m s, N s] and torques [N m, N]."""
+
+    @abstractmethod
+    def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        """M a + C v + g (n, J) [N m, N]."""
+
+    @abstractmethod
+    def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
+        """M x (n, J)."""
+
+    @abstractmethod
+    def inertia_matrix(self, position: FloatArray) -> FloatArray:
+        """M (n, J, J), drives included."""
+
+    @abstractmethod
+    def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Kinetic and potential energy, each (n,) [J]."""
+
+    @abstractmethod
+    def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
+        """J_c (n, 6, J) of a point fixed to a link, in its frame [m]: linear, then angular velocity in the base (2.2)."""
+
+    def momentum(self, position: FloatArray, speed: FloatArray) -> FloatArray:
+        """p = M v (n, J), thesis 2.16."""
+        return self.inertia_times(position, speed)
+
+    def velocity_force(self, position: FloatArray, speed: FloatArray) -> FloatArray:
+        """C'v (n, J) = the derivative of the kinetic energy by q."""
+        return self.momentum_terms(position, speed)[1]
+
+    def gravity(self, position: FloatArray) -> FloatArray:
+        """g (n, J): what the drives must give to hold the machine."""
+        return self.momentum_terms(position, np.zeros_like(position))[2]
+
+    def kinetic_energy(self, position: FloatArray, speed: FloatArray) -> FloatArray:
+        """v'M v / 2 (n,) [J]."""
+        return self.energies(position, speed)[0]
+
+    def potential_energy(self, position: FloatArray) -> FloatArray:
+        """Sum of m g h (n,) [J]; h above the base."""
+        return self.energies(position, np.zeros_like(position))[1]
+
+    def contact_torque(
+        self, position: FloatArray, force: FloatArray, link: str, point: tuple[float, float, float]
+    ) -> FloatArray:
+        """tau_c = J_c' F_c (n, J), thesis 2.5; `force` (n, 6): force and moment that the machine exerts, base axes."""
+        jacobian = self.contact_jacobian(position, link, point)
+        return np.asarray(np.einsum("nij,ni->nj", jacobian, force))
+
+    def contact_force(
+        self, position: FloatArray, residual: FloatArray, link: str, point: tuple[float, float, float]
+    ) -> FloatArray:
+        """The force (n, 3) [N] at a known point that explains a joint residual best, by least squares over J_c' F = res.
+
+        Of the force only what moves the joints can be seen: in a direction in which the point cannot move it is 0.
+        """
+        jacobian = self.contact_jacobian(position, link, point)[:, :3]
+        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1)), residual))
+
+    def require_inertia(self, who: str) -> None:
+        """A coupled machine always has its inertia."""
+
+    def momentum_balance(
+        self, torque: FloatArray, position: FloatArray, speed: FloatArray, velocity: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """(tau - g + C'w - friction, p = M w), both (n, J): thesis 2.17 with beta = g - C'w + friction."""
+        momentum, velocity_force, gravity = self.momentum_terms(position, velocity)
+        velocity_force -= gravity
+        velocity_force += torque
+        return self.minus_friction(velocity_force, speed, velocity), momentum
+
+    def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
+        """tau - C v - g - friction (n, J)."""
+        rest = torque - self.inverse_dynamics(position, speed, np.zeros_like(speed))
+        return self.minus_friction(rest, speed, speed)
+
+    def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
+        """M a + C v + g + friction (n, J)."""
+        return self.inverse_dynamics(position, speed, acceleration) + self.friction(speed)
+
+    def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:
+        """v'(tau - friction) of all joints together (n, 1) [W]."""
+        power: FloatArray = np.sum(super().drive_power(torque, speed), axis=1, keepdims=True)
+        return power
+
+    def energy(self, position: FloatArray, speed: FloatArray) -> FloatArray:
+        """Kinetic and potential energy (n, 1) [J]."""
+        kinetic, potential = self.energies(position, speed)
+        return (kinetic + potential)[:, np.newaxis]
+
+    def joint_equations(
+        self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray
+    ) -> list[JointEquation]:
+        """M_jj a_j = tau_j - (C v + g)_j - sum over the others M_ji a_i - d v_j: the other joints are measured."""
+        own = np.zeros_like(speed)
+        force = self.minus_friction(torque - self.inverse_dynamics(position, speed, own), speed, own)
+        inertia = self.inertia_matrix(position)
+        coupling = np.einsum("nji,ni->nj", inertia, acceleration)
+        equations = []
+        for j in range(len(self.joints)):
+            diagonal = np.ascontiguousarray(inertia[:, j, j])
+            known = np.ascontiguousarray(force[:, j] - coupling[:, j] + diagonal * acceleration[:, j])
+            viscous = self.viscous_friction[j] / self.transmission_ratio[j] ** 2
+            equations.append(JointEquation(diagonal, known, viscous))
+        return equations

@@ -1,0 +1,190 @@
+"""What every machine with joints shares: names, drives, friction, and how a log is referred to the load side.
+
+With the transmission ratio r = dx/dtheta (load travel per motor angle) a motor torque tau drives the load with tau / r,
+and the motor's inertia J_m weighs J_m / r^2 there; position = r theta + offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cdtool.clock import differentiate, integrate, previous_value
+from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.tables import Table
+
+LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
+ROTARY_UNITS = {"torque": "N m", "speed": "rad/s", "position": "rad", "acceleration": "rad/s2"}
+_MOTOR_UNITS = {"torque": "N m", "speed": "rad/s", "position": "rad"}
+_COORDINATES = ("motor", "load")
+
+
+@dataclass(frozen=True)
+class JointMachine:
+    """Parameters as in machine.toml, one value a joint; friction at the motor with coordinates "motor", else at the load.
+
+    `coordinates`: "motor" where logs hold motor torque, angle and speed, "load" where they hold the load's.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    coordinates: str
+    motor_inertia: tuple[float, ...]
+    transmission_ratio: tuple[float, ...]
+    position_offset: tuple[float, ...]
+    viscous_friction: tuple[float, ...]
+    coulomb_friction: tuple[float, ...]
+    coulomb_slope: tuple[float, ...]
+    constant_force: tuple[float, ...]
+    stick_speed: tuple[float, ...]
+
+    default_sides: ClassVar[str] = "one"
+    coordinates_by_default: ClassVar[str] = "motor"
+    derives_position: ClassVar[bool] = True
+    ratio_unit: ClassVar[str] = "rad/rad"
+
+    @classmethod
+    def drive_keys(cls, table: Table, default_joints: tuple[str, ...] = ()) -> dict[str, Any]:
+        """The keys of [machine] that every machine has; raises ConfigurationError naming the key."""
+        joints = table.texts("joints", default_joints or (table.text("name", "axis"),))
+        if len(set(joints)) != len(joints):
+            raise table.fault("joints", "names a joint twice", "joint names must differ")
+        count = len(joints)
+        coordinates = table.choice("coordinates", _COORDINATES, cls.coordinates_by_default)
+        if coordinates == "load":
+            for key in ("motor_inertia", "transmission_ratio"):
+                if key in table:
+                    raise table.fault(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
+            motor = ratio = None
+        else:
+            motor = table.numbers("motor_inertia", count, 0.0, minimum=0.0)
+            ratio = table.numbers("transmission_ratio", count)
+            if any(item == 0.0 for item in ratio):
+                raise table.fault("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
+        return {
+            "name": table.text("name", "axis"),
+            "joints": joints,
+            "coordinates": coordinates,
+            "motor_inertia": motor or (0.0,) * count,
+            "transmission_ratio": ratio or (1.0,) * count,
+            "position_offset": table.numbers("position_offset", count, 0.0),
+            "viscous_friction": table.numbers("viscous_friction", count, 0.0, minimum=0.0),
+            "coulomb_friction": table.numbers("coulomb_friction", count, 0.0, minimum=0.0),
+            "coulomb_slope": table.numbers("coulomb_slope", count, 0.0, minimum=0.0),
+            "constant_force": table.numbers("constant_force", count, 0.0),
+            "stick_speed": table.numbers("stick_speed", count, 1e-3, above=0.0),
+        }
+
+    @property
+    def load_units(self) -> dict[str, str]:
+        """Units of torque, speed, position and acceleration on the load side."""
+        return ROTARY_UNITS
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of a contact force or torque on the load side."""
+        return self.load_units["torque"]
+
+    @property
+    def speed_unit(self) -> str:
+        """Unit of the load's speed."""
+        return self.load_units["speed"]
+
+    @property
+    def reflected_inertia(self) -> FloatArray:
+        """(J,): the motors' inertias on the load side, J_m / r^2 [kg, kg m2]."""
+        inertia: FloatArray = np.array(self.motor_inertia) / np.array(self.transmission_ratio) ** 2
+        return inertia
+
+    def accepted_units(self, channel: str) -> tuple[str, ...]:
+        """SI units in which a log may hold a channel; the first is what a scaled raw value becomes."""
+        quantity = channel.removeprefix("reference_")
+        if channel in ("force",):
+            return ("N",)
+        if channel in ("label", "trigger"):
+            return ("1",)
+        load = self.load_units[quantity]
+        if quantity == "acceleration" or self.coordinates == "load":
+            return (load,)
+        motor = _MOTOR_UNITS[quantity]
+        return (motor,) if motor == load else (motor, load)
+
+    def referred_to_load(self, recording: Recording, speed_low_pass: float = 50.0) -> Recording:
+        """A recording as logged -> the same with every channel on the load side (apply it once).
+
+        A missing speed is derived causally from the position, and (but for robots, whose pose must be measured) a
+        missing position from the speed, a missing reference position from the reference speed. A finding says so.
+        """
+        channels = {name: self._referred(name, series) for name, series in recording.channels.items()}
+        findings = list(recording.findings)
+        if "speed" not in channels and "position" in channels:
+            channels["speed"] = differentiate(channels["position"], speed_low_pass, self.speed_unit)
+            text = (
+                f"not in the log: derived causally from position (two first-order low-passes at {speed_low_pass:g} Hz)"
+            )
+            findings.append(Finding(text, "speed", "note"))
+        if "position" not in channels and "speed" in channels and self.derives_position:
+            channels["position"] = integrate(channels["speed"], self.load_units["position"])
+            findings.append(Finding("not in the log: the speed, integrated from 0", "position", "note"))
+        if "reference_position" not in channels and "reference_speed" in channels and self.derives_position:
+            channels["reference_position"] = self._integrated_reference(channels)
+            text = "not in the log: the reference speed, integrated from the first position"
+            findings.append(Finding(text, "reference_position", "note"))
+        return replace(recording, channels=channels, findings=tuple(findings))
+
+    def _integrated_reference(self, channels: Mapping[str, Series]) -> Series:
+        speed = channels["reference_speed"]
+        travel = integrate(speed, self.load_units["position"])
+        start = np.nan_to_num(previous_value(channels["position"], speed.time[:1])) if "position" in channels else 0.0
+        return Series(travel.time, travel.values + start, travel.unit)
+
+    def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
+        """(n, J), `force` changed in place: what else acts on a joint, less its friction and constant force.
+
+        Viscous friction acts on `velocity`. Dry friction is Coulomb tanh(slope v) where a slope is given [s/m, s/rad];
+        else it is sign(v) Coulomb, and below the stick speed it balances the force as far as it reaches, so that a
+        resting machine under static torque leaves no residual.
+        """
+        for j in range(len(self.joints)):
+            ratio = self.transmission_ratio[j]
+            column = force[:, j]
+            # In place: on long logs the time goes into fresh memory, not into arithmetic.
+            if self.viscous_friction[j]:
+                column -= velocity[:, j] * (self.viscous_friction[j] / ratio**2)
+            if self.constant_force[j]:
+                column -= self.constant_force[j] / ratio
+            coulomb = self.coulomb_friction[j] / abs(ratio)
+            if coulomb and self.coulomb_slope[j]:
+                column -= coulomb * np.tanh(self.coulomb_slope[j] * speed[:, j])
+            elif coulomb:
+                sticking = np.clip(column, -coulomb, coulomb)
+                sliding = coulomb * np.sign(speed[:, j])
+                column -= np.where(np.abs(speed[:, j]) > self.stick_speed[j], sliding, sticking)
+        return force
+
+    def friction(self, speed: FloatArray) -> FloatArray:
+        """(n, J): viscous, dry and constant friction while moving [N, N m]; at rest the constant force alone."""
+        return -self.minus_friction(np.zeros_like(speed), speed, speed)
+
+    def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:
+        """v (tau - friction) of each joint (n, J) [W]."""
+        power = self.minus_friction(torque.copy(), speed, speed)
+        power *= speed
+        return power
+
+    def _referred(self, channel: str, series: Series) -> Series:
+        quantity = channel.removeprefix("reference_")
+        target = self.load_units.get(quantity)
+        if target is None or quantity == "acceleration":
+            return series
+        ratio, offset = np.array(self.transmission_ratio), np.array(self.position_offset)
+        values = series.values
+        # In motor coordinates a log may still hold some channels on the load side already.
+        if self.coordinates == "motor" and series.unit == _MOTOR_UNITS[quantity]:
+            values = values / ratio if quantity == "torque" else values * ratio
+        if quantity == "position" and offset.any():
+            values = values + offset
+        return series if values is series.values else Series(series.time, values, target)
