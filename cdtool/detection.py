@@ -44,6 +44,7 @@ class Signal:
     `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive
     always opposes the motion. `joints` names the columns: the machine's joints, those of them that are watched, or one
     name for a signal of the whole machine. A detector may leave it empty: then they are the recording's joints.
+    `notes`: what a user should know of how the signal came about.
     """
 
     time: FloatArray
@@ -52,6 +53,7 @@ class Signal:
     unit: str
     signed: bool = True
     joints: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def valid(self) -> BoolArray:

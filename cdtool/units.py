@@ -58,6 +58,8 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m", 1.0),
     "mN m": Unit("N m", 1e-3),
     "kN m": Unit("N m", 1e3),
+    # a channel of a robot with joints of both kinds: rad or m, N m or N ... each joint's own
+    "SI": Unit("SI", 1.0),
     # what a drive reports; a scale leads from here to a torque or a force
     "A": Unit("A", 1.0),
     "mA": Unit("A", 1e-3),

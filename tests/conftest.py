@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cdtool.machines.linear_axis import LinearAxis
+from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import Recording
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
@@ -29,6 +30,29 @@ def machine_of(values: dict[str, object]) -> LinearAxis:
     return machine
 
 
+ARM = {
+    "coordinates": "motor",
+    "link_mass": [1.3, 1.6],
+    "link_length": 0.30,
+    "centre_of_mass": [0.14, 0.18],
+    "link_inertia": [0.012, 0.018],
+    "motor_inertia": 1.5e-5,
+    "transmission_ratio": 1.0 / 60.0,
+    "viscous_friction": 0.4 / 60.0**2,
+    "imu_position": [0.22, 0.20],
+}
+
+
+def arm_of(values: dict[str, object]) -> PlanarArm:
+    """A planar arm from the keys of its [machine] table."""
+    return PlanarArm.from_table(Table(values, "machine.toml", "machine."))
+
+
+@pytest.fixture(scope="session")
+def arm() -> PlanarArm:
+    return arm_of(ARM)
+
+
 @pytest.fixture(scope="session")
 def gate() -> LinearAxis:
     return machine_of(GATE)
@@ -42,7 +66,8 @@ def simulated() -> Callable[[str, int], Recording]:
     def make(kind: str, seed: int) -> Recording:
         if (kind, seed) not in kept:
             run = simulate_gate_run(GateParameters(), np.random.default_rng([99, seed]), kind)  # type: ignore[arg-type]
-            kept[kind, seed] = replace(as_recording(run, f"{kind}{seed}", GateParameters()), digest=f"{kind}{seed}")
+            recording = machine_of(GATE).referred_to_load(as_recording(run, f"{kind}{seed}", GateParameters()))
+            kept[kind, seed] = replace(recording, digest=f"{kind}{seed}", findings=())
         return kept[kind, seed]
 
     return make

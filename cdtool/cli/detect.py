@@ -101,6 +101,7 @@ def detect(
     else:
         _show([pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)])
         _show_not_judged([detection for _, found in done for detection in found.detections])
+        _show_notes([detection for _, found in done for detection in found.detections])
         for log, _ in done:
             if log in plot_names:
                 typer.echo(f"plot written to {plain(plot_names[log])}")
@@ -156,6 +157,13 @@ def _rows_of(detection: Detection, matching: Matching) -> list[tuple[object, ...
     return rows
 
 
+def _show_notes(detections: list[Detection]) -> None:
+    """What a detector wants to be known of its signal, of as many operations as for what could not be judged."""
+    for detection in detections[:_SHOWN]:
+        for note in detection.statistic.notes:
+            typer.echo(f"{plain(detection.operation.name)}: {plain(note)}")
+
+
 def _show_not_judged(detections: list[Detection]) -> None:
     """What share of an operation could not be judged, and when, where and why in its longest stretches."""
     shown = [detection for detection in detections if detection.statistic.shares()]
@@ -203,5 +211,6 @@ def _as_json(log: Path, found: Detected, detection: Detection, matching: Matchin
         ],
         "not_judged": detection.statistic.shares(),
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
+        "notes": list(detection.statistic.notes),
         "findings": [str(item) for item in found.recording.findings],
     }

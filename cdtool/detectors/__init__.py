@@ -12,6 +12,11 @@ DETECTORS = Registry(
         "momentum": "cdtool.detectors.momentum:Momentum",
         "inertial_momentum": "cdtool.detectors.inertial_momentum:InertialMomentum",
         "friction_ekf": "cdtool.detectors.friction_ekf:FrictionEkf",
+        "direct": "cdtool.detectors.direct:Direct",
+        "desired_dynamics": "cdtool.detectors.desired_dynamics:DesiredDynamics",
+        "energy": "cdtool.detectors.energy:Energy",
+        "velocity": "cdtool.detectors.velocity:Velocity",
+        "kalman_momentum": "cdtool.detectors.kalman_momentum:KalmanMomentum",
     },
     short_names={
         "pt": "pure_torque",
@@ -19,5 +24,10 @@ DETECTORS = Registry(
         "gm": "momentum",
         "igm": "inertial_momentum",
         "feekf": "friction_ekf",
+        "dd": "direct",
+        "ddd": "desired_dynamics",
+        "eo": "energy",
+        "vo": "velocity",
+        "kmo": "kalman_momentum",
     },
 )

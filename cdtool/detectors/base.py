@@ -107,7 +107,7 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
 
 def for_every_joint(missing: BoolArray) -> BoolArray:
     """(n, J): True for all joints of a sample where it is for one."""
-    return np.broadcast_to(np.any(missing, axis=1, keepdims=True), missing.shape)
+    return np.repeat(np.any(missing, axis=1, keepdims=True), missing.shape[1], axis=1)
 
 
 def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:

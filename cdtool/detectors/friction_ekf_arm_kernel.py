@@ -112,7 +112,7 @@ def run_arm_filter(
 ) -> None:
     """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
 
-    `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is missing.
+    `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is.
     """
     reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)

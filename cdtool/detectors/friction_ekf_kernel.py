@@ -103,7 +103,8 @@ def run_filter(
 ) -> None:
     """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
 
-    `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not; `missing`: force or speed is missing.
+    `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not;
+    `missing`: force or speed is missing.
     """
     reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)

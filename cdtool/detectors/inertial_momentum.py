@@ -31,10 +31,11 @@ _STANDSTILL_AT_LEAST = 0.1
 class InertialMomentum:
     """Complementary filter w = (s a + (k1 s + k2) v) / (s2 + k1 s + k2) a joint, then the momentum observer on w.
 
-    Source: thesis 6.3-6.5, 6.27-6.32, where the left sides are speeds and one 1/s is missing; k1 = 2 zeta w_c, k2 = w_c^2. Needs: torque, speed,
-    acceleration. Unit: N or N m. Start-up: the longer of 3/K and, without a standstill at the start that shows the
-    accelerometer's bias, 3 over the filter's slowest pole. Fails: w_c above the drive's resonance pulls the estimate
-    back to the late motor speed; w_c below 3 rad/s lets the bias drift in.
+    Source: thesis 6.3-6.5 and 6.27-6.32, whose left sides are speeds and of which the latter lack one 1/s; k1 = 2 zeta
+    w_c, k2 = w_c^2. Needs: torque, speed, acceleration (and position, where joints are coupled). Unit: N or N m.
+    Start-up: the longer of 3/K and, without a standstill at the start that shows the accelerometer's bias, 3 over the
+    filter's slowest pole. Fails: w_c above the drive's resonance pulls the estimate back to the late motor speed; w_c
+    below 3 rad/s lets the bias drift in.
     """
 
     bandwidth: float = gain(10.0, "rad/s", "observer gain K")

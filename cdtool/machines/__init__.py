@@ -10,5 +10,6 @@ MACHINES = Registry(
         "linear_axis": "cdtool.machines.linear_axis:LinearAxis",
         "rotary_axis": "cdtool.machines.rotary_axis:RotaryAxis",
         "planar_arm": "cdtool.machines.planar_arm:PlanarArm",
+        "urdf_robot": "cdtool.machines.urdf_robot:UrdfRobot",
     },
 )

@@ -24,8 +24,8 @@ class PlanarArm(CoupledMachine):
     T1 = M11 a1 + h cos(q2 - q1) a2 - h sin(q2 - q1) v2^2 + g1 cos q1
     T2 = h cos(q2 - q1) a1 + M22 a2 + h sin(q2 - q1) v1^2 + g2 cos q2
 
-    with M11 = J1 + m1 lG1^2 + m2 l1^2 + Ja1/n1^2, M22 = J2 + m2 lG2^2 + Ja2/n2^2, h = m2 l1 lG2, g1 = (m2 l1 + m1 lG1) g,
-    g2 = m2 lG2 g and T_i = tau_mi / n_i. An inertial sensor on link i at `imu_position` measures the specific force
+    with M11 = J1 + m1 lG1^2 + m2 l1^2 + Ja1/n1^2, M22 = J2 + m2 lG2^2 + Ja2/n2^2, h = m2 l1 lG2, g1 = (m2 l1 + m1 lG1)
+    g, g2 = m2 lG2 g and T_i = tau_mi / n_i. An inertial sensor on link i at `imu_position` measures the specific force
     across the link: it becomes the link's angular acceleration, gravity and the elbow's acceleration taken off.
     """
 

@@ -10,6 +10,7 @@ from cdtool.detection import Status
 # The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8.
 _RED, _GREEN, _BLUE, _VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
 _ORANGE, _SKY, _BROWN = "#E69F00", "#56B4E9", "#8C613C"
+_NAVY, _OLIVE = "#332288", "#7A7A00"
 
 FORCE = "black"
 LIMIT = "0.25"
@@ -39,6 +40,11 @@ _KNOWN = {
     "pure_torque": Look(_BLUE, "s"),
     "momentum": Look(_VIOLET, "D"),
     "inertial_momentum": Look(_ORANGE, "v"),
+    "kalman_momentum": Look(_NAVY, ">"),
+    "velocity": Look(_SKY, "<"),
+    "energy": Look(_OLIVE, "p"),
+    "direct": Look(_BROWN, "X"),
+    "desired_dynamics": Look("0.35", "P"),
 }
 _OTHERS = (Look(_SKY, "P"), Look(_BROWN, "X"), Look("0.35", "p"), Look(_SKY, "<"), Look(_BROWN, ">"))
 

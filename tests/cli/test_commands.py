@@ -243,7 +243,10 @@ def test_an_unknown_output_is_refused_before_any_work(gate_folder, tmp_path):
 
 def test_listing_tells_detectors_with_gains_units_and_defaults():
     entries = {entry["name"]: entry for entry in json.loads(cdtool("list", "detectors", "--json").out)}
-    assert set(entries) == {"pure_torque", "pure_inertia", "momentum", "inertial_momentum", "friction_ekf"}
+    assert set(entries) == {
+        *("pure_torque", "pure_inertia", "momentum", "inertial_momentum", "friction_ekf"),
+        *("direct", "desired_dynamics", "energy", "velocity", "kalman_momentum"),
+    }
     assert entries["momentum"]["short_name"] == "gm"
     assert entries["momentum"]["gains"][0]["default"] == 10.0 and entries["momentum"]["gains"][0]["unit"] == "rad/s"
     for kind in ("thresholds", "machines", "formats"):

@@ -2,19 +2,54 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cdtool.detectors
-from cdtool.detection import Status
+from cdtool.detection import WHOLE_MACHINE, Status
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
+from tests.motions import moving
+from tests.robots import JOINTS as ROBOT_JOINTS
+from tests.robots import six_joint_robot
 
 NAMES = DETECTORS.names()
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A machine and recordings of it: `free` and `hit` by seed."""
+
+    machine: Any
+    free: Callable[[int], Recording]
+    hit: Callable[[int], Recording]
+
+
+@pytest.fixture(scope="module", params=["gate: 1 joint", "arm: 2 joints", "robot: 6 joints"])
+def subject(request, tmp_path_factory) -> Subject:
+    """The simulated gate, and exact motions of a planar arm and of a robot with revolute and prismatic joints."""
+    if request.param.startswith("gate"):
+        simulated = request.getfixturevalue("simulated")
+        return Subject(
+            request.getfixturevalue("gate"), lambda seed: simulated("none", seed), lambda seed: simulated("stiff", seed)
+        )
+    if request.param.startswith("arm"):
+        machine = request.getfixturevalue("arm")
+    else:
+        pytest.importorskip("pinocchio")
+        machine = six_joint_robot(tmp_path_factory.mktemp("robot"))
+    contact = np.linspace(5.0, 2.0, len(machine.joints))
+    return Subject(
+        machine,
+        lambda seed: moving(machine, seconds=7.2, seed=seed, noise=1e-3),
+        lambda seed: moving(machine, seconds=7.2, seed=seed, noise=1e-3, contact=contact, contact_at=6.0),
+    )
 
 
 def needs_of(name: str) -> tuple[str, ...]:
@@ -23,6 +58,12 @@ def needs_of(name: str) -> tuple[str, ...]:
 
 def cut(recording: Recording, end: float) -> Recording:
     return recording.between(-np.inf, end)
+
+
+def needed(detector: Any, machine: Any) -> tuple[str, ...]:
+    """A model of coupled joints needs their pose as well."""
+    more = ("position",) if machine.coupled and len(detector.needs) > 1 and "torque" in detector.needs else ()
+    return tuple(dict.fromkeys((*detector.needs, *more)))
 
 
 def changed(recording: Recording, channel: str, values: np.ndarray) -> Recording:
@@ -53,9 +94,9 @@ def test_it_is_a_frozen_dataclass_whose_gains_have_default_unit_and_meaning(name
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("kind", ["stiff", "none"])
-def test_it_is_causal_its_output_on_a_prefix_is_the_prefix_of_its_output(name, kind, gate, simulated):
-    recording = simulated(kind, 1)
+@pytest.mark.parametrize("kind", ["hit", "free"])
+def test_it_is_causal_its_output_on_a_prefix_is_the_prefix_of_its_output(name, kind, subject):
+    recording, gate = getattr(subject, kind)(1), subject.machine
     detector = DETECTORS.load(name)()
     whole = detector.signal(recording, gate)
     for end in (0.0105, 0.4, 1.2345, 3.0, 6.02, 6.1):
@@ -67,13 +108,14 @@ def test_it_is_causal_its_output_on_a_prefix_is_the_prefix_of_its_output(name, k
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_causal_with_channels_at_rates_of_their_own(name, gate, simulated):
-    recording = simulated("stiff", 2)
+def test_it_is_causal_with_channels_at_rates_of_their_own(name, subject):
+    recording, gate = subject.hit(2), subject.machine
     slower = {
         "torque": recording["torque"].between(0.0003, 9.0),
         "acceleration": Series(
             recording["acceleration"].time[::3] + 0.0004, recording["acceleration"].values[::3], "m/s2"
         ),
+        "position": Series(recording["position"].time[::2] + 0.0002, recording["position"].values[::2], "m"),
     }
     recording = replace(recording, channels={**recording.channels, **slower})
     detector = DETECTORS.load(name)()
@@ -95,8 +137,8 @@ def test_it_never_reads_the_load_cell(name, gate, simulated):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_time_shift_changes_nothing_but_the_time(name, gate, simulated):
-    recording = simulated("soft", 1)
+def test_a_time_shift_changes_nothing_but_the_time(name, subject):
+    recording, gate = subject.hit(1), subject.machine
     shift = 512.0  # a power of two: the time steps keep their bits but for the last few
     moved = replace(
         recording,
@@ -109,9 +151,9 @@ def test_a_time_shift_changes_nothing_but_the_time(name, gate, simulated):
 
 
 @pytest.mark.parametrize(("name", "channel"), [(name, channel) for name in NAMES for channel in needs_of(name)])
-def test_missing_samples_are_masked_and_the_estimate_recovers(name, channel, gate, simulated):
+def test_missing_samples_are_masked_and_the_estimate_recovers(name, channel, subject):
     detector = DETECTORS.load(name)()
-    recording = simulated("none", 3)
+    recording, gate = subject.free(3), subject.machine
     values = recording[channel].values.copy()
     hole = slice(2500, 2700)
     values[hole] = np.nan
@@ -121,41 +163,42 @@ def test_missing_samples_are_masked_and_the_estimate_recovers(name, channel, gat
     inside = (holed.time >= 2.56) & (holed.time <= 2.69)
     assert not holed.valid[inside].any()
     assert set(np.unique(holed.status[inside])) <= {Status.GAP, Status.START_UP}
-    end = slice(5000, None)
+    end = slice(6000, None)
     assert holed.valid[end].mean() == pytest.approx(clean.valid[end].mean(), abs=0.01)
     spread = clean.values[clean.valid].std()
     assert np.abs(holed.values[end] - clean.values[end]).max() < 0.05 * spread
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_scattered_missing_samples_leave_the_other_samples_valid(name, gate, simulated):
+def test_scattered_missing_samples_leave_the_other_samples_valid(name, subject):
     detector = DETECTORS.load(name)()
-    recording = simulated("none", 4)
+    recording, gate = subject.free(4), subject.machine
+    judged = detector.signal(recording, gate).valid
     rng = np.random.default_rng(0)
     for channel in detector.needs:
         values = recording[channel].values.copy()
-        values[rng.random(len(values)) < 0.05] = np.nan
+        values[rng.random(len(values)) < 0.05] = np.nan  # all joints of a message at once
         recording = changed(recording, channel, values)
     signal = detector.signal(recording, gate)
     assert np.isfinite(signal.values[signal.valid]).all()
-    running = signal.time > 3.0
-    assert 0.8 < signal.valid[running].mean() < 0.97
+    judged[signal.time <= 3.0] = False
+    assert 0.8 < signal.valid[judged].mean() < 0.97
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_all_missing_channel_is_never_valid_and_never_crashes(name, gate, simulated):
-    detector = DETECTORS.load(name)()
-    for channel in detector.needs:
-        recording = simulated("none", 3)
+def test_an_all_missing_channel_is_never_valid_and_never_crashes(name, subject):
+    detector, gate = DETECTORS.load(name)(), subject.machine
+    for channel in needed(detector, gate):
+        recording = subject.free(3)
         blind = changed(recording, channel, np.full_like(recording[channel].values, np.nan))
         assert not detector.signal(blind, gate).valid.any()
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_absent_channel_is_an_error_that_names_it(name, gate, simulated):
-    detector = DETECTORS.load(name)()
-    for channel in detector.needs:
-        recording = simulated("none", 3)
+def test_an_absent_channel_is_an_error_that_names_it(name, subject):
+    detector, gate = DETECTORS.load(name)(), subject.machine
+    for channel in needed(detector, gate):
+        recording = subject.free(3)
         left = {n: s for n, s in recording.channels.items() if n != channel}
         with pytest.raises(RecordingError, match=channel):
             detector.signal(replace(recording, channels=left), gate)
@@ -163,11 +206,12 @@ def test_an_absent_channel_is_an_error_that_names_it(name, gate, simulated):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("samples", [0, 1, 2])
-def test_a_recording_of_hardly_any_samples_gives_a_signal_of_that_length(name, samples, gate, simulated):
-    recording = simulated("none", 3)
+def test_a_recording_of_hardly_any_samples_gives_a_signal_of_that_length(name, samples, subject):
+    recording, gate = subject.free(3), subject.machine
     short = {n: replace(s, time=s.time[:samples], values=s.values[:samples]) for n, s in recording.channels.items()}
     signal = DETECTORS.load(name)().signal(replace(recording, channels=short), gate)
-    assert signal.values.shape == signal.status.shape == (samples, 1)
+    columns = 1 if signal.joints == WHOLE_MACHINE else len(gate.joints)
+    assert signal.values.shape == signal.status.shape == (samples, columns)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -187,7 +231,7 @@ def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(n
 
     def pair(first: Recording, second: Recording, joints: tuple[str, str]) -> Recording:
         channels = {}
-        for channel in ("torque", "speed", "position", "acceleration"):
+        for channel in first.without_ground_truth().channels:
             values = np.hstack((first[channel].values[:n], second[channel].values[:n]))
             channels[channel] = Series(first[channel].time[:n], values, first[channel].unit)
         return Recording("pair", "pair", joints, channels)
@@ -201,3 +245,43 @@ def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(n
     np.testing.assert_array_equal(both.values[:, 0], one.values[:n, 0])
     np.testing.assert_array_equal(both.values, swapped.values[:, ::-1])
     np.testing.assert_array_equal(both.status, swapped.status[:, ::-1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_order_of_a_robots_joints_does_not_matter(name, tmp_path):
+    pytest.importorskip("pinocchio")
+    order = [3, 0, 5, 1, 4, 2]
+    straight, mixed = six_joint_robot(tmp_path), six_joint_robot(tmp_path, [ROBOT_JOINTS[i] for i in order])
+    recording = moving(straight, seconds=3.0, noise=1e-3, contact=np.arange(1.0, 7.0), contact_at=2.0)
+    channels = {n: replace(s, values=s.values[:, order]) for n, s in recording.channels.items()}
+    permuted = replace(recording, joints=mixed.joints, channels=channels)
+    detector = DETECTORS.load(name)()
+    one, other = detector.signal(recording, straight), detector.signal(permuted, mixed)
+    columns = slice(None) if one.joints == WHOLE_MACHINE else order
+    scale = np.abs(one.values).max()
+    np.testing.assert_allclose(other.values, one.values[:, columns], rtol=1e-9, atol=1e-9 * scale)
+    np.testing.assert_array_equal(other.status, one.status[:, columns])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_jittering_clock_changes_the_signal_little(name, subject):
+    recording = subject.hit(5)
+    rng = np.random.default_rng(1)
+    steps = rng.uniform(0.7, 1.3, len(recording["speed"])) * 1e-3
+    clock = np.minimum(np.cumsum(steps), recording.end)
+    clock = clock[np.concatenate(([True], np.diff(clock) > 0.0))]
+    # Sampled at other instants, not the same samples with wrong stamps.
+    jittered = {
+        n: Series(clock, np.column_stack([np.interp(clock, s.time, column) for column in s.values.T]), s.unit)
+        for n, s in recording.channels.items()
+        if n not in GROUND_TRUTH
+    }
+    detector = DETECTORS.load(name)()
+    even = detector.signal(recording, subject.machine)
+    uneven = detector.signal(replace(recording, channels=jittered), subject.machine)
+    at = np.searchsorted(clock, even.time[2000:6900])
+    steady = even.valid[2000:6900] & uneven.valid[at]
+    assert steady.mean() > 0.5
+    difference = (uneven.values[at] - even.values[2000:6900])[steady]
+    measured = np.ptp(even.values[2000:6900][steady])
+    assert np.sqrt(np.mean(difference**2)) < 0.05 * measured

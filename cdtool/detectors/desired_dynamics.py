@@ -1,0 +1,100 @@
+"""Derivation from desired dynamics: the torque given against the torque that the reference motion would need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.clock import previous_value
+from cdtool.detection import Signal, Status
+from cdtool.detectors.base import for_every_joint, gain, hold_last, require_channels, require_positive
+from cdtool.detectors.filters import low_pass, polynomial_rates, settling_time, started_at
+from cdtool.dynamics import Machine
+from cdtool.recording import BoolArray, FloatArray, Recording
+
+# The reference's rates come from a cubic through this many of its last samples.
+_SAMPLES = 21
+
+
+@dataclass(frozen=True)
+class DesiredDynamics:
+    """res = LP{tau - M(q_ref) a_ref - C v_ref - g(q_ref) - friction(v_ref)} (thesis 2.8, friction added).
+
+    v_ref and a_ref come from the reference alone: a causal cubic through its last samples. Needs: torque, position,
+    reference_position (a reference_speed is used where it is logged). Unit N or N m, positive where the contact opposes
+    positive travel. The tracking error q_ref - q is told with the signal; where it exceeds `tracking_limit` the method
+    is not applicable, since q_ref no longer stands for q (2.7). Start-up: the low-pass, as for the direct derivation.
+    Fails: a soft controller or an elastic drive, whose real acceleration is not the reference's: every start and stop
+    shows; after a contact the error grows, and the method goes blind when it exceeds the limit.
+    """
+
+    cutoff: float = gain(5.0, "Hz", "cut-off frequency of the low-pass")
+    tracking_limit: float = gain(0.05, "m", "tracking error beyond which the method is not applicable (rad: robots)")
+
+    name: ClassVar[str] = "desired_dynamics"
+    short_name: ClassVar[str] = "ddd"
+    title: ClassVar[str] = "Derivation from desired dynamics"
+    needs: ClassVar[tuple[str, ...]] = ("torque", "position", "reference_position")
+    signed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        require_positive(self, "cutoff", "tracking_limit")
+
+    def unit(self, machine: Machine) -> str:
+        """N or N m."""
+        return machine.force_unit
+
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
+        """Residual (n, J) on the reference's clock; raises RecordingError where a channel is absent."""
+        require_channels(self, recording, machine)
+        machine.require_inertia(self.name)
+        reference = recording["reference_position"]
+        time = reference.time
+        torque = previous_value(recording["torque"], time)
+        error = reference.values - previous_value(recording["position"], time)
+        speed, acceleration = _rates(recording)
+        motion_missing = ~np.isfinite(reference.values + speed + acceleration)
+        missing = motion_missing | ~np.isfinite(torque) | ~np.isfinite(error)
+        if machine.coupled:
+            motion_missing, missing = for_every_joint(motion_missing), for_every_joint(missing)
+        pose, speed, acceleration = (
+            hold_last(item, ~np.isfinite(item)) for item in (reference.values, speed, acceleration)
+        )
+        needed = machine.required_torque(pose, speed, acceleration)
+        held = hold_last(torque, ~np.isfinite(torque))
+        residual, _ = low_pass(time, held - needed, motion_missing, self.cutoff)
+        settle = settling_time(self.cutoff)
+        started = started_at(time, motion_missing, settle)
+        status = np.where(time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
+        lost = np.abs(np.nan_to_num(error)) > self.tracking_limit
+        status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE
+        status[missing] = Status.GAP
+        notes = _tracking_notes(error, recording.joints, machine.load_units["position"])
+        return Signal(time, residual, status, self.unit(machine), self.signed, notes=notes)
+
+
+def _rates(recording: Recording) -> tuple[FloatArray, FloatArray]:
+    """The reference's speed and acceleration (n, J) on the reference position's clock."""
+    reference = recording["reference_position"]
+    if "reference_speed" not in recording:
+        return polynomial_rates(reference.time, reference.values, _SAMPLES)
+    logged = recording["reference_speed"]
+    acceleration, _ = polynomial_rates(logged.time, logged.values, _SAMPLES)
+    held = previous_value(logged, reference.time)
+    if acceleration.shape == held.shape and np.array_equal(logged.time, reference.time):
+        return held, acceleration
+    at = np.searchsorted(logged.time, reference.time, side="right") - 1
+    known: BoolArray = np.isfinite(held) & (at >= 0)[:, np.newaxis]
+    return held, np.where(known, acceleration[np.maximum(at, 0)], np.nan)
+
+
+def _tracking_notes(error: FloatArray, joints: tuple[str, ...], unit: str) -> tuple[str, ...]:
+    notes = []
+    for joint, column in zip(joints, error.T, strict=True):
+        known = column[np.isfinite(column)]
+        if len(known):
+            rms, largest = float(np.sqrt(np.mean(known**2))), float(np.abs(known).max())
+            notes.append(f"tracking error of {joint}: rms {rms:.3g} {unit}, largest {largest:.3g} {unit}")
+    return tuple(notes)

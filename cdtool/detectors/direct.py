@@ -1,0 +1,57 @@
+"""Direct derivation: the contact torque straight from the equation of motion, every term through one low-pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.detection import Signal, Status
+from cdtool.detectors.base import drive_on_speed_clock, for_every_joint, gain, require_channels, require_positive
+from cdtool.detectors.filters import low_pass, settling_time, started_at
+from cdtool.dynamics import Machine
+from cdtool.recording import Recording
+
+
+@dataclass(frozen=True)
+class Direct:
+    """res = LP{tau - C v - g - friction} - M(q) s LP{v} (thesis 2.6, friction added).
+
+    Every term goes through the same second-order Butterworth low-pass, and the acceleration is that filter's own rate:
+    nothing is differenced. With a first-order low-pass and a constant M this is the momentum observer. Needs: torque,
+    speed (and position, where joints are coupled). Unit N or N m, positive where the contact opposes positive travel.
+    Start-up 3 over the real part of the filter's poles. Fails: noise of the speed grows with `cutoff` times the
+    inertia; where M changes within the filter's memory the terms no longer match.
+    """
+
+    cutoff: float = gain(5.0, "Hz", "cut-off frequency of the low-pass")
+
+    name: ClassVar[str] = "direct"
+    short_name: ClassVar[str] = "dd"
+    title: ClassVar[str] = "Direct derivation"
+    needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
+    signed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        require_positive(self, "cutoff")
+
+    def unit(self, machine: Machine) -> str:
+        """N or N m."""
+        return machine.force_unit
+
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
+        """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        require_channels(self, recording, machine)
+        machine.require_inertia(self.name)
+        drive = drive_on_speed_clock(recording, machine)
+        balance = machine.force_balance(drive.torque, drive.position, drive.speed)
+        filtered, _ = low_pass(drive.time, balance, drive.speed_missing, self.cutoff)
+        _, acceleration = low_pass(drive.time, drive.speed, drive.speed_missing, self.cutoff)
+        residual = filtered - machine.inertia_times(drive.position, acceleration)
+        settle = settling_time(self.cutoff)
+        started = started_at(drive.time, drive.speed_missing, settle)
+        status = np.where(drive.time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
+        missing = for_every_joint(drive.missing) if machine.coupled else drive.missing
+        status[missing] = Status.GAP
+        return Signal(drive.time, residual, status, self.unit(machine), self.signed)

@@ -1,0 +1,70 @@
+"""Energy observer: the power that a contact takes from the machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.detection import WHOLE_MACHINE, Signal, Status
+from cdtool.detectors.base import (
+    Drive,
+    drive_on_speed_clock,
+    for_every_joint,
+    gain,
+    observe_momentum,
+    require_channels,
+    require_positive,
+)
+from cdtool.dynamics import Machine
+from cdtool.recording import Recording
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Residual res = k / (s + k) v'tau_c of the machine's energy (thesis 2.9, 2.10 with the sign put right).
+
+    res = k [int (v'(tau - friction) - res) dt - (E - E(0))]: as printed, 2.9 tends to minus the contact's power. Needs:
+    torque, speed (and position, where joints are coupled). Unit W, positive where the contact takes power. One signal
+    for the whole machine; joints that are not coupled have one each. Start-up 3 / k. Not applicable below
+    `minimum_speed` (the norm of all speeds): a contact takes no power from a machine at rest. Fails: a force across the
+    motion; a slow joint beside fast ones; friction that the machine file does not know.
+    """
+
+    bandwidth: float = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
+    minimum_speed: float = gain(0.03, "m/s", "below it the observer is not applicable; norm of the joints' speeds")
+
+    name: ClassVar[str] = "energy"
+    short_name: ClassVar[str] = "eo"
+    title: ClassVar[str] = "Energy observer"
+    needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
+    signed: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        require_positive(self, "bandwidth", "minimum_speed")
+
+    def unit(self, machine: Machine) -> str:  # noqa: ARG002 - the contract hands the machine over
+        """W."""
+        return "W"
+
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
+        """Power taken by a contact (n, 1), or (n, J) of uncoupled joints; raises RecordingError."""
+        require_channels(self, recording, machine)
+        machine.require_inertia(self.name)
+        drive = drive_on_speed_clock(recording, machine)
+        power = machine.drive_power(drive.torque, drive.speed)
+        energy = machine.energy(drive.position, drive.speed)
+        # From the first sample on: a potential energy may be large, and only its changes count.
+        energy = energy - energy[:1]
+        speed = np.abs(drive.speed)
+        missing, motion_missing = drive.missing, drive.speed_missing
+        if machine.coupled:
+            speed = np.linalg.norm(speed, axis=1, keepdims=True)
+            missing, motion_missing = (for_every_joint(item)[:, :1] for item in (missing, motion_missing))
+        alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing)
+        ready = np.full(energy.shape[1], -np.inf)
+        residual, status = observe_momentum(alone, power, energy, self.bandwidth, ready)
+        status[(status == Status.VALID) & (speed < self.minimum_speed)] = Status.NOT_APPLICABLE
+        names = WHOLE_MACHINE if machine.coupled else ()
+        return Signal(drive.time, residual, status, self.unit(machine), self.signed, names)

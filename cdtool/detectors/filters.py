@@ -1,0 +1,129 @@
+"""Causal filters that several detectors share: a second-order low-pass with its rate, and a local polynomial."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recording import BoolArray, FloatArray
+
+_READ_BOOL = "Array(b1, 1, 'C', readonly=True)"
+# Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
+_SETTLE = 3.0 * math.sqrt(2.0)
+
+
+def settling_time(cutoff: float) -> float:
+    """How long after a start the low-pass of `cutoff` [Hz] is not to be trusted [s]: 3 over its poles' real part."""
+    return _SETTLE / (2.0 * math.pi * cutoff)
+
+
+def low_pass(time: FloatArray, values: FloatArray, missing: BoolArray, cutoff: float) -> tuple[FloatArray, FloatArray]:
+    """Low-pass (n, J) of `values` (n, J) and its rate of change: y and s y with the same states, so that they match.
+
+    Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz], bilinear with the measured step
+    and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: the next step is longer. After
+    a gap longer than the settling time it starts anew, from rest at the first value.
+    """
+    filtered, rate = np.empty(values.shape), np.empty(values.shape)
+    for j in range(values.shape[1]):
+        column, lost = np.ascontiguousarray(values[:, j]), np.ascontiguousarray(missing[:, j])
+        _low_pass(time, column, lost, 2.0 * math.pi * cutoff, settling_time(cutoff), filtered[:, j], rate[:, j])
+    return filtered, rate
+
+
+def started_at(time: FloatArray, missing: BoolArray, longest_gap: float) -> FloatArray:
+    """(n, J): for each sample when its filter last started [s]; infinite before the first sample.
+
+    A filter starts with the first sample and again with the first one after a gap longer than `longest_gap` [s].
+    """
+    starts = np.empty(missing.shape)
+    for j in range(missing.shape[1]):
+        present = np.flatnonzero(~missing[:, j])
+        fresh = np.ones(len(present), dtype=bool)
+        fresh[1:] = np.diff(time[present]) > longest_gap
+        last = np.full(len(time), np.inf)
+        last[present[fresh]] = time[present[fresh]]
+        index = np.where(np.isfinite(last), np.arange(len(time)), -1)
+        index = np.maximum.accumulate(index) if len(index) else index
+        starts[:, j] = np.where(index >= 0, last[np.maximum(index, 0)], np.inf)
+    return starts
+
+
+def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
+    """First and second time derivative (n, J) of `values` at each sample, from a cubic through the last `samples`.
+
+    Least squares over the samples so far with their own times: Savitzky and Golay's filter (order 3) at its newest end,
+    for any sampling. NaN where fewer than 5 samples are known or a sample is missing.
+    """
+    first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
+    for j in range(values.shape[1]):
+        _polynomial_rates(time, np.ascontiguousarray(values[:, j]), samples, first[:, j], second[:, j])
+    return first, second
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {_READ_BOOL}, float64, float64, float64[:], float64[:])")
+def _low_pass(
+    time: FloatArray,
+    values: FloatArray,
+    missing: BoolArray,
+    cutoff: float,
+    longest_gap: float,
+    filtered: FloatArray,
+    rate: FloatArray,
+) -> None:
+    """x1' = x2, x2' = w^2 (u - x1) - sqrt(2) w x2, trapezoid; w prewarped: (2 / T) tan(w T / 2)."""
+    root = np.sqrt(2.0)
+    y = 0.0
+    slope = 0.0
+    last = -1
+    for k in range(len(time)):
+        if not missing[k]:
+            step = time[k] - time[last] if last >= 0 else np.inf
+            if step > longest_gap:
+                y = values[k]
+                slope = 0.0
+            else:
+                half = 0.5 * step
+                # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
+                w = np.tan(min(cutoff * half, 1.4)) / half
+                square = w * w
+                drive = half * square * (values[k] + values[last])
+                right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
+                right_y = y + half * slope
+                slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
+                y = right_y + half * slope
+            last = k
+        filtered[k] = y
+        rate[k] = slope
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, float64[:], float64[:])")
+def _polynomial_rates(
+    time: FloatArray, values: FloatArray, samples: int, first: FloatArray, second: FloatArray
+) -> None:
+    """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting."""
+    for k in range(len(time)):
+        start = max(0, k - samples + 1)
+        span = time[k] - time[start]
+        if k - start < 4 or not span > 0.0:
+            continue
+        matrix = np.zeros((4, 5))
+        for i in range(start, k + 1):
+            x = (time[i] - time[k]) / span
+            powers = (1.0, x, x * x, x * x * x)
+            for row in range(4):
+                for column in range(4):
+                    matrix[row, column] += powers[row] * powers[column]
+                matrix[row, 4] += powers[row] * (values[i] - values[k])
+        for pivot in range(4):
+            for row in range(pivot + 1, 4):
+                factor = matrix[row, pivot] / matrix[pivot, pivot]
+                for column in range(pivot, 5):
+                    matrix[row, column] -= factor * matrix[pivot, column]
+        cubic = matrix[3, 4] / matrix[3, 3]
+        square = (matrix[2, 4] - matrix[2, 3] * cubic) / matrix[2, 2]
+        linear = (matrix[1, 4] - matrix[1, 2] * square - matrix[1, 3] * cubic) / matrix[1, 1]
+        first[k] = linear / span
+        second[k] = 2.0 * square / (span * span)

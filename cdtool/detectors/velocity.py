@@ -1,0 +1,76 @@
+"""Velocity observer: a disturbance observer on the joints' speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.detection import Signal
+from cdtool.detectors.base import (
+    drive_on_speed_clock,
+    for_every_joint,
+    gain,
+    observe_momentum,
+    require_channels,
+    require_positive,
+)
+from cdtool.detectors.velocity_kernel import observe_velocity
+from cdtool.dynamics import Machine
+from cdtool.recording import Recording
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Residual res = (s I + K M^-1)^-1 K M^-1 tau_c (thesis 2.11-2.15; 2.12 gives d(xhat)/dt, not xhat).
+
+    d(vhat)/dt = M^-1 (tau - C v - g - friction - res), res = K (vhat - v). K = `bandwidth` times the diagonal of M at
+    the home pose: there, and where M does not change, it is as fast as a momentum observer of that bandwidth. Sampled
+    with M frozen over each step: res = A res + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T). Needs: torque,
+    speed (and position, where joints are coupled). Unit N or N m, positive where the contact opposes positive travel.
+    Start-up: until the slowest mode of K M^-1 has had 3 time constants. Fails: its bandwidth changes with the pose, and
+    what one joint feels leaks into the others while the estimate settles.
+    """
+
+    bandwidth: float = gain(10.0, "rad/s", "K over the diagonal of M at the home pose")
+
+    name: ClassVar[str] = "velocity"
+    short_name: ClassVar[str] = "vo"
+    title: ClassVar[str] = "Velocity observer"
+    needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
+    signed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        require_positive(self, "bandwidth")
+
+    def unit(self, machine: Machine) -> str:
+        """N or N m."""
+        return machine.force_unit
+
+    def signal(self, recording: Recording, machine: Machine) -> Signal:
+        """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        require_channels(self, recording, machine)
+        machine.require_inertia(self.name)
+        drive = drive_on_speed_clock(recording, machine)
+        balance = machine.force_balance(drive.torque, drive.position, drive.speed)
+        if not machine.coupled:
+            # M is constant and diagonal: joint by joint the same recursion as the momentum observer's.
+            momentum = machine.inertia_times(drive.position, drive.speed)
+            ready = np.full(momentum.shape[1], -np.inf)
+            residual, status = observe_momentum(drive, balance, momentum, self.bandwidth, ready)
+            return Signal(drive.time, residual, status, self.unit(machine), self.signed)
+        residual = np.empty(balance.shape)
+        status = np.empty(balance.shape, dtype=np.uint8)
+        observe_velocity(
+            drive.time,
+            np.ascontiguousarray(balance),
+            np.ascontiguousarray(drive.speed),
+            np.ascontiguousarray(machine.inertia_matrix(drive.position)),
+            np.ascontiguousarray(for_every_joint(drive.missing)[:, 0]),
+            np.ascontiguousarray(drive.speed_missing[:, 0]),
+            self.bandwidth * machine.nominal_inertia,
+            residual,
+            status,
+        )
+        return Signal(drive.time, residual, status, self.unit(machine), self.signed)

@@ -1,0 +1,342 @@
+"""URDF -> tree: what pinocchio makes of the same file is the reference, and every fault is told in one line."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdtool.errors import ConfigurationError
+from cdtool.machines.urdf_reader import read_urdf
+from tests.data_folder import data, needs_data
+
+needs_pinocchio = pytest.mark.skipif(find_spec("pinocchio") is None, reason="pinocchio is not installed (cdtool[urdf])")
+
+BODY = (
+    '<inertial><origin xyz="0.1 -0.05 0.2" rpy="0.3 0.1 -0.2"/><mass value="1.5"/>'
+    '<inertia ixx="0.03" ixy="0.002" ixz="-0.001" iyy="0.02" iyz="0.003" izz="0.04"/></inertial>'
+)
+
+
+def link(name, inside=BODY):
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(name, kind, parent, child, axis="0 0 1", origin='xyz="0.1 0.2 0.3" rpy="0.4 -0.5 0.6"', more=""):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin {origin}/>'
+        f'<axis xyz="{axis}"/><limit lower="-9" upper="9" effort="1" velocity="1"/>{more}</joint>'
+    )
+
+
+def write(folder: Path, *parts: str, name: str = "robot.urdf") -> Path:
+    path = folder / name
+    path.write_text(f'<?xml version="1.0"?>\n<robot name="robot">\n{chr(10).join(parts)}\n</robot>\n', encoding="utf-8")
+    return path
+
+
+def random_robot(folder: Path, seed: int, count: int) -> Path:
+    """Joints of all kinds on skew axes, branching, with a fixed link between some of them."""
+    rng = np.random.default_rng(seed)
+    parts, carriers = [link("base")], ["base"]
+
+    def text(values):
+        return " ".join(f"{x:.17g}" for x in values)
+
+    def placement():
+        return f'xyz="{text(rng.normal(size=3) * 0.3)}" rpy="{text(rng.uniform(-3.0, 3.0, size=3))}"'
+
+    for index in range(count):
+        parent = carriers[-1] if rng.random() < 0.6 else str(rng.choice(carriers))
+        kind = str(rng.choice(["revolute", "continuous", "prismatic"]))
+        axis = (
+            text(rng.normal(size=3)) if rng.random() < 0.6 else str(rng.choice(["1 0 0", "0 -1 0", "0 0 1", "0 0 -2"]))
+        )
+        parts += [link(f"link{index}"), joint(f"j{index}", kind, parent, f"link{index}", axis, placement())]
+        carriers.append(f"link{index}")
+        if rng.random() < 0.4:
+            parts += [link(f"flange{index}"), joint(f"f{index}", "fixed", f"link{index}", f"flange{index}")]
+            carriers.append(f"flange{index}")
+    return write(folder, *parts)
+
+
+def assert_as_in_pinocchio(path: Path, joints, locked=None, seed=0):
+    """Every result of the tree against pinocchio's own model of the file, at random states."""
+    pin = pytest.importorskip("pinocchio")
+    locked = locked or {}
+    tree, model = read_urdf(path, joints, locked), pin.buildModelFromUrdf(str(path))
+    data, rng = model.createData(), np.random.default_rng(seed)
+    position, speed = rng.normal(size=(8, len(joints))) * 2.0, rng.normal(size=(8, len(joints)))
+    acceleration = rng.normal(size=(8, len(joints)))
+    columns = [model.idx_vs[model.getJointId(name)] for name in joints]
+    results = *tree.momentum_terms(position, speed), tree.inverse_dynamics(position, speed, acceleration)
+    kinetic, potential = tree.energies(position, speed)
+    jacobians = {item.name: tree.contact_jacobian(position, item.name, (0.1, -0.2, 0.3)) for item in tree.links}
+    lowest = None
+    for k in range(8):
+        q, v, a = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
+        for name, value in (*zip(joints, position[k], strict=True), *locked.items()):
+            index = model.getJointId(name)
+            place = [value] if model.nqs[index] == 1 else [np.cos(value), np.sin(value)]
+            q[model.idx_qs[index] : model.idx_qs[index] + len(place)] = place
+        v[columns], a[columns] = speed[k], acceleration[k]
+        expected = (
+            pin.crba(model, data, q) @ v,
+            pin.computeCoriolisMatrix(model, data, q, v).T @ v,
+            pin.computeGeneralizedGravity(model, data, q),
+            pin.rnea(model, data, q, v, a),
+        )
+        size = max(np.linalg.norm(item[columns]) for item in expected)
+        for found, wanted in zip(results, expected, strict=True):
+            assert np.max(np.abs(found[k] - wanted[columns])) < 1e-12 * size
+        assert kinetic[k] == pytest.approx(pin.computeKineticEnergy(model, data, q, v), rel=1e-11, abs=1e-12)
+        # Where the locked joints' mass is fixed to the base, the two count from different heights.
+        lifted = pin.computePotentialEnergy(model, data, q) - potential[k]
+        lowest = lifted if lowest is None else lowest
+        assert lifted == pytest.approx(lowest, abs=1e-10 * max(1.0, abs(lowest)))
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        for name, jacobian in jacobians.items():
+            frame = model.getFrameId(name, pin.FrameType.BODY)
+            wanted = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)[:, columns]
+            lever = data.oMf[frame].rotation @ np.array((0.1, -0.2, 0.3))
+            wanted[:3] -= np.cross(lever, wanted[3:], axis=0)
+            assert jacobian[k] == pytest.approx(wanted, abs=1e-11)
+
+
+@needs_pinocchio
+@pytest.mark.parametrize("axis", ["1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-3 0 0", "1 2 3", "-0.95 0.1 0.2"])
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+def test_one_joint_of_any_kind_about_any_axis_is_as_in_pinocchio(tmp_path, kind, axis):
+    assert_as_in_pinocchio(write(tmp_path, link("base"), link("arm"), joint("j", kind, "base", "arm", axis)), ["j"])
+
+
+@needs_pinocchio
+@pytest.mark.parametrize("seed", range(10))
+def test_trees_of_all_kinds_of_joints_are_as_in_pinocchio_in_any_order_of_columns(tmp_path, seed):
+    count = 6 + seed % 2
+    order = [f"j{k}" for k in np.random.default_rng(seed).permutation(count)]
+    assert_as_in_pinocchio(random_robot(tmp_path, seed, count), order)
+
+
+@needs_pinocchio
+@pytest.mark.parametrize("seed", range(4))
+def test_locked_joints_stand_where_they_are_locked(tmp_path, seed):
+    path = random_robot(tmp_path, seed, 7)
+    assert_as_in_pinocchio(path, ["j6", "j1", "j4", "j5"], {"j0": 0.7, "j2": -2.5, "j3": 4.0})
+
+
+@needs_pinocchio
+def test_a_joint_without_an_axis_moves_about_x(tmp_path):
+    plain = (
+        '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><limit effort="1" velocity="1"/></joint>'
+    )
+    path = write(tmp_path, link("a"), link("b"), plain)
+    assert_as_in_pinocchio(path, ["j"])
+    assert read_urdf(path, ["j"], {}).contact_jacobian(np.zeros((1, 1)), "b", (0, 0, 0))[0, 3:, 0].tolist() == [1, 0, 0]
+
+
+@needs_pinocchio
+@needs_data("ur10e")
+def test_an_arm_with_identified_and_slightly_unphysical_inertias_is_as_in_pinocchio():
+    assert_as_in_pinocchio(data("ur10e/ur10e.urdf"), [f"joint{k}" for k in (1, 2, 3, 4, 5, 6)])
+
+
+def robots() -> Path:
+    """Where the package example-robot-data keeps its URDFs."""
+    places = [Path(site) / "cmeel.prefix/share/example-robot-data/robots" for site in sys.path]
+    return next((place for place in places if place.is_dir()), Path("absent"))
+
+
+@needs_pinocchio
+@pytest.mark.skipif(not robots().is_dir(), reason="example-robot-data is not installed")
+def test_a_panda_and_a_ur10_without_their_meshes_are_as_in_pinocchio(tmp_path):
+    fingers = {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.01}
+    for robot, joints, locked in (
+        ("panda_description/urdf/panda.urdf", [f"panda_joint{k}" for k in range(1, 8)], fingers),
+        (
+            "ur_description/urdf/ur10_robot.urdf",
+            [
+                "elbow_joint",
+                "shoulder_lift_joint",
+                "shoulder_pan_joint",
+                "wrist_1_joint",
+                "wrist_2_joint",
+                "wrist_3_joint",
+            ],
+            {},
+        ),
+    ):
+        path = tmp_path / "alone.urdf"
+        path.write_bytes((robots() / robot).read_bytes())
+        assert_as_in_pinocchio(path, joints, locked)
+
+
+@needs_pinocchio
+def test_meshes_are_never_looked_for(tmp_path, capfd):
+    mesh = '<visual><geometry><mesh filename="package://nowhere/arm.dae"/></geometry></visual>'
+    path = write(tmp_path, link("base"), link("arm", BODY + mesh), joint("j", "revolute", "base", "arm"))
+    assert [item.name for item in read_urdf(path, ["j"], {}).links] == ["base", "arm"]
+    assert capfd.readouterr() == ("", "")
+
+
+@needs_pinocchio
+def test_gravity_and_drive_inertia_go_with_the_order_of_the_joints(tmp_path):
+    path = random_robot(tmp_path, 3, 3)
+    position = np.full((1, 3), 0.4)
+    tree = read_urdf(path, ["j2", "j0", "j1"], {}, drive_inertia=(1.0, 2.0, 3.0), gravity=(0.0, 0.0, 0.0))
+    plain = read_urdf(path, ["j2", "j0", "j1"], {})
+    assert tree.inertia_matrix(position) - plain.inertia_matrix(position) == pytest.approx(np.diag((1, 2, 3))[None])
+    assert not tree.momentum_terms(position, position)[2].any()
+
+
+@needs_pinocchio
+def test_a_massless_last_link_is_taken_where_a_drive_gives_it_inertia(tmp_path):
+    path = write(tmp_path, link("base"), link("arm"), link("tip", ""), joint("j", "revolute", "base", "arm"), TIP)
+    assert read_urdf(path, ["j", "tip"], {}, drive_inertia=(0.0, 0.1)).inertia_matrix(np.zeros((1, 2)))[0, 1, 1] == 0.1
+    fault = refused(path, ["j", "tip"])
+    assert "joint 'tip' moves no inertia" in fault.message
+    assert "drive_inertia" in fault.hint
+
+
+TIP = joint("tip", "revolute", "arm", "tip")
+ARM = (link("base"), link("arm"), joint("j", "revolute", "base", "arm"))
+
+
+def refused(path: Path, joints=("j",), locked=None) -> ConfigurationError:
+    with pytest.raises(ConfigurationError) as caught:
+        read_urdf(path, joints, locked or {})
+    assert str(path) in caught.value.message
+    assert "\n" not in str(caught.value)
+    assert caught.value.hint
+    return caught.value
+
+
+def test_without_pinocchio_the_extra_to_install_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    fault = refused(write(tmp_path, *ARM))
+    assert "pinocchio, which is not installed" in fault.message
+    assert fault.hint == "pip install 'cdtool[urdf]'"
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    assert "no such file" in refused(tmp_path / "none.urdf").message
+
+
+def test_a_folder_is_no_urdf(tmp_path):
+    assert "cannot be read" in refused(tmp_path).message
+
+
+def test_broken_xml_is_told_with_line_and_column(tmp_path):
+    path = tmp_path / "broken.urdf"
+    path.write_text('<robot name="r">\n<link name="a"></robot>\n', encoding="utf-8")
+    assert "broken XML in line 2, column 18: mismatched tag" in refused(path).message
+
+
+def test_another_kind_of_xml_is_no_urdf(tmp_path):
+    path = tmp_path / "model.sdf"
+    path.write_text("<sdf/>", encoding="utf-8")
+    assert "its root is <sdf>" in refused(path).message
+
+
+def test_an_xacro_file_must_be_expanded_first(tmp_path):
+    body = BODY.replace('"1.5"', '"${mass}"')
+    fault = refused(write(tmp_path, link("base", body), *ARM[1:]))
+    assert "link 'base': <mass> value is '${mass}'" in fault.message
+    assert "xacro" in fault.hint
+
+
+@needs_pinocchio
+def test_what_the_urdf_parser_finds_is_in_the_message_and_not_on_the_terminal(tmp_path, capfd):
+    fault = refused(write(tmp_path, *ARM, link("island")))
+    assert "Two root links found" in fault.message
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_joint_that_is_not_there_lists_the_nearest_and_the_map_of_names(tmp_path):
+    fault = refused(write(tmp_path, *ARM), ["jj"])
+    assert "no moving joint 'jj'" in fault.message
+    assert "did you mean j?" in fault.hint
+    assert "joint_map" in fault.hint
+
+
+def test_a_fixed_joint_cannot_be_logged(tmp_path):
+    path = write(tmp_path, *ARM, link("tip"), joint("flange", "fixed", "arm", "tip"))
+    assert "no moving joint 'flange'" in refused(path, ["j", "flange"]).message
+
+
+def test_joints_neither_logged_nor_locked_are_listed_with_the_line_to_write(tmp_path):
+    path = write(tmp_path, *ARM, link("tip"), TIP, link("end"), joint("slide", "prismatic", "tip", "end"))
+    fault = refused(path)
+    assert "neither logged nor locked: tip, slide" in fault.message
+    assert fault.hint == "locked = { tip = 0.0, slide = 0.0 }"
+
+
+def test_a_mimic_joint_is_a_joint_of_its_own(tmp_path):
+    follower = joint("tip", "revolute", "arm", "tip", more='<mimic joint="j" multiplier="2"/>')
+    assert "neither logged nor locked: tip" in refused(write(tmp_path, *ARM, link("tip"), follower)).message
+
+
+def test_no_joint_at_all_is_refused(tmp_path):
+    assert "no joint is logged" in refused(write(tmp_path, *ARM), [], {"j": 0.0}).message
+
+
+@pytest.mark.parametrize(
+    ("joints", "locked", "message"),
+    [
+        (["j", "j"], {}, "joint 'j' is given twice"),
+        (["j"], {"j": 0.0}, "joint 'j' is both logged and locked"),
+        (["j"], {"k": 0.0}, "no moving joint 'k' to lock"),
+        ([], {"j": float("nan")}, "joint 'j' is locked at nan"),
+    ],
+)
+def test_names_that_do_not_fit_are_refused(tmp_path, joints, locked, message):
+    assert message in refused(write(tmp_path, *ARM), joints, locked).message
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar", "spherical"])
+def test_other_types_of_joints_are_refused(tmp_path, kind):
+    fault = refused(write(tmp_path, link("base"), link("arm"), joint("j", kind, "base", "arm")))
+    assert f"joint 'j': type '{kind}' is not supported" in fault.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('value="1.5"', 'value="-1.5"', "link 'arm': mass -1.5 kg is negative"),
+        ('ixx="0.03"', 'ixx="nan"', "link 'arm': <inertia> ixx is 'nan'"),
+        ('xyz="0.1 -0.05 0.2"', 'xyz="0.1 inf 0.2"', "link 'arm': <origin> xyz is '0.1 inf 0.2'"),
+    ],
+)
+def test_masses_and_inertias_that_cannot_be_are_refused(tmp_path, old, new, message):
+    path = write(tmp_path, link("base"), link("arm", BODY.replace(old, new)), ARM[2])
+    assert message in refused(path).message
+
+
+def test_an_axis_without_length_is_refused(tmp_path):
+    path = write(tmp_path, link("base"), link("arm"), joint("j", "revolute", "base", "arm", axis="0 0 0"))
+    assert "joint 'j': its axis has the length 0" in refused(path).message
+
+
+@needs_pinocchio
+def test_an_inertia_matrix_that_is_not_positive_definite_is_refused(tmp_path):
+    round_body = '<inertial><mass value="1"/><inertia ixx="1" ixy="{}" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    path = write(
+        tmp_path,
+        link("base"),
+        link("arm", round_body.format(0)),
+        link("tip", round_body.format(3)),
+        joint("j", "revolute", "base", "arm", "1 0 0", 'xyz="0 0 0"'),
+        joint("tip", "revolute", "arm", "tip", "0 1 0", 'xyz="0 0 0"'),
+    )
+    fault = refused(path, ["j", "tip"])
+    assert "not positive definite" in fault.message
+    assert "drive_inertia" in fault.hint
+
+
+def test_drive_inertias_that_are_not_one_a_joint_are_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match="2 values of drive_inertia, 1 joints"):
+        read_urdf(write(tmp_path, *ARM), ["j"], {}, drive_inertia=(1.0, 2.0))
