@@ -31,9 +31,9 @@ STREAMS = [
 ]
 
 
-def wanted(*fields, clock="log"):
+def wanted(*fields, clock="log", joints=("axis",)):
     sources = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in fields)
-    return ChannelMap(TimeSource(clock=clock), sources, ("axis",), topics=True)
+    return ChannelMap(TimeSource(clock=clock), sources, joints, topics=True)
 
 
 @pytest.fixture

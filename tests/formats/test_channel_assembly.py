@@ -188,9 +188,9 @@ def test_a_channel_that_never_changes_while_the_machine_moves_is_told(log, machi
 def test_a_field_with_more_values_than_joints_is_a_clear_error(tmp_path, machine):
     path = tmp_path / "two.mcap"
     time = np.arange(5.0)
-    write_mcap(path, [Stream("/joint_states", "sensor_msgs/msg/JointState", time, {"effort": np.ones((5, 2))})])
-    found = machine('[channels.mcap]\ntorque = { topic = "/joint_states", field = "effort[:]" }\n')
-    with pytest.raises(RecordingError, match=r"effort\[:\]\) gives 2 values a sample for 1 joints"):
+    write_mcap(path, [Stream("/drive", "std_msgs/msg/Float64MultiArray", time, {"data": np.ones((5, 2))})])
+    found = machine('[channels.mcap]\ntorque = { topic = "/drive", field = "data[:]" }\n')
+    with pytest.raises(RecordingError, match=r"data\[:\]\) gives 2 values a sample for 1 joints"):
         read_recording(path, found)
 
 

@@ -45,11 +45,35 @@ def test_the_same_streams_give_the_same_bytes(written, encoding):
 def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
     fields = ["position[1]", "position[:]", "position[shoulder_joint]", "position[elbow.joint]", "effort[0]"]
     path = written(encoding=encoding)
-    columns = Mcap().columns(path, wanted(*(("/joint_states", field) for field in fields))).columns
+    asked = wanted(*(("/joint_states", field) for field in fields), joints=("base", "shoulder_joint", "elbow.joint"))
+    columns = Mcap().columns(path, asked).columns
     found = [columns[f"/joint_states {field}"].values for field in fields]
     for values, expected in zip(found, [JOINTS[:, 1], JOINTS, JOINTS[:, 1], JOINTS[:, 2], JOINTS[:, 2]], strict=True):
         assert np.array_equal(values, expected)
     assert set(columns) == {f"/joint_states {field}" for field in fields}
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+def test_a_whole_array_comes_in_the_machines_order_by_the_messages_names(written, encoding):
+    path = written(encoding=encoding)
+    order = ("elbow.joint", "base", "shoulder_joint")
+    column = Mcap().columns(path, wanted(("/joint_states", "position[:]"), joints=order)).columns
+    assert np.array_equal(column["/joint_states position[:]"].values, JOINTS[:, [2, 0, 1]])
+    two = Mcap().columns(path, wanted(("/joint_states", "position[:]"), joints=order[:2])).columns
+    assert np.array_equal(two["/joint_states position[:]"].values, JOINTS[:, [2, 0]])
+
+
+def test_names_that_the_messages_do_not_have_are_an_error_and_never_a_silent_permutation(written):
+    asked = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
+    with pytest.raises(RecordingError, match=r"name base, shoulder_joint, elbow.joint, not 'shoulder'.*joint_map"):
+        Mcap().columns(written(), asked)
+
+
+def test_a_name_array_whose_order_changes_between_messages_is_followed(by_hand):
+    names = (["a", "b"], ["b", "a"])
+    messages = [(i, i, {"name": names[i % 2], "q": [1.0, 2.0] if i % 2 == 0 else [2.0, 1.0]}) for i in range(4)]
+    column = Mcap().columns(by_hand(messages), wanted(("/a", "q[:]"), joints=("a", "b"))).columns["/a q[:]"]
+    assert column.values.tolist() == [[1.0, 2.0]] * 4
 
 
 @pytest.mark.parametrize("clock", ["log", "publish", "header"])

@@ -50,7 +50,8 @@ class Mcap:
         columns: dict[str, Column] = {}
         for source in wanted.sources:
             topic = log.topics[source.topic]
-            column, found = field_column(path, topic, decoded[source.topic], source.field, wanted.time.clock, origin)
+            clock, messages = wanted.time.clock, decoded[source.topic]
+            column, found = field_column(path, topic, messages, source.field, clock, origin, wanted.joints)
             if column.name not in columns:
                 columns[column.name] = column
                 findings += found

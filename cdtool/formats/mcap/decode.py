@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -96,9 +96,12 @@ def decode_topic(topic: Topic) -> Decoded:
 
 
 def field_column(
-    path: Path, topic: Topic, decoded: Decoded, text: str, clock: str, origin: int
+    path: Path, topic: Topic, decoded: Decoded, text: str, clock: str, origin: int, joints: Sequence[str] = ()
 ) -> tuple[Column, list[Finding]]:
-    """One wanted field of a topic as a column, sorted by the chosen clock; raises RecordingError."""
+    """One wanted field of a topic as a column, sorted by the chosen clock; raises RecordingError.
+
+    A whole array whose elements the messages name comes in the order of `joints`.
+    """
     where = f"{path}: {topic.name}"
     picked = parse_field(text, where)
     name = f"{topic.name} {text}"
@@ -107,7 +110,7 @@ def field_column(
     elsewhere = 0
     for raw, message in decoded.messages:
         try:
-            value = picked.of(message)
+            value = picked.of(message, joints)
         except FieldMissingError as fault:
             raise missing(where, text, fault) from fault
         if value is None:

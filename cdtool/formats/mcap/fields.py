@@ -18,22 +18,26 @@ Value = float | list[float] | None
 
 
 class FieldMissingError(Exception):
-    """The message has no such field; `known` are those that it has at this place."""
+    """The message has no such field; `known` are those that it has at this place, or `advice` tells what to do."""
 
-    def __init__(self, problem: str, known: Sequence[str] = ()) -> None:
+    def __init__(self, problem: str, known: Sequence[str] = (), advice: str = "") -> None:
         super().__init__(problem)
         self.problem = problem
         self.known = tuple(known)
+        self.advice = advice
 
 
 @dataclass(frozen=True)
 class Field:
-    """A parsed field; `of(message)` gives a number, a list, NaN for an empty array, None for a joint not in there."""
+    """A parsed field; `of(message)` gives a number, a list, NaN for an empty array, None for a joint not in there.
+
+    A whole array (`[:]`) beside names of its elements comes in the order of `joints`, by name.
+    """
 
     text: str
     steps: tuple[tuple[str, str | None], ...]
 
-    def of(self, message: Any) -> Value:
+    def of(self, message: Any, joints: Sequence[str] = ()) -> Value:
         """Its value in one message; raises FieldMissingError."""
         value = message
         for name, index in self.steps:
@@ -44,7 +48,8 @@ class Field:
             if not _is_array(value):
                 raise FieldMissingError(f"'{name}' is not an array", [name])
             if index == ":":
-                return [_number(item, self.text) for item in value]
+                numbers = [_number(item, self.text) for item in value]
+                return _in_order(numbers, _element_names(parent), joints)
             if index.isdigit():
                 if len(value) == 0:
                     return math.nan
@@ -113,7 +118,24 @@ def header_stamp(message: Any) -> int | None:
 
 def missing(where: str, text: str, fault: FieldMissingError) -> RecordingError:
     """The error for a field that is not there, with the nearest known ones."""
-    return RecordingError(f"{where}: no field '{text}': {fault.problem}", nearest(text, fault.known))
+    return RecordingError(f"{where}: no field '{text}': {fault.problem}", fault.advice or nearest(text, fault.known))
+
+
+def _element_names(message: Any) -> list[str]:
+    return [str(name) for name in _member(message, "name")] if "name" in _member_names(message) else []
+
+
+def _in_order(numbers: list[float], names: list[str], joints: Sequence[str]) -> list[float]:
+    """The numbers of the joints, found by their names; as they are where the message names none or there is but one."""
+    if not joints or not numbers or len(names) != len(numbers) or len(joints) == len(numbers) == 1:
+        return numbers
+    absent = [joint for joint in joints if joint not in names]
+    if absent:
+        raise FieldMissingError(
+            f"its messages name {', '.join(names)}, not '{absent[0]}' of machine.joints",
+            advice="name machine.joints as the log does (a URDF's other names go into machine.joint_map)",
+        )
+    return [numbers[names.index(joint)] for joint in joints]
 
 
 def _member(value: Any, name: str) -> Any:
