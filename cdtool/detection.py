@@ -86,8 +86,8 @@ class Signal:
         return {text: count / status.size for text, count in counts.items() if count}
 
     def why_not(self, start: float = -np.inf, end: float = np.inf) -> str:
-        """The reasons not to judge in words, with their shares, from `start` to `end` [s]."""
-        shares = self.shares(start, end)
+        """The reasons not to judge in words, the most frequent first, with their shares, from `start` to `end` [s]."""
+        shares = dict(sorted(self.shares(start, end).items(), key=lambda item: -item[1]))
         return ", ".join(f"{text} {100.0 * share:.0f} %" for text, share in shares.items()) or "no samples"
 
 

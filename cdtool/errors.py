@@ -50,6 +50,10 @@ class SignatureError(CdtoolError):
     """A signature cannot be learned, read, or does not belong to what it is applied to."""
 
 
+class NothingValidError(SignatureError):
+    """The runs to learn from hold nothing that the detector could judge: a property of detector and motion, no fault."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Words that help after a wrong name: the nearest known ones first, then all of them."""
     names = sorted(known)

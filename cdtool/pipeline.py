@@ -100,7 +100,7 @@ def detect_operation(
         nothing = np.full(signal.values.shape, np.nan)
         status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
         statistic = replace(signal, status=status)
-        verdict = Verdict("not assessable", reason=refused)
+        verdict = Verdict("not assessable", reason=refused or f"nothing learned: {statistic.why_not()}")
         return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
     statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
     alarms, crossings = activation.alarms(statistic, band)
@@ -114,7 +114,9 @@ def detect_operation(
 
 
 def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:
-    """The threshold that applies to an operation, or None and why."""
+    """The threshold that applies to an operation, or None and why; nothing to say where nothing was learned at all."""
+    if not thresholds:
+        return None, ""
     learned = [item for item in thresholds if isinstance(item, FittedSignature)]
     if len(learned) < len(thresholds):
         return next(item for item in thresholds if not isinstance(item, FittedSignature)), ""

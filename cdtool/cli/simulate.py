@@ -21,28 +21,70 @@ def _simulate() -> None:
     """Write simulated recordings with known contacts."""
 
 
+FreeOption = Annotated[int, typer.Option("--free", min=0, help="Impact-free runs to learn from.")]
+HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, help="Impact-free runs kept apart.")]
+StiffOption = Annotated[int, typer.Option("--stiff", min=0, help="Impacts on the bare load cell.")]
+SoftOption = Annotated[int, typer.Option("--soft", min=0, help="Impacts with a rubber bumper.")]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")]
+FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")]
+OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")]
+
+
 @simulate.command("gate")
 def gate(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
-    free: Annotated[int, typer.Option("--free", min=0, help="Impact-free runs to learn from.")] = 14,
-    holdout: Annotated[int, typer.Option("--holdout", min=0, help="Impact-free runs kept apart.")] = 40,
-    stiff: Annotated[int, typer.Option("--stiff", min=0, help="Impacts on the bare load cell.")] = 30,
-    soft: Annotated[int, typer.Option("--soft", min=0, help="Impacts with a rubber bumper.")] = 30,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")] = 1,
-    file_format: Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")] = "csv",
+    output: OutputOption,
+    free: FreeOption = 14,
+    holdout: HoldoutOption = 40,
+    stiff: StiffOption = 30,
+    soft: SoftOption = 30,
+    seed: SeedOption = 1,
+    file_format: FormatOption = "csv",
     as_json: JsonOption = False,
 ) -> None:
     """The heavy sliding gate of the thesis's chapter 5: recordings, machine.toml and benchmark.toml.
 
     Example: cdtool simulate gate --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o gate
     """
-    if file_format not in _FORMATS:
-        raise UsageError(f"unknown format '{file_format}'", nearest(file_format, _FORMATS))
+    _check_format(file_format)
     from cdtool.simulation.gate_recordings import write_gate_recordings
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     with progress("simulating") as advance:
         written = write_gate_recordings(output, counts, seed, file_format, advance)
+    _report(output, written, seed, as_json)
+
+
+@simulate.command("arm")
+def arm(
+    output: OutputOption,
+    trial: Annotated[int, typer.Option("--trial", min=1, max=2, help="1: the arm is hit; 2: the forearm.")] = 1,
+    free: FreeOption = 14,
+    holdout: HoldoutOption = 40,
+    stiff: StiffOption = 30,
+    soft: SoftOption = 30,
+    seed: SeedOption = 1,
+    file_format: FormatOption = "csv",
+    as_json: JsonOption = False,
+) -> None:
+    """The light robot arm of the thesis's chapter 6: recordings, machine.toml and benchmark.toml.
+
+    Example: cdtool simulate arm --trial 2 --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o forearm
+    """
+    _check_format(file_format)
+    from cdtool.simulation.arm_recordings import write_arm_recordings
+
+    counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
+    with progress("simulating") as advance:
+        written = write_arm_recordings(output, counts, seed, 1 if trial == 1 else 2, file_format, advance)
+    _report(output, written, seed, as_json)
+
+
+def _check_format(file_format: str) -> None:
+    if file_format not in _FORMATS:
+        raise UsageError(f"unknown format '{file_format}'", nearest(file_format, _FORMATS))
+
+
+def _report(output: Path, written: int, seed: int, as_json: bool) -> None:
     if as_json:
         print_json({"folder": str(output), "recordings": written, "seed": seed})
         return

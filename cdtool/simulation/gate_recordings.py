@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from cdtool.errors import UsageError
 from cdtool.recording import Recording, Series
-from cdtool.simulation.gate_model import GateParameters, GateRun, Impact, simulate_gate_run
+from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
+from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, write_folder
 from cdtool.units import UNITS
+
+__all__ = ["GROUPS", "as_recording", "write_gate_recordings"]
 
 # What the fictitious drive and sensors log: motor current, revolutions, an accelerometer mounted backward.
 _TORQUE_CONSTANT = 0.56  # N m/A
-_IMPACT_OF: Mapping[str, Impact] = {"free": "none", "holdout": "none", "stiff": "stiff", "soft": "soft"}
-GROUPS = tuple(_IMPACT_OF)
-# With the format "mixed" this many of each group are MCAP files.
-_MIXED_MCAP = 2
-# MCAP stamps count from a fixed instant, so that the same seed gives the same bytes.
-_EPOCH_NS = 1_700_000_000_000_000_000
 _DECIMALS = {
     "t": "%.0f",
     "i_motor": "%.4f",
@@ -32,14 +26,12 @@ _DECIMALS = {
     "n_ref": "%.3f",
     "i_ref": "%.4f",
 }
-
-
-@dataclass(frozen=True)
-class _Planned:
-    group: str
-    number: int
-    name: str
-    suffix: str
+_BENCHMARK_SETTINGS = (
+    "# Made by cdtool simulate gate. Paths are relative to this file.",
+    'machine = "machine.toml"',
+    'detectors = ["pi", "feekf", "gm", "igm", "pt"]',
+)
+_BENCHMARK_RULES = ("[onset]", "above_n = 20.0", "back_to_n = 8.0")
 
 
 def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recording:
@@ -72,37 +64,13 @@ def write_gate_recordings(
     each group as MCAP, the others as CSV. Raises UsageError where nothing is to be written or the folder is not empty.
     """
     gate = parameters or GateParameters()
-    planned = list(_plan(counts, file_format))
-    if not planned:
-        raise UsageError("no recording is asked for", "give a number above 0 for --free, --holdout, --stiff or --soft")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
-    contacts = []
-    for done, item in enumerate(planned, 1):
-        rng = np.random.default_rng([seed, GROUPS.index(item.group), item.number])
-        run = simulate_gate_run(gate, rng, _IMPACT_OF[item.group])
-        path = folder / item.group / f"{item.name}{item.suffix}"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        (_write_mcap if item.suffix == ".mcap" else _write_csv)(path, run)
-        if run.contact_start is not None:
-            contacts.append((f"{item.group}/{path.name}", f"{run.contact_start:.6f}", item.group))
-        if progress:
-            progress(done, len(planned))
-    (folder / "machine.toml").write_text(_machine_toml(gate), encoding="utf-8")
-    (folder / "benchmark.toml").write_text(_benchmark_toml(planned), encoding="utf-8")
-    with (folder / "contacts.csv").open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerows([("recording", "true_contact_s", "kind"), *contacts])
-    return len(planned)
 
+    def simulate(group: str, number: int) -> GateRun:
+        rng = np.random.default_rng([seed, GROUPS.index(group), number])
+        return simulate_gate_run(gate, rng, IMPACT_OF[group])
 
-def _plan(counts: Mapping[str, int], file_format: str) -> Iterator[_Planned]:
-    for group in GROUPS:
-        count = counts.get(group, 0)
-        width = max(2, len(str(count)))
-        for number in range(1, count + 1):
-            as_mcap = file_format == "mcap" or (file_format == "mixed" and number <= _MIXED_MCAP)
-            yield _Planned(group, number, f"{number:0{width}d}", ".mcap" if as_mcap else ".csv")
+    bench = Bench(simulate, _write_csv, _write_mcap, _machine_toml(gate), _BENCHMARK_SETTINGS, _BENCHMARK_RULES)
+    return write_folder(folder, counts, file_format, bench, progress)
 
 
 def _write_csv(path: Path, run: GateRun) -> None:
@@ -141,7 +109,7 @@ def _write_mcap(path: Path, run: GateRun) -> None:
             {"data[0]": run.reference_speed, "data[1]": run.reference_torque},
         ),
     ]
-    write_mcap(path, streams, start_ns=_EPOCH_NS)
+    write_mcap(path, streams, start_ns=EPOCH_NS)
 
 
 def _machine_toml(gate: GateParameters) -> str:
@@ -175,24 +143,3 @@ force = {{ topic = "/load_cell", field = "wrench.force.x" }}
 reference_speed = {{ topic = "/reference", field = "data[0]" }}
 reference_torque = {{ topic = "/reference", field = "data[1]" }}
 """
-
-
-def _benchmark_toml(planned: list[_Planned]) -> str:
-    def logs(group: str) -> str:
-        suffixes = sorted({item.suffix for item in planned if item.group == group})
-        return ", ".join(f'"{group}/*{suffix}"' for suffix in suffixes)
-
-    groups = [group for group in GROUPS if any(item.group == group for item in planned)]
-    lines = [
-        "# Made by cdtool simulate gate. Paths are relative to this file.",
-        'machine = "machine.toml"',
-        'detectors = ["pi", "feekf", "gm", "igm", "pt"]',
-    ]
-    titles = {
-        "free": "[learn]",
-        "holdout": "[holdout]                       # impact-free, never learned from: false alarms",
-    }
-    for group in groups:
-        lines += ["", titles.get(group, f"[impacts.{group}]"), f"logs = [{logs(group)}]"]
-    lines += ["", "[onset]", "above_n = 20.0", "back_to_n = 8.0", ""]
-    return "\n".join(lines)

@@ -1,6 +1,6 @@
 """Causal sensor models: what a resolver, a torque estimate and an accelerometer make of the truth.
 
-Every filter starts from zero and looks backward only, so no latency is flattered. Noise is handed in as
+Every filter starts from rest and looks backward only, so no latency is flattered. Noise is handed in as
 standard normal samples: the caller owns the random generator.
 """
 
@@ -103,11 +103,13 @@ def accelerometer(
     damping: float,
     resolution: float,
     period: float,
+    settled: float = 0.0,
 ) -> Array:
     """A MEMS reading: LP2(acceleration + vibration + noise white + bias), rounded to `resolution` [m/s2].
 
-    `frequency` [Hz] and `damping` belong to the sensor's low-pass; `resolution` = 0 is unquantised.
+    `frequency` [Hz] and `damping` belong to the sensor's low-pass, which starts at rest on the value `settled` [m/s2]
+    (gravity's share, on a sensor that has been on for long); `resolution` = 0 is unquantised.
     """
     sensed = acceleration + vibration + noise * white + bias
-    reading = second_order_low_pass(sensed, frequency, damping, period)
+    reading = settled + second_order_low_pass(sensed - settled, frequency, damping, period)
     return np.asarray(np.rint(reading / resolution) * resolution if resolution > 0.0 else reading, dtype=np.float64)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from cdtool.detection import Band, Signal
-from cdtool.errors import SignatureError, UsageError
+from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.recording import Recording
 from cdtool.thresholds.base import with_limits
 
@@ -62,7 +62,8 @@ class Limit:
         highest, lowest = [], []
         for recording, signal in pairs:
             if not signal.valid.any(axis=0).all():
-                raise SignatureError(f"{recording.name}: a joint has no valid sample", "leave the run out")
+                kind = SignatureError if signal.valid.any() else NothingValidError
+                raise kind(f"{recording.name}: a joint has no valid sample ({signal.why_not()})", "leave the run out")
             highest.append(np.max(np.where(signal.valid, signal.values, -np.inf), axis=0))
             lowest.append(np.min(np.where(signal.valid, signal.values, np.inf), axis=0))
         upper = np.mean(highest, axis=0) + self.safety_factor * np.std(highest, axis=0, ddof=1)

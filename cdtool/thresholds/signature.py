@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from cdtool.detection import Band, Signal
-from cdtool.errors import SignatureError, UsageError, nearest
+from cdtool.errors import NothingValidError, SignatureError, UsageError, nearest
 from cdtool.motion import MotionClass, motion_class
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
@@ -226,7 +226,11 @@ class Signature:
             by_position=by_position.learned(np.array(samples[1])),
         )
         if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_position)):
-            raise SignatureError("the runs share no part of the stroke where the signal is valid", "see cdtool info")
+            reasons = pairs[0][1].why_not() if not pairs[0][1].valid.any() else "valid in too few runs at a time"
+            raise NothingValidError(
+                f"the runs share no part of the stroke where the signal can be judged ({reasons})",
+                "another detector, or other joints",
+            )
         return fitted
 
     def _check_number(self, runs: int) -> None:

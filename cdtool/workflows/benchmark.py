@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.activation import Activation
-from cdtool.errors import RecordingError, SignatureError
+from cdtool.errors import NothingValidError, RecordingError, SignatureError
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Results, Skipped
 from cdtool.kernels import compile_loaded
 from cdtool.operations import Operation
@@ -47,7 +47,7 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
     begin = perf_counter()
     learn = load_runs(setup.learn, machine_file, setup.operations, jobs=jobs, base=setup.path.parent)
     learned_at = perf_counter()
-    thresholds, skipped = _learn(setup, learn.operations, detectors, learn.skipped)
+    thresholds, skipped, blind = _learn(setup, learn.operations, detectors, learn.skipped)
     seconds = {"reading": learned_at - begin, "detecting": perf_counter() - learned_at}
     work = [(group, path) for group in setup.groups for path in _paths(setup, group)]
     activation = Activation(setup.debounce)
@@ -60,7 +60,7 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
     false_alarms: list[FalseAlarmResult] = []
     exposure: dict[tuple[str, str], Exposure] = {}
     skipped = [*learn.skipped, *skipped]
-    findings = list(learn.findings)
+    findings = [*learn.findings, *blind]
     digests = {op.recording.source: op.recording.digest for op in learn.operations}
     for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
         skipped += scored.skipped
@@ -96,28 +96,36 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
 
 def _learn(
     setup: BenchmarkFile, operations: Sequence[Operation], detectors: Sequence[Any], unread: Sequence[Skipped]
-) -> tuple[dict[str, tuple[FittedThreshold, ...]], list[Skipped]]:
+) -> tuple[dict[str, tuple[FittedThreshold, ...]], list[Skipped], list[Skipped]]:
+    """Each detector's thresholds, the runs left out, and the detectors that could judge nothing in any run."""
     thresholds: dict[str, tuple[FittedThreshold, ...]] = {}
     skipped: list[Skipped] = []
-    machine = setup.machine_file.machine
+    blind: list[Skipped] = []
     for detector in detectors:
-        if setup.threshold == "signature":
-            fitted, _, left_out = fit_signatures(
-                operations, machine, detector, setup.signature, unread, watched=setup.watched
-            )
-            thresholds[detector.name] = fitted
-            skipped += left_out
-        else:
-            if not operations:
-                raise SignatureError(f"no run to learn {detector.name} from", "check with cdtool info")
-            pairs = [
-                (op.recording.without_ground_truth(), run_detector(op, machine, detector, setup.watched))
-                for op in operations
-            ]
-            thresholds[detector.name] = (
-                THRESHOLDS.load(setup.threshold)(safety_factor=setup.signature.factor).fit(pairs),
-            )
-    return thresholds, skipped
+        try:
+            if setup.threshold == "signature":
+                fitted, _, left_out = fit_signatures(
+                    operations, setup.machine_file.machine, detector, setup.signature, unread, watched=setup.watched
+                )
+                thresholds[detector.name] = fitted
+                skipped += left_out
+            else:
+                thresholds[detector.name] = (_limits(setup, operations, detector),)
+        except NothingValidError as fault:
+            thresholds[detector.name] = ()
+            blind.append(Skipped(detector.name, f"not assessable: {fault.message}"))
+    return thresholds, skipped, blind
+
+
+def _limits(setup: BenchmarkFile, operations: Sequence[Operation], detector: Any) -> FittedThreshold:
+    if not operations:
+        raise SignatureError(f"no run to learn {detector.name} from", "check with cdtool info")
+    pairs = [
+        (op.recording.without_ground_truth(), run_detector(op, setup.machine_file.machine, detector, setup.watched))
+        for op in operations
+    ]
+    fitted: FittedThreshold = THRESHOLDS.load(setup.threshold)(safety_factor=setup.signature.factor).fit(pairs)
+    return fitted
 
 
 def _provenance(
