@@ -9,7 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-QUESTIONS = ("friction_ekf", "momentum", "start_up", "whole_benchmark", "gate_accuracy")
+QUESTIONS = (
+    *("friction_ekf", "momentum", "robot_dynamics", "detectors"),
+    *("start_up", "whole_benchmark", "gate_accuracy", "arm_accuracy"),
+)
 
 
 def main() -> int:

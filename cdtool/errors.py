@@ -51,7 +51,7 @@ class SignatureError(CdtoolError):
 
 
 class NothingValidError(SignatureError):
-    """The runs to learn from hold nothing that the detector could judge: a property of detector and motion, no fault."""
+    """The runs to learn from hold nothing that the detector could judge: that lies in detector and motion."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

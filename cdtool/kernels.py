@@ -10,6 +10,7 @@ import threading
 import types
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 # The signature of an array (n,) of float64 that a kernel only reads; writable arrays fit it too.
@@ -23,7 +24,7 @@ _told = False
 class Kernel:
     """A function that numba compiles when it is first called; `signature` fixes its one specialisation.
 
-    A kernel may call another kernel of its own module: the name is linked to the compiled one.
+    A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one.
     """
 
     def __init__(self, function: Callable[..., Any], signature: str) -> None:
@@ -61,13 +62,32 @@ def compile_loaded() -> int:
 
 
 def _linked(function: Callable[..., Any]) -> Callable[..., Any]:
-    names = function.__globals__
-    called = {name: names[name].compiled for name in function.__code__.co_names if isinstance(names.get(name), Kernel)}
+    called = _called(function)
     if not called:
         return function
-    linked = types.FunctionType(function.__code__, {**names, **called}, function.__name__)
-    linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__
+    names = function.__globals__ | {name: item.compiled for name, item in called.items()}
+    linked = types.FunctionType(function.__code__, names, function.__name__)
+    linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__ + _stamp(function)
     return linked
+
+
+def _called(function: Callable[..., Any]) -> dict[str, Kernel]:
+    names = function.__globals__
+    return {name: names[name] for name in function.__code__.co_names if isinstance(names.get(name), Kernel)}
+
+
+def _files(function: Callable[..., Any]) -> set[str]:
+    return {function.__code__.co_filename}.union(*(_files(item.function) for item in _called(function).values()))
+
+
+def _stamp(function: Callable[..., Any]) -> str:
+    import hashlib
+
+    # numba compiles a cached function anew when its own file has changed; the files of what it calls go into its name.
+    others = sorted(_files(function) - {function.__code__.co_filename})
+    if not others:
+        return ""
+    return "_" + hashlib.sha256(b"".join(Path(file).read_bytes() for file in others)).hexdigest()[:12]
 
 
 def _compile(function: Callable[..., Any], signature: str) -> Callable[..., Any]:

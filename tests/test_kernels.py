@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,21 @@ def test_where_no_cache_can_be_written_it_compiles_anyway_and_says_so_once(no_ca
     with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as told:
         assert (first(1.0), second(1.0)) == (2.0, 3.0)
     assert len(told) == 1
+
+
+def test_a_cached_kernel_is_compiled_anew_when_a_kernel_it_imports_has_changed(tmp_path):
+    define = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "
+    (tmp_path / "outer.py").write_text(
+        f"from inner import inner\n{define}outer(x):\n    return inner(x)\nprint(outer(3.0))"
+    )
+    project = str(Path(__file__).parents[1])
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": project}
+    said = []
+    for factor in (2, 2, 5):
+        (tmp_path / "inner.py").write_text(f"{define}inner(x):\n    return {factor} * x\n")
+        run = [sys.executable, "-B", str(tmp_path / "outer.py")]
+        said.append(float(subprocess.run(run, env=environment, capture_output=True, check=True).stdout))
+    assert said == [6.0, 6.0, 15.0]
 
 
 def test_importing_modules_with_kernels_does_not_load_numba():

@@ -1,7 +1,7 @@
 """Machines whose joints move one another: what a planar arm and a robot from a URDF share.
 
-M(q) a + C(q, v) v + g(q) + friction = tau - tau_c (thesis 2.4, friction added), tau_c = J_c' F_c (2.5): what the machine
-exerts on the obstacle. C is the matrix of Christoffel symbols, so that dM/dt = C + C'.
+M(q) a + C(q, v) v + g(q) + friction = tau - tau_c (thesis 2.4, friction added), tau_c = J_c' F_c (2.5): what the
+machine exerts on the obstacle. C is the matrix of Christoffel symbols, so that dM/dt = C + C'.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class CoupledMachine(JointMachine, ABC):
 
     @abstractmethod
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
-        """J_c (n, 6, J) of a point fixed to a link, in its frame [m]: linear, then angular velocity in the base (2.2)."""
+        """J_c (n, 6, J) of a point of a link, in its frame [m]: linear, then angular velocity, base axes (2.2)."""
 
     def momentum(self, position: FloatArray, speed: FloatArray) -> FloatArray:
         """p = M v (n, J), thesis 2.16."""
@@ -79,7 +79,7 @@ class CoupledMachine(JointMachine, ABC):
     def contact_force(
         self, position: FloatArray, residual: FloatArray, link: str, point: tuple[float, float, float]
     ) -> FloatArray:
-        """The force (n, 3) [N] at a known point that explains a joint residual best, by least squares over J_c' F = res.
+        """The force (n, 3) [N] at a known point that explains a joint residual best: least squares of J_c' F = res.
 
         Of the force only what moves the joints can be seen: in a direction in which the point cannot move it is 0.
         """

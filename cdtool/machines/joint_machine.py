@@ -24,7 +24,7 @@ _COORDINATES = ("motor", "load")
 
 @dataclass(frozen=True)
 class JointMachine:
-    """Parameters as in machine.toml, one value a joint; friction at the motor with coordinates "motor", else at the load.
+    """Parameters as in machine.toml, one a joint; friction at the motor with coordinates "motor", else at the load.
 
     `coordinates`: "motor" where logs hold motor torque, angle and speed, "load" where they hold the load's.
     """

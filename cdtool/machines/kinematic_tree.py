@@ -18,7 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
-from cdtool.machines import tree_kernel as kernel
+from cdtool.machines import tree_rows as rows
+from cdtool.machines.tree_inverse_kernel import sweep_inverse_dynamics, sweep_jacobian
+from cdtool.machines.tree_kernel import sweep_energies, sweep_momentum
 from cdtool.recording import FloatArray
 
 
@@ -83,7 +85,7 @@ class KinematicTree:
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
         momentum, force, gravity = (np.empty_like(position) for _ in range(3))
-        kernel.sweep_momentum(self._bodies, self._route, self._gravity, position, speed, momentum, force, gravity)
+        sweep_momentum(self._bodies, self._route, self._gravity, position, speed, momentum, force, gravity)
         return momentum, force, gravity
 
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -94,7 +96,7 @@ class KinematicTree:
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
         kinetic, potential = np.empty(len(position)), np.empty(len(position))
-        kernel.sweep_energies(self._bodies, self._route, self._gravity, position, speed, kinetic, potential)
+        sweep_energies(self._bodies, self._route, self._gravity, position, speed, kinetic, potential)
         return kinetic, potential
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
@@ -108,7 +110,7 @@ class KinematicTree:
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
         acceleration, torque = self._table("acceleration", acceleration, position), np.empty_like(position)
-        kernel.sweep_inverse_dynamics(self._bodies, self._route, self._gravity, position, speed, acceleration, torque)
+        sweep_inverse_dynamics(self._bodies, self._route, self._gravity, position, speed, acceleration, torque)
         return torque
 
     def inertia_matrix(self, position: FloatArray) -> FloatArray:
@@ -142,7 +144,7 @@ class KinematicTree:
         place = np.array(found.translation) + _matrix(found.rotation) @ np.array(point, dtype=np.float64)
         jacobian = np.zeros((len(position), 6, len(self.joints)))
         steps = np.array(path, dtype=np.int64)
-        kernel.sweep_jacobian(self._bodies, self._route, steps, tuple(place.tolist()), position, jacobian)
+        sweep_jacobian(self._bodies, self._route, steps, tuple(place.tolist()), position, jacobian)
         return jacobian
 
     @cached_property
@@ -152,31 +154,31 @@ class KinematicTree:
         for index in range(len(moved) - 1, -1, -1):
             if self.joints[index].parent >= 0:
                 moved[self.joints[index].parent] += moved[index]
-        table = np.empty((len(self.joints), kernel.CONSTANTS))
+        table = np.empty((len(self.joints), rows.CONSTANTS))
         for row, joint, mass in zip(table, self.joints, moved, strict=True):
-            row[kernel.ROTATION : kernel.TRANSLATION] = joint.rotation
-            row[kernel.TRANSLATION : kernel.MASS] = _matrix(joint.rotation).T @ np.array(joint.translation)
-            row[kernel.MASS] = joint.mass
-            row[kernel.MOMENT : kernel.INERTIA] = joint.first_moment
-            row[kernel.INERTIA : kernel.DRIVE] = joint.inertia
-            row[kernel.DRIVE] = joint.drive_inertia
-            row[kernel.SLIDES] = 1.0 if joint.prismatic else 0.0
-            row[kernel.MOVED_MASS] = mass
+            row[rows.ROTATION : rows.TRANSLATION] = joint.rotation
+            row[rows.TRANSLATION : rows.MASS] = _matrix(joint.rotation).T @ np.array(joint.translation)
+            row[rows.MASS] = joint.mass
+            row[rows.MOMENT : rows.INERTIA] = joint.first_moment
+            row[rows.INERTIA : rows.DRIVE] = joint.inertia
+            row[rows.DRIVE] = joint.drive_inertia
+            row[rows.SLIDES] = 1.0 if joint.prismatic else 0.0
+            row[rows.MOVED_MASS] = mass
         return table
 
     @cached_property
-    def _route(self) -> kernel.IndexArray:
+    def _route(self) -> rows.IndexArray:
         """The kernels' way through the tree: slot 0 is the base, a joint's own slot follows the one before it."""
-        table = np.empty((len(self.joints), kernel.STEPS), dtype=np.int64)
+        table = np.empty((len(self.joints), rows.STEPS), dtype=np.int64)
         own: list[int] = []
         last = 0
         for row, joint in zip(table, self.joints, strict=True):
             parent = own[joint.parent] if joint.parent >= 0 else 0
             follows = parent == last
-            row[kernel.COLUMN] = self.order.index(joint.name)
-            row[kernel.BEFORE] = last if follows else last + 1
-            row[kernel.COPY_OF] = -1 if follows else parent
-            last = int(row[kernel.BEFORE]) + 1
+            row[rows.COLUMN] = self.order.index(joint.name)
+            row[rows.BEFORE] = last if follows else last + 1
+            row[rows.COPY_OF] = -1 if follows else parent
+            last = int(row[rows.BEFORE]) + 1
             own.append(last)
         return table
 

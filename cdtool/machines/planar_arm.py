@@ -1,4 +1,4 @@
-"""A planar arm of two links, both motors on the base, so that they set the links' absolute angles (thesis chapter 6)."""
+"""A planar arm of two links, both motors on the base: they set the links' absolute angles (thesis chapter 6)."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def test_every_file_of_the_folder_with_a_format_is_registered():
 def test_every_file_of_the_folder_with_a_machine_is_registered():
     folder = Path(cdtool.machines.__file__).parent
     helpers = {"__init__", "axis", "joint_machine", "coupled", "kinematic_tree", "urdf_reader"}
-    modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("tree_kernel")}
+    modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("tree_")}
     assert modules - helpers == set(MACHINES.table)
 
 
