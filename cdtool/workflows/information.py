@@ -149,8 +149,8 @@ def _travelled(speed: Series, joint: int) -> tuple[float, float]:
 
 
 def _bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
-    """How fast the friction EKF can be on this log: its poles at the nominal speed."""
-    if not all(channel in recording for channel in ("torque", "speed", "acceleration")):
+    """How fast the friction EKF can be on this log: its poles at the nominal speed of an axis."""
+    if machine_file.machine.coupled or not all(channel in recording for channel in ("torque", "speed", "acceleration")):
         return []
     detector: Any = machine_file.detector("friction_ekf")
     motion = motion_class(recording)

@@ -1,0 +1,113 @@
+"""Machines of several joints through every command: chosen joints, blind detectors, alarms that name their joint."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from cdtool.errors import ConfigurationError, NothingValidError, UsageError
+from cdtool.simulation.arm_recordings import write_arm_recordings
+from tests.command import cdtool
+
+
+@pytest.fixture(scope="module")
+def forearm(tmp_path_factory) -> Path:
+    """Trial 2: the forearm is hit while it keeps its direction, and the arm leads the motion."""
+    folder = tmp_path_factory.mktemp("forearm") / "logs"
+    write_arm_recordings(folder, {"free": 10, "holdout": 2, "stiff": 2, "soft": 1}, seed=5, trial=2)
+    return folder
+
+
+def learn(folder: Path, output: Path, *options: object) -> None:
+    free = sorted((folder / "free").iterdir())
+    done = cdtool("learn-signature", *free, "-m", folder / "machine.toml", "-d", "gm", "-o", output, *options)
+    assert done.status == 0, done.err
+
+
+def test_a_benchmark_watches_the_joints_it_names_and_says_so(forearm):
+    results = api.benchmark(forearm / "benchmark.toml").results
+    assert results.provenance["watched_joints"] == ["forearm"]
+    assert {item.joint for item in results.contacts if item.joint} == {"forearm"}
+
+
+def test_a_detector_that_can_judge_nothing_is_not_assessable_and_the_others_go_on(forearm):
+    results = api.benchmark(forearm / "benchmark.toml").results
+    blind = [item for item in results.contacts if item.detector == "friction_ekf"]
+    assert len(blind) == 3 and {item.outcome for item in blind} == {"not_assessable"}
+    assert all("not applicable" in (item.reason or "") for item in blind)
+    assert not [item for item in results.false_alarms if item.detector == "friction_ekf"]
+    assert any(item.recording == "friction_ekf" and "not assessable" in item.reason for item in results.findings)
+    assert not results.skipped
+    seen = [item.outcome for item in results.contacts if item.detector == "inertial_momentum"]
+    assert seen == ["detected"] * 3
+
+
+def test_learning_a_signature_where_the_detector_is_blind_is_a_clear_error(forearm):
+    free = sorted((forearm / "free").iterdir())
+    with pytest.raises(NothingValidError, match="not applicable 100 %"):
+        api.learn_signature(free, forearm / "machine.toml", "feekf", joints=("forearm",))
+
+
+def test_a_signature_watches_the_joints_that_it_was_learned_for(forearm, tmp_path):
+    signature = tmp_path / "forearm.json"
+    learn(forearm, signature, "--joints", "forearm")
+    log = forearm / "stiff" / "01.csv"
+    done = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--json")
+    alarms = json.loads(done.out)[0]["alarms"]
+    assert alarms and {alarm["joint"] for alarm in alarms} == {"forearm"}
+    refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--joints", "arm")
+    assert refused.status == 2 and "joints belong to a limit" in refused.err
+    more = forearm / "holdout" / "01.csv"
+    added = cdtool("learn-signature", more, "-m", forearm / "machine.toml", "--update", signature, "--json")
+    assert added.status == 0 and len(json.loads(added.out)["added"]) == 1
+
+
+def test_a_signature_of_a_robot_watches_every_joint_on_both_sides_unless_told_otherwise(forearm, tmp_path):
+    learn(forearm, tmp_path / "all.json")
+    stored = json.loads((tmp_path / "all.json").read_text())["current"][0]
+    assert stored["joints"] == ["arm", "forearm"] and stored["sides"] == "two"
+
+
+def test_hand_set_limits_watch_chosen_joints(forearm):
+    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
+    found = api.detect(log, machine, detector="gm", limit=[0.6], joints=("forearm",))
+    assert found.joints == ("forearm",) and found.detections[0].statistic.values.shape[1] == 1
+    both = api.detect(log, machine, detector="gm", limit=[3.9, 0.6])
+    assert both.joints == ("arm", "forearm")
+    with pytest.raises(UsageError, match="did you mean forearm"):
+        api.detect(log, machine, detector="gm", limit=[0.6], joints=("forarm",))
+
+
+def test_a_joint_that_the_machine_does_not_have_is_refused_by_name(forearm, tmp_path):
+    text = (forearm / "benchmark.toml").read_text().replace('joints = ["forearm"]', 'joints = ["wrist"]')
+    (forearm / "wrong.toml").write_text(text)
+    with pytest.raises(ConfigurationError, match=r"joints: names 'wrist'"):
+        api.benchmark(forearm / "wrong.toml")
+    free = sorted((forearm / "free").iterdir())
+    command = ("learn-signature", *free, "-m", forearm / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")
+    done = cdtool(*command, "--joints", "wrist")
+    assert done.status == 2 and "unknown joint 'wrist'" in done.err and not (tmp_path / "s.json").exists()
+
+
+def test_an_energy_signal_belongs_to_the_whole_machine(forearm):
+    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
+    found = api.detect(log, machine, detector="energy", limit=[0.01], joints=("arm",))
+    assert found.joints == ("whole machine",)
+    done = cdtool("detect", log, "-m", machine, "-d", "energy", "--limit", "0.01")
+    assert done.status == 0 and "whole machine" in done.out
+
+
+def test_the_notes_of_a_detector_are_shown(forearm):
+    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
+    done = cdtool("detect", log, "-m", machine, "-d", "desired_dynamics", "--limit", "9")
+    assert done.status == 0 and "tracking error of arm: rms" in done.out
+    values = json.loads(cdtool("detect", log, "-m", machine, "-d", "ddd", "--limit", "9", "--json").out)
+    assert values[0]["notes"][1].startswith("tracking error of forearm")
+
+
+def test_info_names_every_joint(forearm):
+    done = cdtool("info", forearm / "stiff" / "01.csv", "-m", forearm / "machine.toml")
+    assert done.status == 0 and "speed [arm]" in done.out and "speed [forearm]" in done.out
