@@ -174,7 +174,7 @@ def _filterpy(detector: FrictionEkf, run: Run, machine: LinearAxis, joint: bool)
         kalman.Q = np.diag([q_d * PERIOD, q_a, q_v])
         noise = np.diag([r_a, r_v])
         friction = np.empty(len(run.time))
-        friction[0] = viscous
+        friction[0] = known_friction
         for k in range(1, len(run.time)):
             d, _, v = kalman.x
             kalman.F = np.array([[1.0, 0.0, 0.0], [-v / inertia, 0.0, -d / inertia], [0.0, PERIOD, 1.0]])

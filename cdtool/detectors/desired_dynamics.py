@@ -62,9 +62,9 @@ class DesiredDynamics:
         pose, speed, acceleration = (
             hold_last(item, ~np.isfinite(item)) for item in (reference.values, speed, acceleration)
         )
-        needed = machine.required_torque(pose, speed, acceleration)
         held = hold_last(torque, ~np.isfinite(torque))
-        residual, _ = low_pass(time, held - needed, motion_missing, self.cutoff)
+        balance = machine.force_balance(held, pose, speed) - machine.inertia_times(pose, acceleration)
+        residual, _ = low_pass(time, balance, motion_missing, self.cutoff)
         settle = settling_time(self.cutoff)
         started = started_at(time, motion_missing, settle)
         status = np.where(time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)

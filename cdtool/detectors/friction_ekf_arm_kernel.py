@@ -13,9 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from cdtool.detection import StatusArray
+from cdtool.detectors.friction_ekf_kernel import progress_of_settling
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
+State = tuple[float, float, float, float]
 Covariance = tuple[float, float, float, float, float, float, float, float, float, float]
 
 _TEN = "UniTuple(float64, 10)"
@@ -51,8 +53,8 @@ def predict_covariance(
 @kernel(f"{_TEN}({_TEN}, {_FOUR}, {_FOUR}, float64)")
 def update_covariance(
     p: Covariance,
-    column: tuple[float, float, float, float],
-    k: tuple[float, float, float, float],
+    column: State,
+    k: State,
     innovation: float,
 ) -> Covariance:
     """Joseph form P - k c' - c k' + k k' S: c is P's column of the measured state, S the innovation's variance.
@@ -74,6 +76,18 @@ def update_covariance(
         p34 - k3 * c4 - c3 * k4 + k3 * k4 * innovation,
         p44 - 2.0 * k4 * c4 + k4 * k4 * innovation,
     )
+
+
+@kernel(f"Tuple(({_FOUR}, {_TEN}))({_FOUR}, {_TEN}, {_FOUR}, float64, float64, b1)")
+def correct(
+    state: State, p: Covariance, column: State, innovation: float, surprise: float, applicable: bool
+) -> tuple[State, Covariance]:
+    """State and covariance after one scalar measurement; where the friction cannot be observed, d is left alone."""
+    k1 = column[0] / innovation if applicable else 0.0
+    k = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
+    d, a, v, q = state
+    corrected = (d + k[0] * surprise, a + k[1] * surprise, v + k[2] * surprise, q + k[3] * surprise)
+    return corrected, update_covariance(p, column, k, innovation)
 
 
 @kernel(
@@ -114,7 +128,6 @@ def run_arm_filter(
 
     `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is.
     """
-    reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)
     next_sample = 0
     started = False
@@ -174,45 +187,19 @@ def run_arm_filter(
             sample = acceleration[next_sample]
             if np.isfinite(sample) and step >= 0.0:
                 column = (p[1], p[4], p[5], p[6])
-                innovation = p[4] + r_a
-                k1 = column[0] / innovation if applicable else 0.0
-                gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
-                surprise = sample - a
-                d, a = d + gains[0] * surprise, a + gains[1] * surprise
-                v, q = v + gains[2] * surprise, q + gains[3] * surprise
-                p = update_covariance(p, column, gains, innovation)
+                (d, a, v, q), p = correct((d, a, v, q), p, column, p[4] + r_a, sample - a, applicable)
                 last_acceleration_time = until
             next_sample += 1
         if seen:
             applicable = abs(speed[k]) >= minimum_speed
             column = (p[2], p[5], p[7], p[8])
-            innovation = p[7] + r_v
-            k1 = column[0] / innovation if applicable else 0.0
-            gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
-            surprise = speed[k] - v
-            d, a = d + gains[0] * surprise, a + gains[1] * surprise
-            v, q = v + gains[2] * surprise, q + gains[3] * surprise
-            p = update_covariance(p, column, gains, innovation)
+            (d, a, v, q), p = correct((d, a, v, q), p, column, p[7] + r_v, speed[k] - v, applicable)
             column = (p[3], p[6], p[8], p[9])
-            innovation = p[9] + r_q
-            k1 = column[0] / innovation if applicable else 0.0
-            gains = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
-            surprise = position[k] - q
-            d, a = d + gains[0] * surprise, a + gains[1] * surprise
-            v, q = v + gains[2] * surprise, q + gains[3] * surprise
-            p = update_covariance(p, column, gains, innovation)
-            since = time[k] - last_speed_time
-            # Rough bandwidth: ready once its integral over time reaches 3.
-            if applicable:
-                against = against + 1 if (speed[k] > 0.0) != forward else 0
-                if against == reversal_samples:
-                    forward = not forward
-                    against = 0
-                    settled = 0.0  # after a rebound the estimate has the wrong sign for a while
-                settled += bandwidth_scale * abs(speed[k]) * np.sqrt(since)
-                last_applicable = time[k]
-            elif time[k] - last_applicable > glitch:
-                settled = 0.0
+            (d, a, v, q), p = correct((d, a, v, q), p, column, p[9] + r_q, position[k] - q, applicable)
+            gained = bandwidth_scale * abs(speed[k]) * np.sqrt(time[k] - last_speed_time)
+            settled, against, forward, last_applicable = progress_of_settling(
+                applicable, speed[k] > 0.0, time[k], gained, glitch, settled, against, forward, last_applicable
+            )
             last_speed_time = time[k]
         held = k
         friction[k] = d

@@ -73,6 +73,34 @@ def update_third(p: Covariance, k1: float, k2: float, k3: float, noise: float) -
     )
 
 
+@kernel(
+    "Tuple((float64, int64, b1, float64))(b1, b1, float64, float64, float64, float64, int64, b1, float64)",
+)
+def progress_of_settling(
+    applicable: bool,
+    moves_forward: bool,
+    time: float,
+    gained: float,
+    glitch: float,
+    settled: float,
+    against: int,
+    forward: bool,
+    last_applicable: float,
+) -> tuple[float, int, bool, float]:
+    """How far the estimate has settled: (settled, against, forward, last_applicable) after one more sample.
+
+    `settled` is the integral of the rough bandwidth over time, `gained` this step's part: ready once it reaches 3. It
+    starts anew after a stop longer than `glitch` and after a rebound, when the estimate has the wrong sign for a while;
+    fewer than 3 samples in succession of the other sign are wild ones.
+    """
+    if applicable:
+        against = against + 1 if moves_forward != forward else 0
+        if against == 3:
+            return gained, 0, not forward, time
+        return settled + gained, against, forward, time
+    return 0.0 if time - last_applicable > glitch else settled, against, forward, last_applicable
+
+
 _READ = "Array(float64, 1, 'C', readonly=True)"
 
 
@@ -106,7 +134,6 @@ def run_filter(
     `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not;
     `missing`: force or speed is missing.
     """
-    reversal_samples = 3  # fewer of the other sign are wild samples, not a rebound
     samples = len(acceleration)
     next_sample = 0
     started = False
@@ -196,18 +223,10 @@ def run_filter(
             a += k2 * surprise
             v += k3 * surprise
             p = update_third(p, k1, k2, k3, r_v)
-            since = time[k] - last_speed_time
-            # Rough bandwidth: ready once its integral over time reaches 3.
-            if applicable:
-                against = against + 1 if (speed[k] > 0.0) != forward else 0
-                if against == reversal_samples:
-                    forward = not forward
-                    against = 0
-                    settled = 0.0  # after a rebound the estimate has the wrong sign for a while
-                settled += bandwidth_scale * inverse_inertia * abs(speed[k]) * np.sqrt(since)
-                last_applicable = time[k]
-            elif time[k] - last_applicable > glitch:
-                settled = 0.0
+            gained = bandwidth_scale * inverse_inertia * abs(speed[k]) * np.sqrt(time[k] - last_speed_time)
+            settled, against, forward, last_applicable = progress_of_settling(
+                applicable, speed[k] > 0.0, time[k], gained, glitch, settled, against, forward, last_applicable
+            )
             last_speed_time = time[k]
         held_force = force[k]
         if varies:
