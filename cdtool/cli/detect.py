@@ -17,6 +17,7 @@ from cdtool.evaluation.results import Skipped
 if TYPE_CHECKING:
     from cdtool.evaluation.matching import Matching
     from cdtool.pipeline import Detection
+    from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
 
 # Operations of which is told what could not be judged, and how many stretches of each.
@@ -34,6 +35,9 @@ def detect(
     ] = "",
     detector: Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")] = None,
     joints: JointsOption = "",
+    contact_at: Annotated[
+        str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z, m in the link's frame.")
+    ] = "",
     operations: OperationsOption = "whole",
     debounce: DebounceOption = None,
     onset_above: Annotated[
@@ -53,13 +57,16 @@ def detect(
     """
     from cdtool.evaluation.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
+    from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
     from cdtool.workflows.runs import lost
 
     machine_file = read_machine_file(machine)
     limits = _limits(limit)
+    contact = ContactPoint.parse(contact_at) if contact_at else None
     plot_names = _plot_names(plot, logs)
     done: list[tuple[Path, Detected]] = []
+    forces: dict[str, ForceSummary] = {}
     skipped: list[Skipped] = []
     with progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
@@ -75,6 +82,9 @@ def detect(
                     debounce=debounce,
                     onset=OnsetRule(above=onset_above, back_to=onset_back_to),
                 )
+                if contact:
+                    made = [summarise_force(item, machine_file.machine, contact) for item in found.detections]
+                    forces |= {item.operation: item for item in made}
                 done.append((log, found))
                 skipped += lost(found.recording)
                 if plot_names:
@@ -97,11 +107,13 @@ def detect(
         pairs = (
             (log, found, *pair) for log, found in done for pair in zip(found.detections, found.matchings, strict=True)
         )
-        print_json([_as_json(*item) for item in pairs])
+        print_json([_as_json(*item, forces.get(item[2].operation.name)) for item in pairs])
     else:
         _show([pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)])
         _show_not_judged([detection for _, found in done for detection in found.detections])
         _show_notes([detection for _, found in done for detection in found.detections])
+        for force in list(forces.values())[:_SHOWN]:
+            _show_force(force)
         for log, _ in done:
             if log in plot_names:
                 typer.echo(f"plot written to {plain(plot_names[log])}")
@@ -157,6 +169,14 @@ def _rows_of(detection: Detection, matching: Matching) -> list[tuple[object, ...
     return rows
 
 
+def _show_force(force: ForceSummary) -> None:
+    at_alarm = f"{force.at_alarm:.1f} N at the first alarm, " if math.isfinite(force.at_alarm) else ""
+    largest = (
+        f"largest {force.largest:.1f} N at {force.largest_at:.3f} s" if math.isfinite(force.largest) else "unknown"
+    )
+    typer.echo(f"{plain(force.operation)}: estimated force at {plain(str(force.contact))}: {at_alarm}{largest}")
+
+
 def _show_notes(detections: list[Detection]) -> None:
     """What a detector wants to be known of its signal, of as many operations as for what could not be judged."""
     for detection in detections[:_SHOWN]:
@@ -179,7 +199,9 @@ def _show_not_judged(detections: list[Detection]) -> None:
         typer.echo(f"not judged: and {len(shown) - _SHOWN} operations more (--json has all)")
 
 
-def _as_json(log: Path, found: Detected, detection: Detection, matching: Matching) -> dict[str, Any]:
+def _as_json(
+    log: Path, found: Detected, detection: Detection, matching: Matching, force: ForceSummary | None
+) -> dict[str, Any]:
     joints = detection.statistic.joints
     return {
         "log": str(log),
@@ -211,6 +233,13 @@ def _as_json(log: Path, found: Detected, detection: Detection, matching: Matchin
         ],
         "not_judged": detection.statistic.shares(),
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
+        "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),
         "findings": [str(item) for item in found.recording.findings],
     }
+
+
+def _force_as_json(force: ForceSummary) -> dict[str, Any]:
+    figures = {"at_alarm_n": force.at_alarm, "largest_n": force.largest, "largest_at_s": force.largest_at}
+    known = {name: value if math.isfinite(value) else None for name, value in figures.items()}
+    return {"link": force.contact.link, "point_m": list(force.contact.point), **known}

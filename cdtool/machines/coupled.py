@@ -16,6 +16,9 @@ from cdtool.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
 from cdtool.recording import FloatArray
 
+# A singular value of the Jacobian below this share of the largest: what it would tell of a force is noise.
+_HARDLY = 0.05
+
 
 @dataclass(frozen=True)
 class CoupledMachine(JointMachine, ABC):
@@ -81,10 +84,11 @@ class CoupledMachine(JointMachine, ABC):
     ) -> FloatArray:
         """The force (n, 3) [N] at a known point that explains a joint residual best: least squares of J_c' F = res.
 
-        Of the force only what moves the joints can be seen: in a direction in which the point cannot move it is 0.
+        Of the force only what moves the joints can be seen: in a direction in which the point cannot move, or hardly
+        (5 % of its best direction, near a singular pose), it is 0.
         """
         jacobian = self.contact_jacobian(position, link, point)[:, :3]
-        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1)), residual))
+        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1), rcond=_HARDLY), residual))
 
     def require_inertia(self, who: str) -> None:
         """A coupled machine always has its inertia."""

@@ -1,0 +1,81 @@
+"""From a joint residual to the force at a known contact point (thesis 2.2-2.5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cdtool.clock import previous_value
+from cdtool.errors import UsageError
+from cdtool.pipeline import Detection
+from cdtool.recording import FloatArray, Series
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """A point fixed to a link, in the link's frame [m]."""
+
+    link: str
+    point: tuple[float, float, float]
+
+    @classmethod
+    def parse(cls, text: str) -> ContactPoint:
+        """From LINK:X,Y,Z; raises UsageError."""
+        link, _, numbers = text.rpartition(":")
+        try:
+            x, y, z = (float(part) for part in numbers.split(","))
+        except ValueError:
+            x = y = z = np.nan
+        if not link or not np.isfinite([x, y, z]).all():
+            raise UsageError(f"contact point is '{text}'", "LINK:X,Y,Z in m in the link's frame, e.g. link4:0,0.1,0.3")
+        return cls(link, (x, y, z))
+
+    def __str__(self) -> str:
+        return f"{self.link} ({', '.join(f'{x:g}' for x in self.point)}) m"
+
+
+def contact_force(detection: Detection, machine: Any, contact: ContactPoint) -> Series:
+    """The force (n, 3) [N], base axes, that the machine exerts at the point, on the signal's clock.
+
+    Least squares of J_c' F = residual. NaN where the signal cannot be judged or the pose is missing. In a direction in
+    which the point cannot move, or does so only with a joint that is not watched, it is 0. Raises UsageError where the
+    signal is no contact torque of all joints, ConfigurationError for an unknown link.
+    """
+    signal, recording = detection.statistic, detection.operation.recording
+    if not machine.coupled:
+        raise UsageError(f"machine '{machine.name}' has no links to touch", "a planar_arm or urdf_robot is needed")
+    if signal.joints != recording.joints or signal.unit != machine.force_unit or detection.detector == "pure_torque":
+        raise UsageError(
+            f"{detection.detector} of {', '.join(signal.joints)} is no contact torque of all joints",
+            "momentum, inertial_momentum, velocity, direct, desired_dynamics or kalman_momentum of all joints",
+        )
+    position = previous_value(recording["position"], signal.time)
+    known = np.isfinite(position).all(axis=1) & signal.valid.all(axis=1)
+    force: FloatArray = np.full((len(signal.time), 3), np.nan)
+    force[known] = machine.contact_force(position[known], signal.values[known], contact.link, contact.point)
+    return Series(signal.time, force, "N")
+
+
+@dataclass(frozen=True)
+class ForceSummary:
+    """The estimated force's magnitude [N]: at the first alarm (NaN without one), and its largest with its time [s]."""
+
+    contact: ContactPoint
+    operation: str
+    at_alarm: float
+    largest: float
+    largest_at: float
+
+
+def summarise_force(detection: Detection, machine: Any, contact: ContactPoint) -> ForceSummary:
+    """Magnitude of the estimated force at the first alarm and at its largest; raises as `contact_force` does."""
+    force = contact_force(detection, machine, contact)
+    size = np.linalg.norm(force.values, axis=1)
+    alarms = detection.verdict.alarms
+    at_alarm = float(size[np.searchsorted(force.time, alarms[0].time, side="right") - 1]) if alarms else float("nan")
+    if not np.isfinite(size).any():
+        return ForceSummary(contact, detection.operation.name, at_alarm, float("nan"), float("nan"))
+    peak = int(np.nanargmax(size))
+    return ForceSummary(contact, detection.operation.name, at_alarm, float(size[peak]), float(force.time[peak]))
