@@ -110,10 +110,6 @@ class Machine(Protocol):
         """tau - C v - g - friction: what is left to accelerate or to collide."""
         ...
 
-    def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """M a + C v + g + friction: what the drives must give for this motion without contact."""
-        ...
-
     def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:
         """v'(tau - friction) [W]: (n, 1) of the whole machine, (n, J) where the joints are not coupled."""
         ...

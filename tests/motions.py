@@ -57,3 +57,19 @@ def moving(
             spoilt = values + noise * values.std(axis=0) * rng.standard_normal(values.shape)
         channels[name] = Series(time, spoilt, unit)
     return Recording(f"moving{seed}", "made up", machine.joints, channels, digest=f"moving{seed}")
+
+
+def standing(machine: Any, position: Sequence[float], torque: Sequence[float], seconds: float = 3.0) -> Recording:
+    """A machine at rest in a pose (J,) while its drives give a constant torque (J,)."""
+    time = np.arange(round(seconds / PERIOD)) * PERIOD
+    nothing = np.zeros((len(time), len(machine.joints)))
+    units = machine.load_units
+    pose = Series(time, nothing + np.asarray(position), units["position"])
+    channels = {
+        "torque": Series(time, nothing + np.asarray(torque), units["torque"]),
+        "position": pose,
+        "reference_position": pose,
+        "speed": Series(time, nothing, units["speed"]),
+        "acceleration": Series(time, nothing, units["acceleration"]),
+    }
+    return Recording("standing", "made up", machine.joints, channels)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cdtool.machines.urdf_robot import UrdfRobot
@@ -49,3 +49,12 @@ def six_joint_robot(folder: Path, joints: Sequence[str] = JOINTS, **keys: object
         **keys,
     }
     return UrdfRobot.from_table(Table(values, str(folder / "machine.toml"), "machine."))
+
+
+def urdf_robot(folder: Path, urdf: str, values: Mapping[str, object]) -> UrdfRobot:
+    """The machine of a URDF's text and the keys of its [machine] table; needs pinocchio."""
+    (folder / "robot.urdf").write_text(urdf, encoding="utf-8")
+    table = Table({"urdf": "robot.urdf", **values}, str(folder / "machine.toml"), "machine.")
+    robot = UrdfRobot.from_table(table)
+    table.finish()
+    return robot

@@ -1,0 +1,261 @@
+"""The planar arm against Lagrange's equations, its sensors, its contacts, and what its machine file may not say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.machines.planar_arm import PlanarArm
+from cdtool.recording import FloatArray, Recording, Series
+from tests.conftest import ARM, arm_of
+from tests.motions import moving
+
+RNG = np.random.default_rng(6)
+POSITION, SPEED, ACCELERATION = RNG.uniform(-3.0, 3.0, (3, 200, 2))
+ELBOW = 0.30
+
+
+def kinetic_and_potential(arm: PlanarArm, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Each (n,) [J], from the centres of mass and the motors: nothing of the arm's own methods."""
+    angles, rates = position.T, speed.T
+    velocity = [0.0, 0.0]
+    kinetic = potential = np.zeros(len(position))
+    height = np.zeros(len(position))
+    for i in range(2):
+        reach = arm.centre_of_mass[i]
+        across = velocity[0] - reach * np.sin(angles[i]) * rates[i], velocity[1] + reach * np.cos(angles[i]) * rates[i]
+        motor = arm.motor_inertia[i] / arm.transmission_ratio[i] ** 2
+        kinetic = kinetic + 0.5 * arm.link_mass[i] * (across[0] ** 2 + across[1] ** 2)
+        kinetic = kinetic + 0.5 * (arm.link_inertia[i] + motor) * rates[i] ** 2
+        potential = potential + arm.link_mass[i] * 9.81 * (height + reach * np.sin(angles[i]))
+        velocity = [-ELBOW * np.sin(angles[0]) * rates[0], ELBOW * np.cos(angles[0]) * rates[0]]
+        height = ELBOW * np.sin(angles[0])
+    return kinetic, potential
+
+
+def slope(function, at: FloatArray, step: float = 1e-4) -> FloatArray:
+    """(..., 2): derivative by each joint's value, fourth order."""
+    columns = []
+    for j in range(2):
+        move = step * np.eye(2)[j]
+        near = function(at + move) - function(at - move)
+        far = function(at + 2.0 * move) - function(at - 2.0 * move)
+        columns.append((8.0 * near - far) / (12.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+def test_energies_are_those_of_two_rigid_bodies_and_two_motors(arm):
+    for found, wanted in zip(arm.energies(POSITION, SPEED), kinetic_and_potential(arm, POSITION, SPEED), strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
+
+
+def test_6_21_and_6_22_are_lagranges_equations_of_these_energies(arm):
+    """d/dt dT/dv - dT/dq + dU/dq, T = v'M v / 2: M from T, the rest by numerical derivatives."""
+
+    def momentum(position: FloatArray, speed: FloatArray) -> FloatArray:
+        # T is a quadratic form of v, so that a central difference of any step is exact.
+        return slope(lambda v: kinetic_and_potential(arm, position, v)[0], speed, 0.5)
+
+    carried = np.einsum("nij,nj->ni", slope(lambda q: momentum(q, SPEED), POSITION), SPEED)
+    kinetic = slope(lambda q: kinetic_and_potential(arm, q, SPEED)[0], POSITION)
+    potential = slope(lambda q: kinetic_and_potential(arm, q, SPEED)[1], POSITION)
+    wanted = momentum(POSITION, ACCELERATION) + carried - kinetic + potential
+    np.testing.assert_allclose(arm.inverse_dynamics(POSITION, SPEED, ACCELERATION), wanted, atol=1e-9)
+
+
+def test_momentum_velocity_force_and_gravity_make_the_rate_of_the_momentum(arm):
+    """dM/dt = C + C': dp/dt = tau + C'v - g wherever tau is what the motion needs."""
+    momentum, velocity_force, gravity = arm.momentum_terms(POSITION, SPEED)
+    needed = arm.inverse_dynamics(POSITION, SPEED, ACCELERATION)
+    step = 1e-4
+
+    def later(t: float) -> FloatArray:
+        position = POSITION + t * SPEED + 0.5 * t**2 * ACCELERATION
+        return arm.momentum(position, SPEED + t * ACCELERATION)
+
+    rate = (8.0 * (later(step) - later(-step)) - (later(2.0 * step) - later(-2.0 * step))) / (12.0 * step)
+    np.testing.assert_allclose(momentum, later(0.0), rtol=1e-12)
+    np.testing.assert_allclose(rate, needed + velocity_force - gravity, atol=1e-9)
+
+
+def test_velocity_force_is_the_slope_of_the_kinetic_energy_and_gravity_that_of_the_potential(arm):
+    kinetic = slope(lambda q: arm.kinetic_energy(q, SPEED), POSITION)
+    potential = slope(arm.potential_energy, POSITION)
+    np.testing.assert_allclose(arm.velocity_force(POSITION, SPEED), kinetic, atol=1e-9)
+    np.testing.assert_allclose(arm.gravity(POSITION), potential, atol=1e-9)
+
+
+def test_the_inertia_matrix_does_what_its_product_with_a_vector_does(arm):
+    product = np.einsum("nij,nj->ni", arm.inertia_matrix(POSITION), ACCELERATION)
+    np.testing.assert_allclose(product, arm.inertia_times(POSITION, ACCELERATION), rtol=1e-12)
+    assert (np.linalg.eigvalsh(arm.inertia_matrix(POSITION)) > 0.0).all()
+
+
+def sensed(arm: PlanarArm, elbow: bool = True) -> tuple[Recording, FloatArray]:
+    """A log whose sensors feel what two accelerometers at imu_position would, and the links' true accelerations.
+
+    The sensors' places are differentiated twice; without `elbow` the second one is taken as if its joint stood still.
+    """
+    log = moving(arm, seconds=3.0, seed=4)
+    position, speed, acceleration = (log[name].values for name in ("position", "speed", "acceleration"))
+
+    def place(link: int, t: float) -> FloatArray:
+        angle = position + t * speed + 0.5 * t**2 * acceleration
+        own = arm.imu_position[link] * np.array([np.cos(angle[:, link]), np.sin(angle[:, link])])
+        joint = ELBOW * np.array([np.cos(angle[:, 0]), np.sin(angle[:, 0])])
+        return own + joint if link and elbow else own
+
+    step = 2e-3
+    felt = []
+    for link in range(2):
+        near = place(link, step) - 2.0 * place(link, 0.0) + place(link, -step)
+        far = place(link, 2.0 * step) - 2.0 * place(link, 0.0) + place(link, -2.0 * step)
+        moved = (16.0 * near - far) / (12.0 * step**2) + np.array([[0.0], [9.81]])
+        across = np.array([-np.sin(position[:, link]), np.cos(position[:, link])])
+        felt.append(np.sum(across * moved, axis=0))
+    series = Series(log["speed"].time, np.column_stack(felt), "m/s2")
+    return replace(log, channels={**log.channels, "acceleration": series}), acceleration
+
+
+def test_the_sensors_specific_forces_become_the_links_angular_accelerations(arm):
+    log, true = sensed(arm)
+    found = arm.link_acceleration(log)
+    assert found.unit == "rad/s2"
+    np.testing.assert_allclose(found.values, true, atol=1e-9)
+
+
+def test_a_second_sensor_that_did_not_feel_the_elbow_would_be_read_wrongly(arm):
+    log, true = sensed(arm, elbow=False)
+    error = np.abs(arm.link_acceleration(log).values - true).max(axis=0)
+    assert error[0] < 1e-9
+    assert error[1] > 0.5
+
+
+def test_a_log_of_motors_and_sensors_is_referred_to_the_links(arm):
+    log, true = sensed(arm)
+    as_logged = {
+        name: Series(series.time, series.values * 60.0, series.unit)
+        for name, series in log.channels.items()
+        if name in ("position", "speed")
+    }
+    as_logged["torque"] = Series(log["torque"].time, log["torque"].values / 60.0, "N m")
+    as_logged["acceleration"] = log["acceleration"]
+    referred = arm.referred_to_load(replace(log, channels=as_logged))
+    for name in ("torque", "position", "speed"):
+        np.testing.assert_allclose(referred[name].values, log[name].values, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(referred["acceleration"].values, true, atol=1e-9)
+    assert [str(finding) for finding in referred.findings if finding.channel == "acceleration"] == [
+        "acceleration: specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"
+    ]
+
+
+def test_accelerations_of_the_links_themselves_stay_as_they_are(arm):
+    log = moving(arm, seconds=1.0)
+    referred = arm.referred_to_load(log)
+    assert referred["acceleration"] is log["acceleration"]
+    assert not referred.findings
+
+
+def test_an_acceleration_may_be_logged_in_either_unit_and_the_rest_in_the_motors(arm):
+    assert arm.accepted_units("acceleration") == ("m/s2", "rad/s2")
+    assert arm.accepted_units("torque") == ("N m",)
+    assert arm.accepted_units("speed") == ("rad/s",)
+
+
+@pytest.mark.parametrize(("lost", "named"), [(("position",), "position"), (("speed", "position"), "position")])
+def test_sensors_without_a_pose_are_refused_for_gravity_would_be_unknown(arm, lost, named):
+    log, _ = sensed(arm)
+    left = {name: series for name, series in log.channels.items() if name not in lost}
+    with pytest.raises(RecordingError, match=f"the links' accelerations need the channel '{named}'"):
+        arm.referred_to_load(replace(log, channels=left))
+
+
+def test_sensors_whose_place_is_not_given_are_refused():
+    arm = arm_of({key: value for key, value in ARM.items() if key != "imu_position"})
+    log, _ = sensed(arm_of(ARM))
+    with pytest.raises(ConfigurationError, match="imu_position is missing") as caught:
+        arm.referred_to_load(log)
+    assert "rad/s2" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("joints", ["arm"], "machine.joints: names 1 joints"),
+        ("joints", ["a", "b", "c"], "machine.joints: names 3 joints"),
+        ("link_mass", [1.3, -1.6], r"machine.link_mass\[1\]: is -1.6"),
+        ("link_mass", 0.0, "machine.link_mass: is 0.0"),
+        ("link_mass", None, "machine.link_mass: is missing"),
+        ("link_length", -0.3, "machine.link_length: is -0.3"),
+        ("link_inertia", [0.01, -0.01], r"machine.link_inertia\[1\]: is -0.01"),
+        ("imu_position", [0.2, -0.2], r"machine.imu_position\[1\]: is -0.2"),
+        ("centre_of_mass", [0.1, 0.1, 0.1], "machine.centre_of_mass: has 3 values"),
+        ("gravity", [0.0, 0.0, -9.81], r"machine.gravity: is \[0.0, 0.0, -9.81\]"),
+        ("gravity", -9.81, "machine.gravity: is -9.81"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_by_name(key, value, message):
+    values = {name: item for name, item in {**ARM, key: value}.items() if item is not None}
+    with pytest.raises(ConfigurationError, match=message):
+        arm_of(values)
+
+
+POINTS = [("arm", (0.28, 0.0, 0.0)), ("forearm", (0.2, 0.0, 0.05))]
+
+
+def place_of(link: str, point: tuple[float, float, float], position: FloatArray) -> FloatArray:
+    """(n, 2): x and height of a point of a link."""
+    own = position[:, ("arm", "forearm").index(link)]
+    along, across = point[0], point[2]
+    here = np.column_stack((along * np.cos(own) - across * np.sin(own), along * np.sin(own) + across * np.cos(own)))
+    elbow = ELBOW * np.column_stack((np.cos(position[:, 0]), np.sin(position[:, 0])))
+    return here + elbow if link == "forearm" else here
+
+
+@pytest.mark.parametrize(("link", "point"), POINTS)
+def test_the_contact_jacobian_gives_the_velocity_of_its_point(arm, link, point):
+    jacobian = arm.contact_jacobian(POSITION, link, point)
+    velocity = np.einsum("nij,nj->ni", jacobian, SPEED)
+    moved = np.einsum("nij,nj->ni", slope(lambda q: place_of(link, point, q), POSITION), SPEED)
+    np.testing.assert_allclose(velocity[:, [0, 2]], moved, atol=1e-9)
+    assert not velocity[:, 1].any()
+    turning = SPEED[:, ("arm", "forearm").index(link)]
+    np.testing.assert_allclose(velocity[:, 3:], np.outer(turning, [0.0, -1.0, 0.0]), atol=1e-12)
+
+
+@pytest.mark.parametrize(("link", "point"), POINTS)
+def test_a_contact_force_has_the_same_power_at_its_point_and_at_the_joints(arm, link, point):
+    force = RNG.normal(size=(200, 6))
+    velocity = np.einsum("nij,nj->ni", arm.contact_jacobian(POSITION, link, point), SPEED)
+    torque = arm.contact_torque(POSITION, force, link, point)
+    np.testing.assert_allclose(np.sum(torque * SPEED, axis=1), np.sum(force * velocity, axis=1), rtol=1e-9, atol=1e-12)
+
+
+def test_a_planar_force_on_the_forearm_is_recovered_from_the_residual_of_both_joints(arm):
+    link, point = POINTS[1]
+    # Away from the stretched arm, where the two joints move the point the same way.
+    bent = np.column_stack((POSITION[:, 0], POSITION[:, 0] + 1.4))
+    force = np.zeros((200, 6))
+    force[:, [0, 2]] = RNG.normal(size=(200, 2)) * 30.0
+    residual = arm.contact_torque(bent, force, link, point)
+    np.testing.assert_allclose(arm.contact_force(bent, residual, link, point), force[:, :3], atol=1e-9)
+
+
+def test_of_a_force_on_the_arm_only_the_part_across_it_can_be_seen(arm):
+    link, point = POINTS[0]
+    along = np.column_stack((np.cos(POSITION[:, 0]), np.zeros(200), np.sin(POSITION[:, 0])))
+    across = np.column_stack((-np.sin(POSITION[:, 0]), np.zeros(200), np.cos(POSITION[:, 0])))
+    force = np.zeros((200, 6))
+    force[:, :3] = 50.0 * along + 20.0 * across + 7.0 * np.array([0.0, 1.0, 0.0])
+    residual = arm.contact_torque(POSITION, force, link, point)
+    found = arm.contact_force(POSITION, residual, link, point)
+    np.testing.assert_allclose(found, 20.0 * across, atol=1e-9)
+
+
+def test_an_unknown_link_lists_the_nearest(arm):
+    with pytest.raises(ConfigurationError, match="unknown link 'forarm'") as caught:
+        arm.contact_jacobian(POSITION, "forarm", (0.1, 0.0, 0.0))
+    assert "forearm" in caught.value.hint
