@@ -63,3 +63,44 @@ def test_a_log_without_a_header_has_a_clock_too():
     info = cdtool.info(data("ur10e/no_torque.csv"))
     assert info.channels[3].rate_hz == pytest.approx(100.0)
     assert info.channels[3].duration_s == pytest.approx(5.664)
+
+
+def test_columns_of_joints_that_are_mixed_up_are_told(tmp_path):
+    time = np.arange(4000) * 1e-3
+    positions = [np.sin(time), 0.7 * np.sin(2.3 * time + 1.0), np.full(len(time), 0.3)]
+    speeds = [np.gradient(item, 1e-3) for item in positions]
+    log = write(tmp_path / "a.csv", "t,v1,v2,v3,q1,q2,q3", [time, *speeds, *positions])
+    text = """
+[machine]
+type = "rotary_axis"
+joints = ["a", "b", "c"]
+coordinates = "load"
+[channels]
+time = { column = "t", unit = "s" }
+speed = { columns = ["v1", "v2", "v3"], unit = "rad/s" }
+position = { columns = ["ORDER", "q3"], unit = "rad" }
+"""
+    told = {}
+    for order in ("q1,q2", "q2,q1"):
+        machine = tmp_path / "machine.toml"
+        machine.write_text(text.replace("ORDER", order.replace(",", '", "')))
+        told[order] = [str(item) for item in cdtool.info(log, machine=machine).findings if "another order" in item.message]
+    assert told["q1,q2"] == []
+    assert told["q2,q1"] == [
+        "position: that of a follows the speed of b: columns in another order?",
+        "position: that of b follows the speed of a: columns in another order?",
+    ]
+
+
+@needs_data("ur10e/no_torque.csv")
+def test_the_right_columns_of_a_real_robot_are_not_suspected(tmp_path):
+    machine = tmp_path / "machine.toml"
+    columns = "[channels]\ntime = { column = 0, unit = 's' }\nposition = { columns = [POSE], unit = 'rad' }\n"
+    columns += "speed = { columns = [7, 8, 9, 10, 11, 12], unit = 'rad/s' }\n"
+    names = "[machine]\ntype = 'rotary_axis'\ncoordinates = 'load'\njoints = ['a', 'b', 'c', 'd', 'e', 'f']\n"
+    told = {}
+    for order in ("1, 2, 3, 4, 5, 6", "2, 1, 3, 4, 5, 6"):
+        machine.write_text(names + columns.replace("POSE", order))
+        info = cdtool.info(data("ur10e/no_torque.csv"), machine=machine)
+        told[order] = sum("another order" in item.message for item in info.findings)
+    assert told == {"1, 2, 3, 4, 5, 6": 0, "2, 1, 3, 4, 5, 6": 2}

@@ -18,6 +18,10 @@ from cdtool.workflows.accelerometer_check import accelerometer_findings
 from cdtool.workflows.clock_guess import guess_clock
 from cdtool.workflows.runs import read_log
 
+# Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
+# one correlates with the other's more than the second, have their columns mixed up.
+_OWN_FIT, _OTHER_FIT = 0.9, 0.99
+
 
 @dataclass(frozen=True)
 class ChannelInfo:
@@ -139,6 +143,31 @@ def _consistency(recording: Recording) -> list[Finding]:
             found.append(Finding(f"integrates to {way[1]:.4g}, the position spans {seen:.4g}: check units", "speed"))
         elif abs(signed) > 0.5 * seen and np.sign(signed) != np.sign(way[0]):
             found.append(Finding("has the opposite sign of the position's derivative", "speed"))
+    return [*found, *_swapped(recording)]
+
+
+def _swapped(recording: Recording) -> list[Finding]:
+    """Joints whose position follows another joint's speed: columns in the wrong order."""
+    speed, position = recording["speed"], recording["position"]
+    if speed.joint_count < 2 or len(speed) < 3 or len(position) < 3:
+        return []
+    steps = np.diff(speed.time)[:, np.newaxis]
+    rates = np.nan_to_num(speed.values)
+    way = np.vstack((np.zeros(speed.joint_count), np.cumsum(0.5 * (rates[1:] + rates[:-1]) * steps, axis=0)))
+    at = np.clip(np.searchsorted(speed.time, position.time, side="right") - 1, 0, None)
+    known = np.isfinite(position.values).all(axis=1)
+    ways, places = way[at][known], position.values[known]
+    if len(places) < 3:
+        return []
+    joints = speed.joint_count
+    with np.errstate(invalid="ignore", divide="ignore"):  # a joint that stands still fits nothing
+        fit = np.nan_to_num(np.corrcoef(ways.T, places.T)[:joints, joints:])
+    found = []
+    for j, joint in enumerate(recording.joints):
+        best = int(np.argmax(fit[:, j]))
+        if fit[best, j] > _OTHER_FIT and max(fit[j, j], fit[best, best]) < _OWN_FIT:
+            text = f"that of {joint} follows the speed of {recording.joints[best]}: columns in another order?"
+            found.append(Finding(text, "position"))
     return found
 
 
