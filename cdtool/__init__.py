@@ -8,6 +8,7 @@ What a command does, a notebook does in one line:
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
+    cdtool.simulate_arm(folder, {"free": 14, "stiff": 30}, seed=1, trial=2)  -> the same
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.version import __version__
     from cdtool.workflows.benchmark import benchmark
@@ -31,10 +33,11 @@ _API = {
     "detect": "cdtool.workflows.detection:detect",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
     "info": "cdtool.workflows.information:info",
+    "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }
 
-__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read", "simulate_gate"]
+__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read", "simulate_arm", "simulate_gate"]
 
 
 def __getattr__(name: str) -> Any:

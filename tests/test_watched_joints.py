@@ -111,3 +111,19 @@ def test_the_notes_of_a_detector_are_shown(forearm):
 def test_info_names_every_joint(forearm):
     done = cdtool("info", forearm / "stiff" / "01.csv", "-m", forearm / "machine.toml")
     assert done.status == 0 and "speed [arm]" in done.out and "speed [forearm]" in done.out
+
+
+def test_a_benchmark_runs_other_detectors_when_asked_and_all_that_the_logs_allow(forearm, tmp_path):
+    results = api.benchmark(forearm / "benchmark.toml", detectors=("vo", "gm")).results
+    assert results.detectors == ("velocity", "momentum")
+    every = api.benchmark(forearm / "benchmark.toml", detectors=("all",)).results
+    assert len(every.detectors) == 10 and not every.skipped
+    text = (forearm / "machine.toml").read_text()
+    (forearm / "blind.toml").write_text("".join(line for line in text.splitlines(True) if "az_1" not in line))
+    setup = (forearm / "benchmark.toml").read_text().replace("machine.toml", "blind.toml")
+    (forearm / "without.toml").write_text(setup)
+    fewer = api.benchmark(forearm / "without.toml", detectors=("all",)).results
+    left = {item.recording for item in fewer.findings if "needs the channel 'acceleration'" in item.reason}
+    assert left == {"pure_inertia", "inertial_momentum", "friction_ekf"} and len(fewer.detectors) == 7
+    with pytest.raises(UsageError, match="name one twice"):
+        api.benchmark(forearm / "benchmark.toml", detectors=("gm", "momentum"))

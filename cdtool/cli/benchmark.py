@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, number, plain, print_skipped, progress, table
-from cdtool.cli.options import JobsOption, JsonOption
+from cdtool.cli.options import JobsOption, JsonOption, listed
 
 if TYPE_CHECKING:
     from cdtool.evaluation.results import Results
@@ -20,6 +20,9 @@ def benchmark(
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="results.json or a folder for the report; repeatable.")
     ] = None,
+    detectors: Annotated[
+        str, typer.Option("--detectors", help="Others than the file's, as gm,vo,eo; all: every one that is known.")
+    ] = "",
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -33,7 +36,7 @@ def benchmark(
     targets = output or []
     check_outputs(targets)
     with progress("benchmark") as advance:
-        done = run(file, jobs=jobs, progress=advance)
+        done = run(file, detectors=listed(detectors), jobs=jobs, progress=advance)
     written = write_outputs(done, targets)
     results = done.results
     print_skipped(results.skipped, results.findings)

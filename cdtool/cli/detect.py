@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.cli.console import leave, number, plain, print_error, print_json, print_skipped, progress, table
-from cdtool.cli.options import DebounceOption, JointsOption, JsonOption, MachineOption, OperationsOption, joint_names
+from cdtool.cli.options import DebounceOption, JointsOption, JsonOption, MachineOption, OperationsOption, listed
 from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
@@ -77,7 +77,7 @@ def detect(
                     signature=signature,
                     detector=detector,
                     limit=limits,
-                    joints=joint_names(joints),
+                    joints=listed(joints),
                     operations=operations,
                     debounce=debounce,
                     onset=OnsetRule(above=onset_above, back_to=onset_back_to),

@@ -15,7 +15,7 @@ from cdtool.cli.options import (
     JsonOption,
     MachineOption,
     OperationsOption,
-    joint_names,
+    listed,
 )
 from cdtool.errors import ExitStatus, UsageError
 
@@ -87,7 +87,7 @@ def learn_signature(
             machine,
             detector,
             rule=settings,
-            joints=joint_names(joints),
+            joints=listed(joints),
             operations=operations,
             debounce=debounce,
             jobs=jobs,

@@ -25,6 +25,6 @@ JobsOption = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Logs read 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
-def joint_names(text: str) -> tuple[str, ...]:
+def listed(text: str) -> tuple[str, ...]:
     """The names in a comma-separated list."""
     return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -31,7 +31,7 @@ class DesiredDynamics:
     """
 
     cutoff: float = gain(5.0, "Hz", "cut-off frequency of the low-pass")
-    tracking_limit: float = gain(0.05, "m", "tracking error beyond which the method is not applicable (rad: robots)")
+    tracking_limit: float = gain(0.2, "m", "tracking error beyond which the method is not applicable (rad: robots)")
 
     name: ClassVar[str] = "desired_dynamics"
     short_name: ClassVar[str] = "ddd"

@@ -207,6 +207,25 @@ drift_acceleration = 0.0375        # rad/s2 per sample
 drift_speed = 1e-3                 # rad/s per sample
 drift_position = 1e-4              # rad per sample
 minimum_speed = 0.05               # rad/s
+
+# Not in the thesis: the same bandwidth of 86 rad/s for the others.
+[detectors.velocity]
+bandwidth = 86.0                   # rad/s
+
+[detectors.energy]
+bandwidth = 86.0                   # rad/s
+
+[detectors.direct]
+cutoff = 13.7                      # Hz
+
+[detectors.desired_dynamics]
+cutoff = 13.7                      # Hz
+tracking_limit = 0.1               # rad
+
+[detectors.kalman_momentum]
+sigma_speed = 0.01                 # rad/s
+sigma_torque = 0.1                 # N m
+contact_drift = 0.35               # N m per sqrt(s)
 """
 
 

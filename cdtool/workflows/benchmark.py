@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from cdtool.activation import Activation
-from cdtool.errors import NothingValidError, RecordingError, SignatureError
+from cdtool.errors import CdtoolError, NothingValidError, RecordingError, SignatureError
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Results, Skipped
 from cdtool.kernels import compile_loaded
 from cdtool.operations import Operation
@@ -19,7 +19,7 @@ from cdtool.pipeline import run_detector
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.learning import fit_signatures
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
 from cdtool.workflows.scoring import Exposure, Scored, Trace, contact_results, false_alarm_results, score_log
@@ -34,33 +34,47 @@ class Benchmark:
     seconds: Mapping[str, float]
 
 
-def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Progress | None = None) -> Benchmark:
+def benchmark(
+    file: str | Path | BenchmarkFile,
+    *,
+    detectors: Sequence[str] = (),
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Benchmark:
     """Learn every detector's threshold, run them over all groups, match alarms with contacts.
+
+    `detectors`: others than the file's; "all" alone stands for every one that is registered and can learn from these
+    logs, the others are named in `results.findings`.
 
     A log that cannot be read or scored is left out and named in `results.skipped`. Raises ConfigurationError for a
     wrong file, SignatureError where nothing can be learned, RecordingError where nothing could be scored.
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
+    setup = with_detectors(setup, detectors) if detectors else setup
     machine_file = setup.machine_file
-    detectors = [machine_file.detector(name) for name in setup.detectors]
+    used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
     begin = perf_counter()
     learn = load_runs(setup.learn, machine_file, setup.operations, jobs=jobs, base=setup.path.parent)
     learned_at = perf_counter()
-    thresholds, skipped, blind = _learn(setup, learn.operations, detectors, learn.skipped)
+    left_out: list[Skipped] = []
+    if list(detectors) == ["all"]:
+        used, left_out = _that_can_run(used, learn.operations, machine_file.machine)
+        setup = replace(setup, detectors=tuple(detector.name for detector in used))
+    thresholds, skipped, blind = _learn(setup, learn.operations, used, learn.skipped)
     seconds = {"reading": learned_at - begin, "detecting": perf_counter() - learned_at}
     work = [(group, path) for group in setup.groups for path in _paths(setup, group)]
     activation = Activation(setup.debounce)
 
     def score(item: tuple[str, Path]) -> Scored:
-        return score_log(setup, item[0], item[1], detectors, thresholds, activation)
+        return score_log(setup, item[0], item[1], used, thresholds, activation)
 
     traces: dict[str, Trace] = {}
     contacts: list[ContactResult] = []
     false_alarms: list[FalseAlarmResult] = []
     exposure: dict[tuple[str, str], Exposure] = {}
     skipped = [*learn.skipped, *skipped]
-    findings = [*learn.findings, *blind]
+    findings = [*learn.findings, *left_out, *blind]
     digests = {op.recording.source: op.recording.digest for op in learn.operations}
     for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
         skipped += scored.skipped
@@ -82,7 +96,7 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
         reason = f"; first reason: {skipped[0].recording}: {skipped[0].reason}" if skipped else ""
         raise RecordingError(f"{setup.path}: no recording could be scored{reason}", "check with cdtool info")
     results = Results(
-        provenance=_provenance(setup, detectors, thresholds, digests, learn.operations),
+        provenance=_provenance(setup, used, thresholds, digests, learn.operations),
         detectors=setup.detectors,
         groups=setup.groups,
         contacts=tuple(contacts),
@@ -92,6 +106,22 @@ def benchmark(file: str | Path | BenchmarkFile, *, jobs: int = 1, progress: Prog
         findings=tuple(findings),
     )
     return Benchmark(results, tuple(traces[group] for group in setup.groups if group in traces), seconds)
+
+
+def _that_can_run(
+    detectors: Sequence[Any], operations: Sequence[Operation], machine: Any
+) -> tuple[list[Any], list[Skipped]]:
+    """The detectors that the first run holds all channels for, and why not the others."""
+    able: list[Any] = []
+    left_out: list[Skipped] = []
+    for detector in detectors:
+        try:
+            for operation in operations[:1]:
+                run_detector(operation, machine, detector)
+            able.append(detector)
+        except CdtoolError as fault:
+            left_out.append(Skipped(detector.name, f"left out: {fault.message}"))
+    return able, left_out
 
 
 def _learn(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import ConfigurationError, nearest
+from cdtool.detectors import DETECTORS
+from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
@@ -83,6 +84,18 @@ def read_benchmark_file(path: str | Path) -> BenchmarkFile:
     root.finish()
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
+    """The same with other detectors, each named once, or with all that are registered where `all` is named.
+
+    Raises ConfigurationError for an unknown name, UsageError for one that is named twice.
+    """
+    known = DETECTORS.names(plugins=True) if list(names) == ["all"] else names
+    chosen = tuple(setup.machine_file.detector(name).name for name in known)
+    if len(set(chosen)) < len(chosen):
+        raise UsageError(f"detectors {', '.join(names)} name one twice", "name each once")
+    return replace(setup, detectors=chosen)
 
 
 def _logs(table: Table, base: Path) -> tuple[Path, ...]:
