@@ -39,12 +39,12 @@ COMMANDS = {
     "docs/benchmark-file.md": 1,
     "docs/choosing.md": 6,
     "docs/signature.md": 7,
-    "docs/simulated-gate.md": 1,
+    "docs/simulators.md": 2,
     "docs/real-recordings.md": 10,
 }
-EXAMPLES = {"docs/python.md": 9, "docs/simulated-gate.md": 1, "docs/detectors/friction-ekf.md": 1}
+EXAMPLES = {"docs/python.md": 9, "docs/simulators.md": 2, "docs/detectors/friction-ekf.md": 1}
 # Lines of shell blocks that set something up or take long: they are run by CI or by hand, not here.
-NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/gate_accuracy.py")
+NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
 
 _FENCE = re.compile(
     r"^(?:<!-- exit (?P<status>\d) -->\n)?```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL

@@ -127,6 +127,16 @@ def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path,
     assert (tmp_path / "c" / "stiff" / "03.csv").read_bytes() != (folder / "stiff" / "03.csv").read_bytes()
 
 
+def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> None:
+    assert cdtool.simulate_arm(tmp_path / "python", {"stiff": 1}, seed=6, trial=2) == 1
+    counts = ("--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0)
+    assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
+    names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
+    assert len(names) == 4
+    for name in names:
+        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "line" / name).read_bytes()
+
+
 def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no recording is asked for"):
         write_arm_recordings(tmp_path / "none", {}, seed=1)
