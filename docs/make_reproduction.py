@@ -6,6 +6,7 @@ the page and the figures to docs/images. Nothing is taken from a file but the pa
 
 from __future__ import annotations
 
+import contextlib
 import re
 import tempfile
 from collections.abc import Callable, Sequence
@@ -121,16 +122,14 @@ def _alarmed(done: Benchmark) -> dict[str, str]:
 
 def example(work: Path, name: str, detector: str, image: str) -> None:
     """Figures 5.6 and 6.7: one detector's signal, its signature and the trigger on a stiff impact."""
-    folder = work / name
-    machine = folder / "machine.toml"
     rule = Signature() if name == "gate" else Signature(sides="one", position_window=22e-3)
-    free = sorted((folder / "free").iterdir())
     joints = {"gate": (), "arm1": ("arm",), "arm2": ("forearm",)}[name]
     debounce = None if name == "gate" else 7
-    learned = cdtool.learn_signature(free, machine, detector, rule=rule, joints=joints, debounce=debounce)
-    write_signature(work / "signature.json", learned.signature)
-    log = folder / "stiff" / "03.csv"
-    plot_detected(cdtool.detect(log, machine, signature=work / "signature.json"), IMAGES / image)
+    with contextlib.chdir(work / name):  # so that the title shows a short name
+        free = sorted(Path("free").iterdir())
+        learned = cdtool.learn_signature(free, "machine.toml", detector, rule=rule, joints=joints, debounce=debounce)
+        write_signature("signature.json", learned.signature)
+        plot_detected(cdtool.detect("stiff/03.csv", "machine.toml", signature="signature.json"), IMAGES / image)
 
 
 def impacts(work: Path) -> None:
