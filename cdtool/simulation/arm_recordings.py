@@ -169,6 +169,7 @@ transmission_ratio = {_pair(arm.transmission_ratio)}  # rad/rad: link angle per 
 position_offset = [0.0, 0.0]       # rad
 imu_position = {_pair(arm.imu_position)}         # m, from the joint along the link
 viscous_friction = {_pair(viscous)}  # N m s/rad at the motor
+stick_speed = 0.01                 # rad/s: the encoders' speed is noisy at rest
 gravity = {arm.gravity:.6g}                     # m/s2
 
 [channels]                         # CSV: columns
