@@ -128,7 +128,7 @@ def test_a_reference_that_the_axis_does_not_follow_makes_the_method_not_applicab
         "position": Series(TIME, position, "m"),
         "reference_position": Series(TIME, reference, "m"),
     }
-    signal = DesiredDynamics().signal(Recording("r", "r", ("axis",), channels), UNIT_MASS)
+    signal = DesiredDynamics(tracking_limit=0.05).signal(Recording("r", "r", ("axis",), channels), UNIT_MASS)
     lost = (TIME > 2.0) & (TIME < 3.0)
     assert (signal.status[lost] == Status.NOT_APPLICABLE).all()
     assert signal.valid[~lost & (TIME > 0.5)].all()
