@@ -84,7 +84,8 @@ position = { columns = ["ORDER", "q3"], unit = "rad" }
     for order in ("q1,q2", "q2,q1"):
         machine = tmp_path / "machine.toml"
         machine.write_text(text.replace("ORDER", order.replace(",", '", "')))
-        told[order] = [str(item) for item in cdtool.info(log, machine=machine).findings if "another order" in item.message]
+        findings = cdtool.info(log, machine=machine).findings
+        told[order] = [str(item) for item in findings if "another order" in item.message]
     assert told["q1,q2"] == []
     assert told["q2,q1"] == [
         "position: that of a follows the speed of b: columns in another order?",
