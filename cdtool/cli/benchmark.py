@@ -75,3 +75,5 @@ def show_table(results: Results) -> None:
     provenance = results.provenance
     typer.echo("latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable;")
     typer.echo(f"ops: operations scored; onset: {provenance.get('onset')}")
+    if provenance.get("watched_joints"):
+        typer.echo(f"joints watched, of all: {plain(provenance['watched_joints'])}")

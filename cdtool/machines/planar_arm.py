@@ -19,7 +19,9 @@ _LINKS = 2
 
 @dataclass(frozen=True)
 class PlanarArm(CoupledMachine):
-    """Absolute link angles q1, q2 [rad], anticlockwise from the horizontal (thesis 6.21-6.25, motors' inertias added).
+    """Two links with both motors on the base: arm and forearm, with IMUs on the links (thesis chapter 6).
+
+    Absolute link angles q1, q2 [rad], anticlockwise from the horizontal (6.21-6.25, motors' inertias added):
 
     T1 = M11 a1 + h cos(q2 - q1) a2 - h sin(q2 - q1) v2^2 + g1 cos q1
     T2 = h cos(q2 - q1) a1 + M22 a2 + h sin(q2 - q1) v1^2 + g2 cos q2

@@ -23,11 +23,12 @@ _MIXED_UNITS = dict.fromkeys(ROTARY_UNITS, "SI")
 
 @dataclass(frozen=True)
 class UrdfRobot(CoupledMachine):
-    """M, C and g from the URDF's links, and on the diagonal of M the drives: `drive_inertia` + motor_inertia / r^2.
+    """Any serial robot by its URDF; drive inertias, ratios and friction of its joints from the machine file.
 
-    Logs hold the joints' own torque, angle and speed (coordinates = "load"), or the motors', referred by
-    transmission_ratio; a current becomes a torque by its channel's scale. `home` is the pose at which the nominal
-    inertia is taken. Revolute, continuous and prismatic joints; needs the extra cdtool[urdf].
+    M, C and g from the URDF's links, and on the diagonal of M the drives: `drive_inertia` + motor_inertia / r^2. Logs
+    hold the joints' own torque, angle and speed (coordinates = "load"), or the motors', referred by transmission_ratio;
+    a current becomes a torque by its channel's scale. `home` is the pose at which the nominal inertia is taken.
+    Revolute, continuous and prismatic joints; needs the extra cdtool[urdf].
     """
 
     tree: KinematicTree

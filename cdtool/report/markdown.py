@@ -19,6 +19,7 @@ _FIGURES = ("mean ms", "std ms", "median ms", "n", "missed", "not assessable", "
 _ONE_LINE = (
     ("tool_version", "cdtool version"),
     ("machine", "machine"),
+    ("watched_joints", "joints watched, of all"),
     ("threshold", "threshold"),
     ("operations", "operations cut by"),
     ("window_s", "matching window [s]"),

@@ -181,7 +181,7 @@ def _provenance(
         "window_s": setup.window,
         "onset": setup.onset.described,
         "operations": setup.operations,
-        "watched_joints": list(setup.watched or setup.machine_file.machine.joints),
+        "watched_joints": ", ".join(setup.watched) or None,
         "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
         "short_names": {detector.name: detector.short_name for detector in detectors},
         "logs_sha256": {shown_path(Path(source), base): digest for source, digest in sorted(digests.items())},
