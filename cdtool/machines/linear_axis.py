@@ -11,8 +11,9 @@ from cdtool.machines.joint_machine import LINEAR_UNITS
 
 @dataclass(frozen=True)
 class LinearAxis(Axis):
-    """Motor inertia [kg m2], load mass [kg], ratio [m/rad], friction at the motor [N m s/rad, N m]; load side N, m.
+    """Axes that slide: gate, door, ball screw, gantry; several of them move independently.
 
+    Motor inertia [kg m2], load mass [kg], ratio [m/rad], friction at the motor [N m s/rad, N m]; load side N, m.
     With coordinates = "load" friction is given at the load [N s/m, N].
     """
 

@@ -10,8 +10,9 @@ from cdtool.machines.axis import Axis
 
 @dataclass(frozen=True)
 class RotaryAxis(Axis):
-    """Motor and load inertia [kg m2], ratio [rad/rad], friction at the motor [N m s/rad, N m]; load side N m, rad.
+    """Axes that turn: hinged door, barrier, turntable; several of them move independently.
 
+    Motor and load inertia [kg m2], ratio [rad/rad], friction at the motor [N m s/rad, N m]; load side N m, rad.
     Its joints are taken as uncoupled: on a robot only detectors without a model (pure_torque) are meaningful.
     """
 
