@@ -127,7 +127,7 @@ def integrate_arm(
 
     state = initial_state.copy()
     trial_state = np.empty((6, 2))
-    slope = np.empty((6, 2))
+    slope = np.zeros((6, 2))
     total = np.empty((6, 2))
     drive = np.empty(2)
     counted_before = np.zeros(2)
@@ -162,14 +162,13 @@ def integrate_arm(
             log[9, joint, sample] = command[joint]
 
         for substep in range(substeps):
-            total[:] = 0.0
-            trial_state[:] = state
             for stage in range(4):
-                if stage > 0:
-                    reach = step if stage == 3 else 0.5 * step
-                    for row in range(6):
-                        for joint in range(2):
-                            trial_state[row, joint] = state[row, joint] + reach * slope[row, joint]
+                reach = 0.0 if stage == 0 else step if stage == 3 else 0.5 * step
+                # Element by element: array assignments would triple the time to compile.
+                for row in range(6):
+                    for joint in range(2):
+                        trial_state[row, joint] = state[row, joint] + reach * slope[row, joint]
+                        total[row, joint] = 0.0 if stage == 0 else total[row, joint]
 
                 for joint in range(2):
                     theta, w = trial_state[0, joint], trial_state[1, joint]
@@ -198,8 +197,8 @@ def integrate_arm(
                     slope[4, joint] = bristle_speed
                     slope[5, joint] = (command[joint] - torque) / torque_lag
 
-                q1, q2 = trial_state[2]
-                qd1, qd2 = trial_state[3]
+                q1, q2 = trial_state[2, 0], trial_state[2, 1]
+                qd1, qd2 = trial_state[3, 0], trial_state[3, 1]
                 # Contact: against the arm, or a horizontal plate above the forearm, which loads both joints.
                 if trial == 1:
                     lever_1, lever_2 = contact_position[0], 0.0
@@ -232,8 +231,10 @@ def integrate_arm(
                         first_contact = sample * sample_period + (substep - 1.0 + share) * step
                     penetration_before = penetration
                     if substep == 0:
-                        log[:6, :, sample] = state
-                        log[6, :, sample] = slope[3]
+                        for joint in range(2):
+                            for row in range(6):
+                                log[row, joint, sample] = state[row, joint]
+                            log[6, joint, sample] = slope[3, joint]
                         contact_force[sample] = force
                 weight = step / 6.0 if stage == 0 or stage == 3 else step / 3.0
                 for row in range(6):
