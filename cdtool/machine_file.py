@@ -18,6 +18,9 @@ from cdtool.errors import ConfigurationError, nearest
 from cdtool.registry import Registry
 from cdtool.tables import Table, read_toml
 
+# One number for all joints, or one a joint.
+Gain = float | tuple[float, ...]
+
 
 @dataclass(frozen=True)
 class MachineFile:
@@ -27,7 +30,7 @@ class MachineFile:
     machine: Any
     columns: ChannelMap
     topics: ChannelMap
-    gains: Mapping[str, Mapping[str, float]]
+    gains: Mapping[str, Mapping[str, Gain]]
     digest: str
 
     def detector(self, name: str) -> Any:
@@ -50,7 +53,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     channels = root.table("channels")
     columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
     topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
-    gains = _read_gains(root.table("detectors"))
+    gains = _read_gains(root.table("detectors"), len(machine.joints))
     root.finish()
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
     return MachineFile(file, machine, columns, topics, gains, digest)
@@ -62,9 +65,9 @@ def fingerprint(machine: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _read_gains(table: Table) -> dict[str, dict[str, float]]:
+def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
     registry = _registry("cdtool.detectors", "DETECTORS")
-    gains: dict[str, dict[str, float]] = {}
+    gains: dict[str, dict[str, Gain]] = {}
     for name in table.values:
         known = {**{full: full for full in registry.names(plugins=True)}, **registry.short_names}
         if name not in known:
@@ -74,7 +77,10 @@ def _read_gains(table: Table) -> dict[str, dict[str, float]]:
         for key in part.values:
             if key not in allowed:
                 raise part.fault(key, "unknown gain", nearest(key, allowed))
-        given = {key: part.number(key) for key in part.values}
+        given = {
+            key: part.numbers(key, joints) if isinstance(value, list) else part.number(key)
+            for key, value in part.values.items()
+        }
         try:
             registry.load(name)(**given)
         except ConfigurationError as fault:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.errors import SignatureError, UsageError
-from cdtool.machine_file import fingerprint
+from cdtool.machine_file import Gain, fingerprint
 from cdtool.thresholds.signature import FittedSignature
 
 SCHEMA_VERSION = 2
@@ -38,7 +38,7 @@ class SignatureFile:
     machine: str
     machine_fingerprint: str
     detector: str
-    gains: Mapping[str, float]
+    gains: Mapping[str, Gain]
     unit: str
     debounce: int | None
     current: tuple[FittedSignature, ...]
@@ -160,7 +160,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         machine=str(values["machine"]["name"]),
         machine_fingerprint=str(values["machine"]["fingerprint"]),
         detector=str(values["detector"]["name"]),
-        gains={str(name): float(value) for name, value in values["detector"]["gains"].items()},
+        gains={str(name): _gain(value) for name, value in values["detector"]["gains"].items()},
         unit=str(values["unit"]),
         debounce=None if values["debounce"] is None else int(values["debounce"]),
         current=tuple(FittedSignature.from_dict(item) for item in values["current"]),
@@ -168,6 +168,10 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
         source=source,
     )
+
+
+def _gain(value: Any) -> Gain:
+    return tuple(map(float, value)) if isinstance(value, list) else float(value)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,15 @@ from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+# One number for all joints, or one a joint (the thesis's diagonal gain matrix, 2.13 and 2.19).
+Gain = float | tuple[float, ...]
+
+AnyDetector = TypeVar("AnyDetector", bound="DataclassInstance")
 
 
 class Detector(Protocol):
@@ -43,11 +52,31 @@ def gain(default: float, unit: str, meaning: str) -> Any:
 
 
 def require_positive(detector: object, *names: str) -> None:
-    """Raise ConfigurationError, naming the gain, where one is not a finite number above zero."""
+    """Raise ConfigurationError, naming the gain, where one is not a finite number above zero, or one a joint."""
     for name in names:
         value = getattr(detector, name)
-        if not (np.isfinite(value) and value > 0.0):
-            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed")
+        numbers = np.atleast_1d(value)
+        if not (numbers.size and np.all(np.isfinite(numbers) & (numbers > 0.0))):
+            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one a joint")
+
+
+def per_joint(value: Gain, joints: int) -> FloatArray:
+    """(J,): one number for all joints, or each joint's own; raises ConfigurationError where their number is another."""
+    if isinstance(value, tuple) and len(value) != joints:
+        many = "the whole machine" if joints == 1 else f"{joints} joints"
+        raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one a joint")
+    return np.array(np.broadcast_to(value, joints), dtype=np.float64)
+
+
+def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
+    """The detector with the gains of one joint alone; raises ConfigurationError as `per_joint` does."""
+    gains = {item.name: getattr(detector, item.name) for item in fields(detector)}
+    return replace(detector, **{name: float(per_joint(value, joints)[joint]) for name, value in gains.items()})
+
+
+def single(value: Gain) -> float:
+    """A gain that is one number; raises ConfigurationError where it has one a joint (see `of_joint`)."""
+    return float(per_joint(value, 1)[0])
 
 
 def require_channels(detector: Detector, recording: Recording, machine: Machine) -> None:
@@ -122,7 +151,7 @@ def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
 
 
 def observe_momentum(
-    drive: Drive, net_force: FloatArray, momentum: FloatArray, bandwidth: float, ready: FloatArray
+    drive: Drive, net_force: FloatArray, momentum: FloatArray, bandwidth: Gain, ready: FloatArray
 ) -> tuple[FloatArray, StatusArray]:
     """Residual and status (n, J) of the generalized momentum observer (thesis 2.18-2.19 corrected).
 
@@ -132,6 +161,7 @@ def observe_momentum(
     """
     residual = momentum
     status = np.empty(net_force.shape, dtype=np.uint8)
+    gains = per_joint(bandwidth, net_force.shape[1])
     for j in range(net_force.shape[1]):
         _observe(
             drive.time,
@@ -139,7 +169,7 @@ def observe_momentum(
             np.ascontiguousarray(momentum[:, j]),
             np.ascontiguousarray(drive.missing[:, j]),
             np.ascontiguousarray(drive.speed_missing[:, j]),
-            bandwidth,
+            gains[j],
             ready[j],
             residual[:, j],
             status[:, j],

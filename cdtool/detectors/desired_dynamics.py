@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
-from cdtool.detectors.base import for_every_joint, gain, hold_last, require_channels, require_positive
+from cdtool.detectors.base import Gain, for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
 from cdtool.detectors.filters import low_pass, polynomial_rates, settling_time, started_at
 from cdtool.dynamics import Machine
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -30,8 +30,8 @@ class DesiredDynamics:
     shows; after a contact the error grows, and the method goes blind when it exceeds the limit.
     """
 
-    cutoff: float = gain(5.0, "Hz", "cut-off frequency of the low-pass")
-    tracking_limit: float = gain(0.2, "m", "tracking error beyond which the method is not applicable (rad: robots)")
+    cutoff: Gain = gain(5.0, "Hz", "cut-off frequency of the low-pass")
+    tracking_limit: Gain = gain(0.2, "m", "tracking error beyond which the method is not applicable (rad: robots)")
 
     name: ClassVar[str] = "desired_dynamics"
     short_name: ClassVar[str] = "ddd"
@@ -64,11 +64,12 @@ class DesiredDynamics:
         )
         held = hold_last(torque, ~np.isfinite(torque))
         balance = machine.force_balance(held, pose, speed) - machine.inertia_times(pose, acceleration)
-        residual, _ = low_pass(time, balance, motion_missing, self.cutoff)
-        settle = settling_time(self.cutoff)
+        cutoff = per_joint(self.cutoff, len(machine.joints))
+        residual, _ = low_pass(time, balance, motion_missing, cutoff)
+        settle = settling_time(cutoff)
         started = started_at(time, motion_missing, settle)
         status = np.where(time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
-        lost = np.abs(np.nan_to_num(error)) > self.tracking_limit
+        lost = np.abs(np.nan_to_num(error)) > per_joint(self.tracking_limit, error.shape[1])
         status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE
         status[missing] = Status.GAP
         notes = _tracking_notes(error, recording.joints, machine.load_units["position"])

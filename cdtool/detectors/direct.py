@@ -8,7 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from cdtool.detection import Signal, Status
-from cdtool.detectors.base import drive_on_speed_clock, for_every_joint, gain, require_channels, require_positive
+from cdtool.detectors.base import (
+    Gain,
+    drive_on_speed_clock,
+    for_every_joint,
+    gain,
+    per_joint,
+    require_channels,
+    require_positive,
+)
 from cdtool.detectors.filters import low_pass, settling_time, started_at
 from cdtool.dynamics import Machine
 from cdtool.recording import Recording
@@ -25,7 +33,7 @@ class Direct:
     inertia; where M changes within the filter's memory the terms no longer match.
     """
 
-    cutoff: float = gain(5.0, "Hz", "cut-off frequency of the low-pass")
+    cutoff: Gain = gain(5.0, "Hz", "cut-off frequency of the low-pass")
 
     name: ClassVar[str] = "direct"
     short_name: ClassVar[str] = "dd"
@@ -46,10 +54,11 @@ class Direct:
         machine.require_inertia(self.name)
         drive = drive_on_speed_clock(recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
-        filtered, _ = low_pass(drive.time, balance, drive.speed_missing, self.cutoff)
-        _, acceleration = low_pass(drive.time, drive.speed, drive.speed_missing, self.cutoff)
+        cutoff = per_joint(self.cutoff, len(machine.joints))
+        filtered, _ = low_pass(drive.time, balance, drive.speed_missing, cutoff)
+        _, acceleration = low_pass(drive.time, drive.speed, drive.speed_missing, cutoff)
         residual = filtered - machine.inertia_times(drive.position, acceleration)
-        settle = settling_time(self.cutoff)
+        settle = settling_time(cutoff)
         started = started_at(drive.time, drive.speed_missing, settle)
         status = np.where(drive.time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
         missing = for_every_joint(drive.missing) if machine.coupled else drive.missing

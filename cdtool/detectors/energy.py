@@ -10,10 +10,12 @@ import numpy as np
 from cdtool.detection import WHOLE_MACHINE, Signal, Status
 from cdtool.detectors.base import (
     Drive,
+    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
     observe_momentum,
+    per_joint,
     require_channels,
     require_positive,
 )
@@ -32,8 +34,8 @@ class Energy:
     motion; a slow joint beside fast ones; friction that the machine file does not know.
     """
 
-    bandwidth: float = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
-    minimum_speed: float = gain(0.03, "m/s", "below it the observer is not applicable; norm of the joints' speeds")
+    bandwidth: Gain = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
+    minimum_speed: Gain = gain(0.03, "m/s", "below it the observer is not applicable; norm of the joints' speeds")
 
     name: ClassVar[str] = "energy"
     short_name: ClassVar[str] = "eo"
@@ -65,6 +67,7 @@ class Energy:
         alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing)
         ready = np.full(energy.shape[1], -np.inf)
         residual, status = observe_momentum(alone, power, energy, self.bandwidth, ready)
-        status[(status == Status.VALID) & (speed < self.minimum_speed)] = Status.NOT_APPLICABLE
+        slow = speed < per_joint(self.minimum_speed, speed.shape[1])
+        status[(status == Status.VALID) & slow] = Status.NOT_APPLICABLE
         names = WHOLE_MACHINE if machine.coupled else ()
         return Signal(drive.time, residual, status, self.unit(machine), self.signed, names)

@@ -14,35 +14,41 @@ _READ_BOOL = "Array(b1, 1, 'C', readonly=True)"
 _SETTLE = 3.0 * math.sqrt(2.0)
 
 
-def settling_time(cutoff: float) -> float:
-    """How long after a start the low-pass of `cutoff` [Hz] is not to be trusted [s]: 3 over its poles' real part."""
-    return _SETTLE / (2.0 * math.pi * cutoff)
+def settling_time(cutoff: FloatArray | float) -> FloatArray:
+    """How long after a start a low-pass of `cutoff` [Hz] is not to be trusted [s]: 3 over its poles' real part."""
+    return np.asarray(_SETTLE / (2.0 * math.pi * cutoff), dtype=np.float64)
 
 
-def low_pass(time: FloatArray, values: FloatArray, missing: BoolArray, cutoff: float) -> tuple[FloatArray, FloatArray]:
+def low_pass(
+    time: FloatArray, values: FloatArray, missing: BoolArray, cutoff: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
     """Low-pass (n, J) of `values` (n, J) and its rate of change: y and s y with the same states, so that they match.
 
-    Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz], bilinear with the measured step
-    and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: the next step is longer. After
-    a gap longer than the settling time it starts anew, from rest at the first value.
+    Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz] (one, or one a joint), bilinear
+    with the measured step and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: the
+    next step is longer. After a gap longer than the settling time it starts anew, from rest at the first value.
     """
     filtered, rate = np.empty(values.shape), np.empty(values.shape)
+    corners = np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1])
+    settle = settling_time(corners)
     for j in range(values.shape[1]):
         column, lost = np.ascontiguousarray(values[:, j]), np.ascontiguousarray(missing[:, j])
-        _low_pass(time, column, lost, 2.0 * math.pi * cutoff, settling_time(cutoff), filtered[:, j], rate[:, j])
+        _low_pass(time, column, lost, 2.0 * math.pi * corners[j], settle[j], filtered[:, j], rate[:, j])
     return filtered, rate
 
 
-def started_at(time: FloatArray, missing: BoolArray, longest_gap: float) -> FloatArray:
+def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
     """(n, J): for each sample when its filter last started [s]; infinite before the first sample.
 
-    A filter starts with the first sample and again with the first one after a gap longer than `longest_gap` [s].
+    A filter starts with the first sample and again with the first one after a gap longer than `longest_gap` [s], one or
+    one a joint.
     """
     starts = np.empty(missing.shape)
+    longest = np.broadcast_to(longest_gap, missing.shape[1])
     for j in range(missing.shape[1]):
         present = np.flatnonzero(~missing[:, j])
         fresh = np.ones(len(present), dtype=bool)
-        fresh[1:] = np.diff(time[present]) > longest_gap
+        fresh[1:] = np.diff(time[present]) > longest[j]
         last = np.full(len(time), np.inf)
         last[present[fresh]] = time[present[fresh]]
         index = np.where(np.isfinite(last), np.arange(len(time)), -1)

@@ -11,12 +11,15 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
+    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
     hold_last,
+    of_joint,
     require_channels,
     require_positive,
+    single,
 )
 from cdtool.detectors.friction_ekf_arm_kernel import run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import run_filter
@@ -59,14 +62,14 @@ class FrictionEkf:
     estimate's sign is wrong: only the first crossing counts.
     """
 
-    sigma_acceleration: float = gain(0.1, "m/s2", "noise of the accelerometer, structure included (standard deviation)")
-    sigma_speed: float = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
-    friction_drift: float = gain(220.0, "N s/m per sqrt(s)", "how fast the friction may change: the square is q_d")
-    drift_acceleration: float = gain(9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)")
-    drift_speed: float = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)")
-    sigma_position: float = gain(1e-3, "rad", "noise of the angle (standard deviation); planar arm")
-    drift_position: float = gain(1e-4, "rad per sample", "unmodelled angle (standard deviation); planar arm")
-    minimum_speed: float = gain(0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed")
+    sigma_acceleration: Gain = gain(0.1, "m/s2", "noise of the accelerometer, structure included (standard deviation)")
+    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
+    friction_drift: Gain = gain(220.0, "N s/m per sqrt(s)", "how fast the friction may change: the square is q_d")
+    drift_acceleration: Gain = gain(9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)")
+    drift_speed: Gain = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)")
+    sigma_position: Gain = gain(1e-3, "rad", "noise of the angle (standard deviation); planar arm")
+    drift_position: Gain = gain(1e-4, "rad per sample", "unmodelled angle (standard deviation); planar arm")
+    minimum_speed: Gain = gain(0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed")
 
     name: ClassVar[str] = "friction_ekf"
     short_name: ClassVar[str] = "feekf"
@@ -113,16 +116,16 @@ class FrictionEkf:
                 acceleration.time,
                 np.ascontiguousarray(acceleration.values[:, j]),
             )
-            friction[:, j], status[:, j] = self.estimate(motion, equation)
+            friction[:, j], status[:, j] = of_joint(self, j, len(equations)).estimate(motion, equation)
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
     def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
         """One joint: friction (n,) and status (n,); every accelerometer sample is used once, at its own time."""
         friction = np.zeros(len(motion.time))
         status = np.zeros(len(motion.time), dtype=np.uint8)
-        process = (self.friction_drift**2, self.drift_acceleration**2, self.drift_speed**2)
-        noise = (self.sigma_acceleration**2, self.sigma_speed**2)
-        limits = (self.friction_drift**2 * _INITIAL_DRIFT_TIME, self.minimum_speed, _ACCELERATION_HOLD, _GLITCH)
+        process = tuple(single(x) ** 2 for x in (self.friction_drift, self.drift_acceleration, self.drift_speed))
+        noise = (single(self.sigma_acceleration) ** 2, single(self.sigma_speed) ** 2)
+        limits = (process[0] * _INITIAL_DRIFT_TIME, single(self.minimum_speed), _ACCELERATION_HOLD, _GLITCH)
         sensor = (motion.missing, motion.acceleration_time, motion.acceleration)
         force = np.ascontiguousarray(equation.force)
         link = equation.pendulum
@@ -144,9 +147,9 @@ class FrictionEkf:
                 link.gravity,
                 link.coupling,
                 *process,
-                self.drift_position**2,
+                single(self.drift_position) ** 2,
                 *noise,
-                self.sigma_position**2,
+                single(self.sigma_position) ** 2,
                 *limits,
                 friction,
                 status,
@@ -165,8 +168,14 @@ class FrictionEkf:
             dtype=np.float64,
         )
         observation = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        process = np.diag([self.friction_drift**2 * period, self.drift_acceleration**2, self.drift_speed**2])
-        noise = np.diag([self.sigma_acceleration**2, self.sigma_speed**2])
+        process = np.diag(
+            [
+                single(self.friction_drift) ** 2 * period,
+                single(self.drift_acceleration) ** 2,
+                single(self.drift_speed) ** 2,
+            ]
+        )
+        noise = np.diag([single(self.sigma_acceleration) ** 2, single(self.sigma_speed) ** 2])
         covariance = solve_discrete_are(transition.T, observation.T, process, noise)
         innovation = observation @ covariance @ observation.T + noise
         kalman_gain = covariance @ observation.T @ np.linalg.inv(innovation)

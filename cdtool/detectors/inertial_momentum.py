@@ -10,13 +10,16 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
+    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
     hold_last,
     observe_momentum,
+    of_joint,
     require_channels,
     require_positive,
+    single,
 )
 from cdtool.dynamics import Machine
 from cdtool.kernels import READ_ONLY, kernel
@@ -38,9 +41,9 @@ class InertialMomentum:
     below 3 rad/s lets the bias drift in.
     """
 
-    bandwidth: float = gain(10.0, "rad/s", "observer gain K")
-    crossover: float = gain(5.0, "rad/s", "w_c: below it the speed counts, above it the accelerometer")
-    damping: float = gain(1.0, "1", "zeta of the complementary filter, 0.7 to 1")
+    bandwidth: Gain = gain(10.0, "rad/s", "observer gain K")
+    crossover: Gain = gain(5.0, "rad/s", "w_c: below it the speed counts, above it the accelerometer")
+    damping: Gain = gain(1.0, "1", "zeta of the complementary filter, 0.7 to 1")
 
     name: ClassVar[str] = "inertial_momentum"
     short_name: ClassVar[str] = "igm"
@@ -65,7 +68,7 @@ class InertialMomentum:
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
         for j, stick_speed in enumerate(machine.stick_speed):
-            fused[:, j], ready[j] = self.fuse(
+            fused[:, j], ready[j] = of_joint(self, j, len(ready)).fuse(
                 drive.time,
                 drive.speed[:, j],
                 hold_last(acceleration, lost)[:, j],
@@ -89,7 +92,8 @@ class InertialMomentum:
         standstill_speed: float,
     ) -> tuple[FloatArray, float]:
         """Fused speed (n,) of one joint, and the time from which it may be trusted [s]."""
-        k1, k2 = 2.0 * self.damping * self.crossover, self.crossover**2
+        crossover = single(self.crossover)
+        k1, k2 = 2.0 * single(self.damping) * crossover, crossover**2
         fused = np.empty(len(time))
         arrays = (np.ascontiguousarray(item) for item in (speed, acceleration, missing))
         settle = 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))

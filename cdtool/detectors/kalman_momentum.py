@@ -8,7 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from cdtool.detection import Signal, StatusArray
-from cdtool.detectors.base import drive_on_speed_clock, gain, require_channels, require_positive
+from cdtool.detectors.base import (
+    Gain,
+    drive_on_speed_clock,
+    gain,
+    per_joint,
+    require_channels,
+    require_positive,
+    single,
+)
 from cdtool.dynamics import Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -33,9 +41,9 @@ class KalmanMomentum:
     noise is not what the gains say.
     """
 
-    sigma_speed: float = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
-    sigma_torque: float = gain(20.0, "N", "noise of torque and model, white from sample to sample (standard deviation)")
-    contact_drift: float = gain(13.0, "N per sqrt(s)", "how fast the contact torque may change")
+    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
+    sigma_torque: Gain = gain(20.0, "N", "noise of torque and model, white from sample to sample (standard deviation)")
+    contact_drift: Gain = gain(13.0, "N per sqrt(s)", "how fast the contact torque may change")
 
     name: ClassVar[str] = "kalman_momentum"
     short_name: ClassVar[str] = "kmo"
@@ -58,6 +66,10 @@ class KalmanMomentum:
         net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
         estimate = np.empty(momentum.shape)
         status = np.empty(momentum.shape, dtype=np.uint8)
+        drift, torque, speed = (
+            per_joint(value, len(machine.joints)) ** 2
+            for value in (self.contact_drift, self.sigma_torque, self.sigma_speed)
+        )
         for j, inertia in enumerate(machine.nominal_inertia):
             _filter(
                 drive.time,
@@ -65,9 +77,9 @@ class KalmanMomentum:
                 np.ascontiguousarray(momentum[:, j]),
                 np.ascontiguousarray(drive.missing[:, j]),
                 np.ascontiguousarray(drive.speed_missing[:, j]),
-                self.contact_drift**2,
-                self.sigma_torque**2,
-                (float(inertia) * self.sigma_speed) ** 2,
+                drift[j],
+                torque[j],
+                float(inertia) ** 2 * speed[j],
                 estimate[:, j],
                 status[:, j],
             )
@@ -79,8 +91,8 @@ class KalmanMomentum:
 
         transition = np.array([[1.0, -period], [0.0, 1.0]])
         observation = np.array([[1.0, 0.0]])
-        process = _process_noise(self.contact_drift**2, self.sigma_torque**2, period)
-        noise = np.array([[(inertia * self.sigma_speed) ** 2]])
+        process = _process_noise(single(self.contact_drift) ** 2, single(self.sigma_torque) ** 2, period)
+        noise = np.array([[(inertia * single(self.sigma_speed)) ** 2]])
         covariance = solve_discrete_are(transition.T, observation.T, process, noise)
         kalman_gain = covariance @ observation.T / (covariance[0, 0] + noise[0, 0])
         eigenvalues = np.linalg.eigvals((np.eye(2) - kalman_gain @ observation) @ transition)

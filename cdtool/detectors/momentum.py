@@ -9,6 +9,7 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
+    Gain,
     drive_on_speed_clock,
     gain,
     observe_momentum,
@@ -30,7 +31,7 @@ class Momentum:
     residual; a compliant drive or clearance delays what the motor's speed can tell.
     """
 
-    bandwidth: float = gain(10.0, "rad/s", "observer gain K: the residual follows a contact with time constant 1/K")
+    bandwidth: Gain = gain(10.0, "rad/s", "observer gain K: the residual follows a contact with time constant 1/K")
 
     name: ClassVar[str] = "momentum"
     short_name: ClassVar[str] = "gm"

@@ -9,10 +9,12 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
+    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
     observe_momentum,
+    per_joint,
     require_channels,
     require_positive,
 )
@@ -33,7 +35,7 @@ class Velocity:
     what one joint feels leaks into the others while the estimate settles.
     """
 
-    bandwidth: float = gain(10.0, "rad/s", "K over the diagonal of M at the home pose")
+    bandwidth: Gain = gain(10.0, "rad/s", "K over the diagonal of M at the home pose")
 
     name: ClassVar[str] = "velocity"
     short_name: ClassVar[str] = "vo"
@@ -69,7 +71,7 @@ class Velocity:
             np.ascontiguousarray(machine.inertia_matrix(drive.position)),
             np.ascontiguousarray(for_every_joint(drive.missing)[:, 0]),
             np.ascontiguousarray(drive.speed_missing[:, 0]),
-            self.bandwidth * machine.nominal_inertia,
+            per_joint(self.bandwidth, len(machine.joints)) * machine.nominal_inertia,
             residual,
             status,
         )

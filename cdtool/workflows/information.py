@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from cdtool.detectors.base import of_joint
 from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.motion import motion_class
@@ -181,8 +181,8 @@ def _bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list
     """How fast the friction EKF can be on this log: its poles at the nominal speed of an axis."""
     if machine_file.machine.coupled or not all(channel in recording for channel in ("torque", "speed", "acceleration")):
         return []
-    detector: Any = machine_file.detector("friction_ekf")
     motion = motion_class(recording)
+    detector = of_joint(machine_file.detector("friction_ekf"), motion.joint, len(recording.joints))
     if motion.nominal_speed < detector.minimum_speed:
         return [
             Finding(f"nominal speed below minimum_speed ({detector.minimum_speed:g}): not applicable", "friction_ekf")

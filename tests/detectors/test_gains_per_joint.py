@@ -1,0 +1,107 @@
+"""Gains may be one number, or one a joint: the thesis's diagonal gain matrix (2.13, 2.19)."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from cdtool.detectors import DETECTORS
+from cdtool.detectors.base import of_joint, single
+from cdtool.detectors.energy import Energy
+from cdtool.detectors.momentum import Momentum
+from cdtool.errors import ConfigurationError, SignatureError
+from cdtool.machine_file import fingerprint, read_machine_file
+from cdtool.signature_store import SignatureFile, read_signature, write_signature
+from cdtool.thresholds.signature import Signature
+from tests.conftest import GATE, machine_of
+from tests.motions import moving
+
+NAMES = [name for name in DETECTORS.names() if fields(DETECTORS.load(name))]
+
+
+@pytest.fixture(scope="module")
+def axes():
+    return machine_of({**GATE, "joints": ["x", "y"]})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_joint_has_its_own_gains(name, axes):
+    recording = moving(axes, seconds=4.0, noise=1e-3, contact=[300.0, 200.0], contact_at=3.0)
+    detector = DETECTORS.load(name)
+    shared = detector()
+    own = {item.name: (item.default, 1.5 * item.default) for item in fields(detector)}
+    signal = detector(**own).signal(recording, axes)
+    for j in (0, 1):
+        alone = detector(**{gain: values[j] for gain, values in own.items()}).signal(recording, axes)
+        np.testing.assert_array_equal(signal.values[:, j], alone.values[:, j])
+        np.testing.assert_array_equal(signal.status[:, j], alone.status[:, j])
+    assert np.abs(signal.values[:, 1] - shared.signal(recording, axes).values[:, 1]).max() > 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_number_for_every_joint_is_that_number(name, arm):
+    recording = moving(arm, seconds=3.0, noise=1e-3, contact=[2.0, 1.0], contact_at=2.0)
+    detector = DETECTORS.load(name)
+    columns = 1 if name == "energy" else 2
+    equal = detector(**{item.name: (item.default,) * columns for item in fields(detector)})
+    np.testing.assert_array_equal(equal.signal(recording, arm).values, detector().signal(recording, arm).values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_wrong_number_of_values_and_a_wrong_value_are_refused(name, arm):
+    recording = moving(arm, seconds=1.0)
+    detector = DETECTORS.load(name)
+    first = fields(detector)[0]
+    with pytest.raises(ConfigurationError, match="3 values for"):
+        detector(**{first.name: (first.default,) * 3}).signal(recording, arm)
+    with pytest.raises(ConfigurationError, match=first.name):
+        detector(**{first.name: (first.default, -1.0)})
+    with pytest.raises(ConfigurationError, match=first.name):
+        detector(**{first.name: ()})
+
+
+def test_a_whole_machines_energy_has_one_gain(arm):
+    with pytest.raises(ConfigurationError, match="2 values for the whole machine"):
+        Energy(bandwidth=(10.0, 20.0)).signal(moving(arm, seconds=1.0), arm)
+
+
+def test_one_joints_gains_are_numbers():
+    detector = of_joint(Momentum(bandwidth=(10.0, 20.0)), 1, 2)
+    assert detector == Momentum(bandwidth=20.0) and single(detector.bandwidth) == 20.0
+    with pytest.raises(ConfigurationError, match="2 values"):
+        single((1.0, 2.0))
+
+
+def test_the_machine_file_takes_one_number_or_one_a_joint(tmp_path):
+    text = """
+[machine]
+type = "rotary_axis"
+joints = ["a", "b"]
+coordinates = "load"
+load_inertia = 1.0
+[detectors.gm]
+bandwidth = BANDWIDTH
+"""
+    path = tmp_path / "machine.toml"
+    path.write_text(text.replace("BANDWIDTH", "[10, 20.0]"))
+    assert read_machine_file(path).detector("gm") == Momentum(bandwidth=(10.0, 20.0))
+    for wrong, words in (("[10, 20, 30]", "has 3 values"), ("[10, 'x']", "is 'x'"), ("[10, -1]", "bandwidth")):
+        path.write_text(text.replace("BANDWIDTH", wrong))
+        with pytest.raises(ConfigurationError, match=words):
+            read_machine_file(path)
+
+
+def test_a_signature_keeps_them_and_is_checked_against_them(tmp_path, gate, simulated):
+    detector = Momentum(bandwidth=(10.0,))
+    runs = [(simulated("none", seed), detector.signal(simulated("none", seed), gate)) for seed in range(10, 20)]
+    fitted = Signature(position_step=0.02, position_window=0.1).fit(runs)
+    gains = {"bandwidth": detector.bandwidth}
+    stored = SignatureFile("gate", fingerprint(gate), "momentum", gains, "N", None, (fitted,), (fitted,), ())
+    write_signature(tmp_path / "s.json", stored)
+    again = read_signature(tmp_path / "s.json")
+    again.check(gate, detector)
+    assert again.gains == gains
+    with pytest.raises(SignatureError, match="bandwidth"):
+        again.check(gate, replace(detector, bandwidth=(11.0,)))
