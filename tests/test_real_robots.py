@@ -106,9 +106,7 @@ def test_the_reference_observer_of_the_data_comes_out_of_the_machines_terms(arm,
 
 @needs_arm
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
-@pytest.mark.parametrize(
-    ("gain", "share"), [(20.0, 0.1), (2.0, 0.04), ((27.0, 15.0, 15.0, 27.0, 27.0, 12.0), 0.12)]
-)
+@pytest.mark.parametrize(("gain", "share"), [(20.0, 0.1), (2.0, 0.04), ((27.0, 15.0, 15.0, 27.0, 27.0, 12.0), 0.12)])
 def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(arm, name, gain, share):
     """They differ by the sampling alone, forward Euler against the exact step, and less the smaller K T is."""
     recording = read(name, arm)
