@@ -12,6 +12,9 @@ from typing import Protocol
 
 from cdtool.recording import FloatArray, Recording
 
+# A gain: one number for all joints, or one a joint (the thesis's diagonal gain matrix, 2.13 and 2.19).
+Gain = float | tuple[float, ...]
+
 
 @dataclass(frozen=True)
 class Pendulum:

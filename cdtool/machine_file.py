@@ -14,12 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.channels import ChannelMap, read_channel_map
+from cdtool.dynamics import Gain
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.registry import Registry
 from cdtool.tables import Table, read_toml
-
-# One number for all joints, or one a joint.
-Gain = float | tuple[float, ...]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
-from cdtool.machine_file import Gain, fingerprint
+from cdtool.machine_file import fingerprint
 from cdtool.thresholds.signature import FittedSignature
 
 SCHEMA_VERSION = 2

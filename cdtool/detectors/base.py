@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -17,9 +17,6 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-
-# One number for all joints, or one a joint (the thesis's diagonal gain matrix, 2.13 and 2.19).
-Gain = float | tuple[float, ...]
 
 AnyDetector = TypeVar("AnyDetector", bound="DataclassInstance")
 

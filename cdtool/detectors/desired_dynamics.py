@@ -9,9 +9,9 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
-from cdtool.detectors.base import Gain, for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
+from cdtool.detectors.base import for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
 from cdtool.detectors.filters import low_pass, polynomial_rates, settling_time, started_at
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The reference's rates come from a cubic through this many of its last samples.

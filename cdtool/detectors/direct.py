@@ -9,7 +9,6 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
@@ -18,7 +17,7 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.filters import low_pass, settling_time, started_at
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from cdtool.detection import WHOLE_MACHINE, Signal, Status
 from cdtool.detectors.base import (
     Drive,
-    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
@@ -19,7 +18,7 @@ from cdtool.detectors.base import (
     require_channels,
     require_positive,
 )
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
 

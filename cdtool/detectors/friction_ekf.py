@@ -11,7 +11,6 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
@@ -23,7 +22,7 @@ from cdtool.detectors.base import (
 )
 from cdtool.detectors.friction_ekf_arm_kernel import run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import run_filter
-from cdtool.dynamics import JointEquation, Machine
+from cdtool.dynamics import Gain, JointEquation, Machine
 from cdtool.recording import FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].

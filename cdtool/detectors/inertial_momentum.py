@@ -10,7 +10,6 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
@@ -21,7 +20,7 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 

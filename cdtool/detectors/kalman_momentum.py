@@ -9,7 +9,6 @@ import numpy as np
 
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     gain,
     per_joint,
@@ -17,7 +16,7 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 

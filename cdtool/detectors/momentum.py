@@ -9,14 +9,13 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     gain,
     observe_momentum,
     require_channels,
     require_positive,
 )
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
 

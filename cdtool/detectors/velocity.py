@@ -9,7 +9,6 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
-    Gain,
     drive_on_speed_clock,
     for_every_joint,
     gain,
@@ -19,7 +18,7 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.velocity_kernel import observe_velocity
-from cdtool.dynamics import Machine
+from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
 
