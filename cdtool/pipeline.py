@@ -100,7 +100,8 @@ def detect_operation(
         nothing = np.full(signal.values.shape, np.nan)
         status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
         statistic = replace(signal, status=status)
-        verdict = Verdict("not assessable", reason=refused or f"nothing learned: {statistic.why_not()}")
+        unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
+        verdict = Verdict("not assessable", reason=refused or unlearned)
         return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
     statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
     alarms, crossings = activation.alarms(statistic, band)
