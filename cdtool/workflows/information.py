@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.clock import integrate, previous_value
 from cdtool.detectors.base import of_joint
 from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -151,12 +152,9 @@ def _swapped(recording: Recording) -> list[Finding]:
     speed, position = recording["speed"], recording["position"]
     if speed.joint_count < 2 or len(speed) < 3 or len(position) < 3:
         return []
-    steps = np.diff(speed.time)[:, np.newaxis]
-    rates = np.nan_to_num(speed.values)
-    way = np.vstack((np.zeros(speed.joint_count), np.cumsum(0.5 * (rates[1:] + rates[:-1]) * steps, axis=0)))
-    at = np.clip(np.searchsorted(speed.time, position.time, side="right") - 1, 0, None)
-    known = np.isfinite(position.values).all(axis=1)
-    ways, places = way[at][known], position.values[known]
+    ways = previous_value(integrate(speed, position.unit), position.time)
+    known = np.isfinite(position.values).all(axis=1) & np.isfinite(ways).all(axis=1)
+    ways, places = ways[known], position.values[known]
     if len(places) < 3:
         return []
     joints = speed.joint_count
@@ -172,8 +170,7 @@ def _swapped(recording: Recording) -> list[Finding]:
 
 
 def _travelled(speed: Series, joint: int) -> tuple[float, float]:
-    values = np.nan_to_num(speed.values[:, joint])
-    path = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(speed.time))))
+    path = integrate(speed, "").values[:, joint]
     return float(path[-1]), float(path.max() - path.min())
 
 
