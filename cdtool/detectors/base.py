@@ -76,15 +76,9 @@ def single(value: Gain) -> float:
     return float(per_joint(value, 1)[0])
 
 
-def require_channels(detector: Detector, recording: Recording, machine: Machine) -> None:
-    """Raise RecordingError, naming the channel, where one that the detector needs is absent.
-
-    A detector that uses a model of a coupled machine needs its position too: M, C and g depend on the pose.
-    """
-    needs = detector.needs
-    if machine.coupled and "torque" in needs and len(needs) > 1:
-        needs = tuple(dict.fromkeys((*needs, "position")))
-    for channel in needs:
+def require_channels(detector: Detector, recording: Recording, *more: str) -> None:
+    """Raise RecordingError, naming the channel, where one that the detector needs (or one of `more`) is absent."""
+    for channel in (*detector.needs, *more):
         if channel not in recording:
             raise RecordingError(
                 f"{recording.name}: {detector.name} needs the channel '{channel}'",
@@ -107,6 +101,16 @@ class Drive:
     speed: FloatArray
     missing: BoolArray
     speed_missing: BoolArray
+
+
+def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Drive:
+    """What a detector with a model starts from; raises RecordingError or ConfigurationError where something is lacking.
+
+    Of a coupled machine the position is needed too: M, C and g depend on the pose.
+    """
+    require_channels(detector, recording, *(("position",) if machine.coupled else ()))
+    machine.require_inertia(detector.name)
+    return drive_on_speed_clock(recording, machine)
 
 
 def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:

@@ -48,7 +48,7 @@ class DesiredDynamics:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the reference's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
+        require_channels(self, recording)
         machine.require_inertia(self.name)
         reference = recording["reference_position"]
         time = reference.time

@@ -9,11 +9,10 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     for_every_joint,
     gain,
     per_joint,
-    require_channels,
     require_positive,
 )
 from cdtool.detectors.filters import low_pass, settling_time, started_at
@@ -49,9 +48,7 @@ class Direct:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         cutoff = per_joint(self.cutoff, len(machine.joints))
         filtered, _ = low_pass(drive.time, balance, drive.speed_missing, cutoff)

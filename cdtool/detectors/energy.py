@@ -10,12 +10,11 @@ import numpy as np
 from cdtool.detection import WHOLE_MACHINE, Signal, Status
 from cdtool.detectors.base import (
     Drive,
-    drive_on_speed_clock,
+    drive_of,
     for_every_joint,
     gain,
     observe_momentum,
     per_joint,
-    require_channels,
     require_positive,
 )
 from cdtool.dynamics import Gain, Machine
@@ -51,9 +50,7 @@ class Energy:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Power taken by a contact (n, 1), or (n, J) of uncoupled joints; raises RecordingError."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         power = machine.drive_power(drive.torque, drive.speed)
         energy = machine.energy(drive.position, drive.speed)
         # From the first sample on: a potential energy may be large, and only its changes count.

@@ -11,12 +11,11 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     for_every_joint,
     gain,
     hold_last,
     of_joint,
-    require_channels,
     require_positive,
     single,
 )
@@ -95,9 +94,7 @@ class FrictionEkf:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Virtual friction (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         acceleration = recording["acceleration"]
         others = previous_value(acceleration, drive.time)
         lost = ~np.isfinite(others)

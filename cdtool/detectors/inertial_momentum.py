@@ -10,13 +10,12 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     for_every_joint,
     gain,
     hold_last,
     observe_momentum,
     of_joint,
-    require_channels,
     require_positive,
     single,
 )
@@ -59,9 +58,7 @@ class InertialMomentum:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         acceleration = previous_value(recording["acceleration"], drive.time)
         lost = ~np.isfinite(acceleration)
         fused = np.empty_like(drive.speed)

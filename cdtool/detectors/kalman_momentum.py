@@ -9,10 +9,9 @@ import numpy as np
 
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     gain,
     per_joint,
-    require_channels,
     require_positive,
     single,
 )
@@ -59,9 +58,7 @@ class KalmanMomentum:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Contact torque (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
         estimate = np.empty(momentum.shape)
         status = np.empty(momentum.shape, dtype=np.uint8)

@@ -9,10 +9,9 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     gain,
     observe_momentum,
-    require_channels,
     require_positive,
 )
 from cdtool.dynamics import Gain, Machine
@@ -25,9 +24,8 @@ class Momentum:
 
     dp/dt = tau - beta - tau_c with beta = g - C'v + friction: no acceleration and no inverse of M is needed. Needs:
     torque, speed (and position, where joints are coupled). Unit: N or N m, positive where the contact opposes positive
-    travel. Start-up
-    3 / K; after a gap longer than that it starts anew. Fails: friction that the machine file does not know stays in the
-    residual; a compliant drive or clearance delays what the motor's speed can tell.
+    travel. Start-up 3 / K; after a gap longer than that it starts anew. Fails: friction that the machine file does not
+    know stays in the residual; a compliant drive or clearance delays what the motor's speed can tell.
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain K: the residual follows a contact with time constant 1/K")
@@ -47,9 +45,7 @@ class Momentum:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
         ready = np.full(momentum.shape[1], -np.inf)
         residual, status = observe_momentum(drive, net_force, momentum, self.bandwidth, ready)

@@ -33,7 +33,7 @@ class PureInertia:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Deceleration (n, J); raises RecordingError without an acceleration."""
-        require_channels(self, recording, machine)
+        require_channels(self, recording)
         acceleration = recording["acceleration"]
         status = np.where(np.isfinite(acceleration.values), Status.VALID, Status.GAP).astype(np.uint8)
         return Signal(acceleration.time, -acceleration.values, status, self.unit(machine), self.signed)

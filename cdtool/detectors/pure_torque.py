@@ -33,7 +33,7 @@ class PureTorque:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Drive force (n, J); raises RecordingError without a torque."""
-        require_channels(self, recording, machine)
+        require_channels(self, recording)
         torque = recording["torque"]
         status = np.where(np.isfinite(torque.values), Status.VALID, Status.GAP).astype(np.uint8)
         return Signal(torque.time, torque.values, status, self.unit(machine), self.signed)

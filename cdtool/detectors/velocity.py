@@ -9,12 +9,11 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.detectors.base import (
-    drive_on_speed_clock,
+    drive_of,
     for_every_joint,
     gain,
     observe_momentum,
     per_joint,
-    require_channels,
     require_positive,
 )
 from cdtool.detectors.velocity_kernel import observe_velocity
@@ -51,9 +50,7 @@ class Velocity:
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
-        require_channels(self, recording, machine)
-        machine.require_inertia(self.name)
-        drive = drive_on_speed_clock(recording, machine)
+        drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         if not machine.coupled:
             # M is constant and diagonal: joint by joint the same recursion as the momentum observer's.
