@@ -339,13 +339,13 @@ def desired_dynamics(d: Diagram) -> None:
     """Desired dynamics.
 
     The model torque is computed from the reference, M(q_r) qdd_r + n(q_r, qd_r), passes the same low-pass F(s) as the
-    torque and is taken from it. Beside it the tracking error q_r - q is checked: where it alone causes a torque error
-    above the threshold in impact-free runs, the residual is not applicable.
+    torque and is taken from it. Beside it the tracking error q_r - q is checked, sample by sample: above its limit the model
+    torque is not that of the motion made, and the residual is not applicable.
     """
     derive, model = d.block(24, 34, "derivatives\n(causal)", 13), d.block(48, 34, "model\ntorque", 10, fill=MODEL)
     error, total = d.sum(24, 16, left="-", top="+"), d.sum(74, 34, left="-", top="+")
     low_pass, valid = d.block(62, 34, "$F(s)$", 10), d.block(85, 34, "valid?", 10)
-    check = d.block(54, 16, "tracking error small\nin impact-free runs?", 25)
+    check = d.block(54, 16, "tracking error\nwithin its limit?", 25)
     d.wire(d.port(6, 51, "torque", 8), r"$\tau_J$", d.block(62, 51, "$F(s)$", 10), (74, 51), total, along=0.1)
     d.wire(d.port(6, 34, "reference", 10), derive, r"$q_r,\,\dot q_r,\,\ddot q_r$", model, low_pass, total, valid)
     d.wire(d.port(6, 16, "position", 10), "$q$", error, "$e$", check, (85, 16), valid)
