@@ -20,7 +20,7 @@ from cdtool.evaluation.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording
-from cdtool.thresholds.signature import FittedSignature
+from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
 from cdtool.workflows.learning import fit_signatures
 

@@ -39,7 +39,7 @@ class Activation:
 
     def alarms(self, statistic: Signal, band: Band) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints."""
-        period = float(np.median(np.diff(statistic.time))) if len(statistic.time) > 1 else 0.0
+        period = statistic.period
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
         for joint in range(statistic.values.shape[1]):
@@ -48,7 +48,7 @@ class Activation:
             upper = np.ascontiguousarray(band.upper[:, joint])
             status = np.ascontiguousarray(statistic.status[:, joint])
             outside = (value > upper) | (value < lower)
-            at, armed = _cross(statistic.time, outside, status, self.samples(period), self.rearm)
+            at, armed = crossings_of(statistic.time, outside, status, self.samples(period), self.rearm)
             for k, was_armed in zip(at, armed, strict=True):
                 above = bool(value[k] > upper[k])
                 limit = float(upper[k] if above else lower[k])
@@ -64,9 +64,10 @@ def _in_order(alarms: list[Alarm]) -> tuple[Alarm, ...]:
     return tuple(sorted(alarms, key=lambda alarm: (alarm.time, alarm.joint)))
 
 
-def _cross(
+def crossings_of(
     time: FloatArray, outside: BoolArray, status: StatusArray, debounce: int, rearm: float
 ) -> tuple[npt.NDArray[np.int64], BoolArray]:
+    """The samples at which one joint's debounced exits from the band are raised, and whether each was armed."""
     at = np.empty(len(time) if outside.any() else 0, dtype=np.int64)
     armed = np.empty(len(at), dtype=np.bool_)
     count = _activate(np.ascontiguousarray(time), outside, status, debounce, rearm, at, armed) if len(at) else 0

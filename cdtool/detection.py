@@ -61,6 +61,11 @@ class Signal:
         valid: BoolArray = self.status == Status.VALID
         return valid
 
+    @property
+    def period(self) -> float:
+        """Median sample period [s]; 0 below two samples."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+
     def watching(self, joints: Sequence[str]) -> Signal:
         """Only the columns of these joints, in their order here; all of them where none is named.
 

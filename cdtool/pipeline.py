@@ -13,8 +13,10 @@ from cdtool.clock import previous_value
 from cdtool.detection import REASONS, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.operations import Operation
-from cdtool.thresholds.base import FittedThreshold
-from cdtool.thresholds.signature import SPEED_TOLERANCE, FittedSignature
+from cdtool.recording import FloatArray
+from cdtool.thresholds.base import FittedThreshold, exceedance
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.signature import SPEED_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,25 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Detection:
-    """What a detector and its threshold say of one operation, with all that led there."""
+    """What a detector and its threshold say of one operation, with all that led there.
+
+    `threshold` is None where none applies.
+    """
 
     operation: Operation
     detector: str
     statistic: Signal
     band: Band
     verdict: Verdict
+    signal: Signal | None = None
+    threshold: FittedThreshold | None = None
+
+    def exceedance(self) -> FloatArray:
+        """For each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""
+        if self.threshold is None or self.signal is None:
+            return np.full(self.statistic.values.shape, -np.inf)
+        recording = self.operation.recording.without_ground_truth()
+        return exceedance(self.threshold, recording, self.signal)[1]
 
     @property
     def leading(self) -> int:
@@ -48,10 +62,9 @@ class Detection:
     @property
     def assessed_seconds(self) -> float:
         """For how long the operation was watched [s]: the time of the valid samples of its best-watched joint."""
-        if len(self.statistic.time) < 2:
+        if not len(self.statistic.time):
             return 0.0
-        period = float(np.median(np.diff(self.statistic.time)))
-        return period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
+        return self.statistic.period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
 
     def not_judged(self) -> list[Stretch]:
         """The stretches in which the leading joint's signal could not be judged, in order of time."""
@@ -95,6 +108,17 @@ def detect_operation(
     assessable". Raises RecordingError where the recording lacks a channel that the detector needs.
     """
     signal = run_detector(operation, machine, detector, watched)
+    return judge(operation, detector.name, signal, thresholds, activation)
+
+
+def judge(
+    operation: Operation,
+    detector: str,
+    signal: Signal,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+) -> Detection:
+    """Hold a detector's signal of an operation against the threshold of its class."""
     threshold, refused = choose_threshold(operation, thresholds)
     if threshold is None:
         nothing = np.full(signal.values.shape, np.nan)
@@ -102,7 +126,7 @@ def detect_operation(
         statistic = replace(signal, status=status)
         unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
         verdict = Verdict("not assessable", reason=refused or unlearned)
-        return Detection(operation, detector.name, statistic, Band(nothing, nothing), verdict)
+        return Detection(operation, detector, statistic, Band(nothing, nothing), verdict, signal)
     statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
     alarms, crossings = activation.alarms(statistic, band)
     if alarms:
@@ -111,7 +135,7 @@ def detect_operation(
         verdict = Verdict("not assessable", reason=statistic.why_not())
     else:
         verdict = Verdict("no alarm")
-    return Detection(operation, detector.name, statistic, band, verdict)
+    return Detection(operation, detector, statistic, band, verdict, signal, threshold)
 
 
 def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:

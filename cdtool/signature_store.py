@@ -13,7 +13,7 @@ from typing import Any
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
 from cdtool.machine_file import fingerprint
-from cdtool.thresholds.signature import FittedSignature
+from cdtool.thresholds.fitted_signature import FittedSignature
 
 SCHEMA_VERSION = 2
 _KIND = "cdtool signature"

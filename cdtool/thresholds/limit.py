@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -16,31 +16,57 @@ from cdtool.thresholds.base import with_limits
 
 @dataclass(frozen=True)
 class FittedLimit:
-    """lower < i < upper, the same at every sample; one value for all joints or one a joint, infinite = no limit."""
+    """lower < i < upper, the same at every sample: `safety_factor` spreads from the extremes of normal runs.
 
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
+    Each has one value for all joints or one a joint; an infinite spread = no limit.
+    """
+
+    least: tuple[float, ...]
+    greatest: tuple[float, ...]
+    spread_below: tuple[float, ...]
+    spread_above: tuple[float, ...]
+    safety_factor: float = 1.0
+
+    @property
+    def lower(self) -> tuple[float, ...]:
+        """The lower limits, in the signal's unit."""
+        pairs = zip(self.least, self.spread_below, strict=True)
+        return tuple(centre - self.safety_factor * spread for centre, spread in pairs)
+
+    @property
+    def upper(self) -> tuple[float, ...]:
+        """The upper limits, in the signal's unit."""
+        pairs = zip(self.greatest, self.spread_above, strict=True)
+        return tuple(centre + self.safety_factor * spread for centre, spread in pairs)
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """The signal and its constant band; raises UsageError where the number of joints differs."""
         joints = signal.values.shape[1]
-        if len(self.lower) not in (1, joints):
+        if len(self.least) not in (1, joints):
             raise UsageError(
-                f"{recording.name}: {len(self.lower)} limits for {joints} joints",
+                f"{recording.name}: {len(self.least)} limits for {joints} joints",
                 "give one limit, or one a joint",
             )
         shape = signal.values.shape
         return with_limits(signal, np.broadcast_to(self.lower, shape), np.broadcast_to(self.upper, shape))
 
+    def with_safety_factor(self, factor: float) -> FittedLimit:
+        """The same with its limits at `factor` spreads from the extremes."""
+        return replace(self, safety_factor=factor)
+
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values; an absent limit is null."""
-        return {side: [None if np.isinf(x) else x for x in getattr(self, side)] for side in ("lower", "upper")}
+        """As JSON values; an infinite spread is null."""
+        values = asdict(self)
+        for name in ("spread_below", "spread_above"):
+            values[name] = [None if np.isinf(x) else x for x in values[name]]
+        return values
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`."""
-        lower = tuple(-np.inf if x is None else float(x) for x in values["lower"])
-        return cls(lower, tuple(np.inf if x is None else float(x) for x in values["upper"]))
+        names = ("least", "greatest", "spread_below", "spread_above")
+        columns = {name: tuple(np.inf if x is None else float(x) for x in values[name]) for name in names}
+        return cls(**columns, safety_factor=float(values["safety_factor"]))
 
 
 @dataclass(frozen=True)
@@ -66,14 +92,22 @@ class Limit:
                 raise kind(f"{recording.name}: a joint has no valid sample ({signal.why_not()})", "leave the run out")
             highest.append(np.max(np.where(signal.valid, signal.values, -np.inf), axis=0))
             lowest.append(np.min(np.where(signal.valid, signal.values, np.inf), axis=0))
-        upper = np.mean(highest, axis=0) + self.safety_factor * np.std(highest, axis=0, ddof=1)
-        lower = np.mean(lowest, axis=0) - self.safety_factor * np.std(lowest, axis=0, ddof=1)
-        return FittedLimit(tuple(map(float, lower)), tuple(map(float, upper)))
+        return FittedLimit(
+            least=tuple(np.mean(lowest, axis=0).tolist()),
+            greatest=tuple(np.mean(highest, axis=0).tolist()),
+            spread_below=tuple(np.std(lowest, axis=0, ddof=1).tolist()),
+            spread_above=tuple(np.std(highest, axis=0, ddof=1).tolist()),
+            safety_factor=self.safety_factor,
+        )
 
     @staticmethod
     def given(limits: Sequence[float]) -> FittedLimit:
-        """Hand-set limits |i| < limit: one for all joints or one a joint (infinite: that joint is not watched)."""
+        """Hand-set limits |i| < limit: one for all joints or one a joint (infinite: that joint is not watched).
+
+        Their spread is the limit itself, so that a safety factor of 1 stands for what was set.
+        """
         values = tuple(limits)
         if not all(value > 0.0 for value in values):
             raise UsageError(f"limits are {list(values)}", "numbers above 0 are needed (inf: not watched)")
-        return FittedLimit(tuple(-value for value in values), values)
+        nothing = (0.0,) * len(values)
+        return FittedLimit(nothing, nothing, values, values)

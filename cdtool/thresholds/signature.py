@@ -2,147 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Band, Signal
-from cdtool.errors import NothingValidError, SignatureError, UsageError, nearest
+from cdtool.detection import Signal
+from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.motion import MotionClass, motion_class
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
-from cdtool.thresholds.base import with_limits
+from cdtool.thresholds.fitted_signature import (
+    RULES,
+    RUNNING_SHARE,
+    SIDES,
+    START_SHARE,
+    FittedSignature,
+    axes_of,
+    known,
+)
 from cdtool.thresholds.signature_curve import Curve, resample
 
-RULES = ("pooled", "thesis")
-SIDES = ("one", "two")
 ENOUGH_RUNS = 10
 # Speeds of one class differ by at most this share.
 SPEED_TOLERANCE = 0.05
 
-_START_SHARE = 0.1
-_RUNNING_SHARE = 0.95
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
-
-
-@dataclass(frozen=True)
-class FittedSignature:
-    """Statistics of the runs along the stroke, for one class of motion, and the rule that makes limits of them.
-
-    `evaluate`: time since motion start counts while accelerating, travel afterwards (or one of them alone). Status
-    NO_LIMIT before the motion starts and where too few runs have been.
-    """
-
-    motion: MotionClass
-    alignment: str
-    rule: str
-    sides: str
-    safety_factor: float
-    signed: bool
-    joints: tuple[str, ...]
-    by_time: Curve
-    by_position: Curve
-
-    def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and its band on the signal's clock; raises RecordingError without speed and position.
-
-        Raises SignatureError where the signal is of other joints than those that were learned.
-        """
-        if signal.joints != self.joints:
-            learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
-            raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
-        where = self._progress(recording, signal.time)
-        shape = signal.values.shape
-        lower, upper = np.full(shape, np.nan), np.full(shape, np.nan)
-        for curve, axis, use in self._curves(where):
-            low, high = self.limits(curve)
-            for j in range(shape[1]):
-                lower[use, j] = curve.at(low[:, j], axis[use])
-                upper[use, j] = curve.at(high[:, j], axis[use])
-        return with_limits(signal, lower, upper)
-
-    def limits(self, curve: Curve) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper limit (g, J) on a curve's grid: mean -+ k s, the side without a limit infinite."""
-        mean, spread = curve.band(pooled=self.rule == "pooled")
-        reach = self.safety_factor * spread
-        lower, upper = mean - reach, mean + reach
-        if self.sides == "one":
-            if self.signed and self.motion.direction < 0:
-                upper = np.where(np.isnan(upper), np.nan, np.inf)
-            else:
-                lower = np.where(np.isnan(lower), np.nan, -np.inf)
-        return lower, upper
-
-    def with_run(self, recording: Recording, signal: Signal, forget: float | None = None) -> FittedSignature:
-        """The signature with one more impact-free run, by Welford's update, or by forgetting with N_eff = `forget`."""
-        where = self._progress(recording, signal.time)
-        sample = [resample(signal, where, curve, axis) for curve, axis in _axes(self.by_time, self.by_position, where)]
-        return replace(
-            self,
-            by_time=self.by_time.updated(sample[0], forget),
-            by_position=self.by_position.updated(sample[1], forget),
-        )
-
-    @property
-    def runs(self) -> int:
-        """The largest number of runs at any grid point."""
-        return int(max(self.by_time.count.max(initial=0), self.by_position.count.max(initial=0)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
-        return {
-            "direction": self.motion.direction,
-            "nominal_speed": self.motion.nominal_speed,
-            "leading_joint": self.motion.joint,
-            "alignment": self.alignment,
-            "rule": self.rule,
-            "sides": self.sides,
-            "safety_factor": self.safety_factor,
-            "signed": self.signed,
-            "joints": list(self.joints),
-            "by_time": self.by_time.to_dict(),
-            "by_position": self.by_position.to_dict(),
-        }
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
-        return cls(
-            motion=MotionClass(int(values["direction"]), float(values["nominal_speed"]), int(values["leading_joint"])),
-            alignment=_known("alignment", values["alignment"], ALIGNMENTS),
-            rule=_known("rule", values["rule"], RULES),
-            sides=_known("sides", values["sides"], SIDES),
-            safety_factor=float(values["safety_factor"]),
-            signed=bool(values["signed"]),
-            joints=tuple(map(str, values["joints"])),
-            by_time=Curve.from_dict(values["by_time"]),
-            by_position=Curve.from_dict(values["by_position"]),
-        )
-
-    def _progress(self, recording: Recording, clock: FloatArray) -> Progress:
-        speed = self.motion.nominal_speed
-        return progress(
-            recording,
-            clock,
-            self.motion.direction,
-            _START_SHARE * speed,
-            _RUNNING_SHARE * speed,
-            self.motion.joint,
-        )
-
-    def _curves(self, where: Progress) -> list[tuple[Curve, FloatArray, Any]]:
-        started = np.isfinite(where.elapsed)
-        if self.alignment == "time":
-            return [(self.by_time, where.elapsed, started)]
-        if self.alignment == "position":
-            return [(self.by_position, where.travel, started)]
-        return [
-            (self.by_time, np.minimum(where.elapsed, self.by_time.end), started & ~where.running),
-            (self.by_position, where.travel, started & where.running),
-        ]
 
 
 @dataclass(frozen=True)
@@ -168,10 +55,10 @@ class Signature:
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
 
     def __post_init__(self) -> None:
-        _known("rule", self.rule, RULES)
+        known("rule", self.rule, RULES)
         if self.sides is not None:
-            _known("sides", self.sides, SIDES)
-        _known("alignment", self.alignment, ALIGNMENTS)
+            known("sides", self.sides, SIDES)
+        known("alignment", self.alignment, ALIGNMENTS)
         if self.safety_factor is not None and not self.safety_factor > 0.0:
             raise UsageError(f"safety factor is {self.safety_factor}", "a number above 0 is needed")
         if not (0.0 < self.position_step <= self.position_window):
@@ -197,8 +84,8 @@ class Signature:
                 recording,
                 signal.time,
                 motion.direction,
-                _START_SHARE * motion.nominal_speed,
-                _RUNNING_SHARE * motion.nominal_speed,
+                START_SHARE * motion.nominal_speed,
+                RUNNING_SHARE * motion.nominal_speed,
                 motion.joint,
             )
             for recording, signal in pairs
@@ -212,7 +99,7 @@ class Signature:
         by_position = Curve.empty(self.position_step, self.position_window, longest, joints)
         samples: tuple[list[FloatArray], list[FloatArray]] = ([], [])
         for (_, signal), where in zip(pairs, wheres, strict=True):
-            for store, (curve, axis) in zip(samples, _axes(by_time, by_position, where), strict=True):
+            for store, (curve, axis) in zip(samples, axes_of(by_time, by_position, where), strict=True):
                 store.append(resample(signal, where, curve, axis))
         fitted = FittedSignature(
             motion=motion,
@@ -262,13 +149,3 @@ class Signature:
             lasting.append(float(np.nanmax(part, initial=0.0)))
         reserve = 1.0 if self.alignment == "time" else _TIME_RESERVE
         return reserve * max(lasting, default=0.0)
-
-
-def _axes(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[Curve, FloatArray], ...]:
-    return ((by_time, where.elapsed), (by_position, where.travel))
-
-
-def _known(what: str, value: Any, allowed: Sequence[str]) -> str:
-    if value not in allowed:
-        raise UsageError(f"unknown {what} '{value}'", nearest(str(value), allowed))
-    return str(value)

@@ -13,6 +13,7 @@ import cdtool.thresholds
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import CHANNELS, GROUND_TRUTH
 from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import exceedance
 
 NAMES = THRESHOLDS.names()
 
@@ -25,7 +26,7 @@ def pairs(gate, simulated):
 
 def test_every_file_of_the_folder_with_a_threshold_is_registered():
     folder = Path(cdtool.thresholds.__file__).parent
-    helpers = {"__init__", "base", "alignment", "signature_curve"}
+    helpers = {"__init__", "base", "alignment", "signature_curve", "fitted_signature"}
     assert {path.stem for path in folder.glob("*.py")} - helpers == set(THRESHOLDS.table)
 
 
@@ -78,6 +79,23 @@ def test_shapes_fit_and_a_missing_value_is_never_valid(name, pairs, gate, simula
     assert not statistic.valid[3000:3100].any()
     assert not np.isnan(band.upper[statistic.valid]).any() and not np.isnan(band.lower[statistic.valid]).any()
     assert statistic.valid[4000:5000].all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_limits_are_linear_in_the_safety_factor_and_tell_which_samples_are_outside(name, pairs, gate, simulated):
+    fitted = THRESHOLDS.load(name)().fit(pairs)
+    recording = simulated("stiff", 1).without_ground_truth()
+    signal = Momentum().signal(recording, gate)
+    statistic, met_at = exceedance(fitted, recording, signal)
+    for factor in (0.3, 1.0, fitted.safety_factor, 17.0):
+        moved = fitted.with_safety_factor(factor)
+        again, band = moved.evaluate(recording, signal)
+        assert moved.safety_factor == factor
+        np.testing.assert_array_equal(again.values, statistic.values)
+        np.testing.assert_array_equal(again.status, statistic.status)
+        outside = ((again.values > band.upper) | (again.values < band.lower)) & again.valid
+        clear = np.abs(met_at - factor) > 1e-6 * factor
+        np.testing.assert_array_equal(outside[clear], ((met_at > factor) & again.valid)[clear])
 
 
 @pytest.mark.parametrize("name", NAMES)
