@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cdtool.errors import nearest
-from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER
+from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
 from cdtool.tables import Table
 from cdtool.units import unit
 
@@ -157,7 +157,7 @@ def _unit_factor(
     scale = table.numbers("scale", count, 1.0)
     if any(item == 0.0 for item in scale):
         raise table.fault("scale", "is 0", "a factor other than 0, e.g. N m per A")
-    if channel in ("label", "trigger"):  # high or low: a unit would mean nothing, and is refused as an unknown key
+    if channel in UNITLESS:  # a unit would mean nothing, and is refused as an unknown key
         return "1", scale
     name = table.text("unit", "")
     if not name:

@@ -16,8 +16,10 @@ BoolArray = npt.NDArray[np.bool_]
 
 MEASURED = ("torque", "speed", "position", "acceleration")
 REFERENCES = ("reference_position", "reference_speed", "reference_torque")
-GROUND_TRUTH = ("force", "label")
+GROUND_TRUTH = ("force", "label", "event")
 TRIGGER = ("trigger",)
+# High or low, or one sample an event: without a unit.
+UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
 
 
@@ -146,13 +148,17 @@ class Recording:
 
 @dataclass(frozen=True)
 class Contact:
-    """A true impact: onset and end [s], the onset's uncertainty [s], its peak force [N] and how it was found."""
+    """A true impact: onset and end [s], the onset's uncertainty [s], its peak force [N] and how it was found.
+
+    `kind` is what a label file calls it.
+    """
 
     start: float
     end: float
     uncertainty: float
     peak_force: float = float("nan")
     found_by: str = "load cell"
+    kind: str = ""
 
 
 def _frozen(values: npt.ArrayLike) -> FloatArray:

@@ -1,8 +1,9 @@
 """Alarms against contacts: one pass, one to one, everything else is derived from it.
 
-Conventions: latency = time of the sample whose processing raised the alarm (debounce included) - onset. A contact
-without an alarm in [onset - its uncertainty, onset + window] is missed: its latency is censored, never dropped. It is
-not assessable where the detector's signal was valid nowhere between onset and the window's end.
+Conventions: latency = time of the sample whose processing raised the alarm (debounce included) - onset. A contact's
+window is [onset - its uncertainty, onset + window]; it ends earlier where the next contact's window begins. A contact
+without an alarm in it is missed: its latency is censored at `watched`, never dropped. It is not assessable where the
+detector's signal was valid nowhere between onset and the window's end.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ Outcome = Literal["detected", "missed", "not_assessable"]
 class Match:
     """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero.
 
+    `watched`: how long after the onset an alarm would have counted [s], the censoring time of a missed contact.
     `reason` tells why a contact could not be assessed.
     """
 
@@ -31,6 +33,7 @@ class Match:
     alarm: Alarm | None = None
     latency: float = float("nan")
     clipped: bool = False
+    watched: float = float("nan")
     reason: str = ""
 
 
@@ -42,6 +45,16 @@ class Matching:
     false_alarms: tuple[Alarm, ...]
 
 
+def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:
+    """Each contact in order of time with the beginning and the end [s] of its window; no two windows overlap."""
+    ordered = sorted(contacts, key=lambda item: item.start)
+    opens = [contact.start - contact.uncertainty for contact in ordered]
+    for i in range(1, len(ordered)):
+        opens[i] = max(opens[i], ordered[i - 1].start)
+    closes = [min(contact.start + window, after) for contact, after in zip(ordered, [*opens[1:], np.inf], strict=False)]
+    return list(zip(ordered, opens, closes, strict=True))
+
+
 def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, window: float = 1.0) -> Matching:
     """Match in order of time: each contact takes the first crossing in its window that no earlier contact took.
 
@@ -50,32 +63,35 @@ def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, wind
     """
     taken: set[Alarm] = set()
     matches = []
-    for contact in sorted(contacts, key=lambda item: item.start):
-        opens, closes = contact.start - contact.uncertainty, contact.start + window
+    spans = windows(contacts, window)
+    for contact, opens, closes in spans:
+        watched = max(min(closes, _end(statistic)) - contact.start, 0.0)
         inside = (alarm for alarm in verdict.crossings if opens <= alarm.time <= closes and alarm not in taken)
         found = next(inside, None)
         if found is None:
-            if _assessable(statistic, contact, window):
-                matches.append(Match(contact, "missed"))
+            if _assessable(statistic, contact.start, closes):
+                matches.append(Match(contact, "missed", watched=watched))
             else:
                 why = verdict.reason or statistic.why_not(contact.start, closes)
-                matches.append(Match(contact, "not_assessable", reason=why))
+                matches.append(Match(contact, "not_assessable", watched=watched, reason=why))
             continue
         taken.add(found)
         latency = found.time - contact.start
-        matches.append(Match(contact, "detected", found, max(latency, 0.0), latency < 0.0))
+        matches.append(Match(contact, "detected", found, max(latency, 0.0), latency < 0.0, watched))
     alone = (alarm for alarm in verdict.alarms if alarm not in taken)
-    false = tuple(alarm for alarm in alone if not _belongs(alarm, contacts, window))
+    false = tuple(alarm for alarm in alone if not belongs(alarm.time, spans))
     return Matching(tuple(matches), false)
 
 
-def _belongs(alarm: Alarm, contacts: Sequence[Contact], window: float) -> bool:
-    return any(
-        contact.start - contact.uncertainty <= alarm.time <= max(contact.start + window, contact.end)
-        for contact in contacts
-    )
+def belongs(time: float, spans: Sequence[tuple[Contact, float, float]]) -> bool:
+    """Whether an alarm at that time [s] lies in a contact's window, or while the contact still presses."""
+    return any(opens <= time <= max(closes, contact.end) for contact, opens, closes in spans)
 
 
-def _assessable(statistic: Signal, contact: Contact, window: float) -> bool:
-    inside = (statistic.time >= contact.start) & (statistic.time <= contact.start + window)
+def _end(statistic: Signal) -> float:
+    return float(statistic.time[-1]) if len(statistic.time) else -np.inf
+
+
+def _assessable(statistic: Signal, start: float, closes: float) -> bool:
+    inside = (statistic.time >= start) & (statistic.time <= closes)
     return bool(np.any(statistic.valid[inside]))

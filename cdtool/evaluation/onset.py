@@ -51,15 +51,24 @@ class OnsetRule:
 
 
 def find_contacts(recording: Recording, rule: OnsetRule) -> list[Contact]:
-    """Contacts by the load cell, else by the label channel; raises RecordingError where both are absent."""
-    if "force" in recording:
-        return _from_force(recording, rule)
-    if "label" in recording:
-        return _from_label(recording)
+    """Contacts by the load cell, else by the label channel, else by events; raises RecordingError without any."""
+    for channel, found in (("force", _from_force), ("label", _from_label), ("event", _from_events)):
+        if channel in recording:
+            return found(recording, rule)
     raise RecordingError(
-        f"{recording.name}: no ground truth: neither 'force' nor 'label' is mapped",
-        "map the load cell in [channels], or use cdtool detect",
+        f"{recording.name}: no ground truth: none of 'force', 'label', 'event' is mapped",
+        "map the load cell in [channels], name a label file, or use cdtool detect",
     )
+
+
+def baseline(force: FloatArray) -> tuple[float, float]:
+    """Reading at rest and its noise, a standard deviation [N]: of the first tenth of a recording's load cell (n,).
+
+    `force` holds no missing samples. Both are wrong where the recording begins in a contact.
+    """
+    first = force[: max(_BASELINE_SAMPLES, int(_BASELINE_SHARE * len(force)))]
+    rest = float(np.median(first))
+    return rest, _MAD * float(np.median(np.abs(first - rest)))
 
 
 def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
@@ -68,12 +77,10 @@ def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
     time, force = series.time[present], series.values[present, 0]
     if len(force) < rule.samples + 2:
         return []
-    first = max(_BASELINE_SAMPLES, int(_BASELINE_SHARE * len(force)))
-    baseline = float(np.median(force[:first]))
-    noise = _MAD * float(np.median(np.abs(force[:first] - baseline)))
+    rest, noise = baseline(force)
     above = rule.above if rule.above is not None else max(rule.sigmas * noise, 1e-9)
     back_to = min(rule.back_to if rule.back_to is not None else 0.5 * above, above)
-    over = np.abs(force - baseline)
+    over = np.abs(force - rest)
     high = over > above
     run = high.copy()
     for lag in range(1, rule.samples):
@@ -110,7 +117,7 @@ def _end_of_contact(time: FloatArray, over: FloatArray, start: int, back_to: flo
     return int(pressed[pauses[0]] if len(pauses) else pressed[-1])
 
 
-def _from_label(recording: Recording) -> list[Contact]:
+def _from_label(recording: Recording, _: OnsetRule) -> list[Contact]:
     series = recording["label"]
     touched = (np.nan_to_num(series.values[:, 0]) > 0.5).astype(int)
     edges = np.diff(np.concatenate(([0], touched, [0])))
@@ -119,3 +126,10 @@ def _from_label(recording: Recording) -> list[Contact]:
         Contact(float(series.time[a]), float(series.time[b - 1]), half_sample, found_by="label")
         for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     ]
+
+
+def _from_events(recording: Recording, rule: OnsetRule) -> list[Contact]:
+    series = recording["event"]
+    times = series.time[np.nan_to_num(series.values[:, 0]) != 0.0]
+    apart = np.concatenate(([True], np.diff(times) > rule.separation)) if len(times) else np.empty(0, dtype=bool)
+    return [Contact(float(time), float(time), 0.0, found_by="event") for time in times[apart]]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.clock import differentiate, integrate, previous_value
-from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.recording import UNITLESS, Finding, FloatArray, Recording, Series
 from cdtool.tables import Table
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
@@ -102,9 +102,9 @@ class JointMachine:
     def accepted_units(self, channel: str) -> tuple[str, ...]:
         """SI units in which a log may hold a channel; the first is what a scaled raw value becomes."""
         quantity = channel.removeprefix("reference_")
-        if channel in ("force",):
+        if channel == "force":
             return ("N",)
-        if channel in ("label", "trigger"):
+        if channel in UNITLESS:
             return ("1",)
         load = self.load_units[quantity]
         if quantity == "acceleration" or self.coordinates == "load":

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cdtool.detection import Alarm, Signal, Status, Verdict
-from cdtool.evaluation.matching import Matching
+from cdtool.evaluation.matching import Matching, windows
 from cdtool.evaluation.matching import match as match_verdict
 from cdtool.recording import Contact
 
@@ -83,3 +87,37 @@ def test_an_alarm_that_is_still_latched_does_not_hide_the_contact():
     matching = match_verdict(verdict, [CONTACT], statistic())
     assert matching.matches[0].alarm == again
     assert matching.false_alarms == (early,)
+
+
+def test_an_alarm_after_the_next_contact_belongs_to_that_one_and_the_first_is_missed():
+    first, second = Contact(5.0, 5.1, 0.01), Contact(5.5, 5.6, 0.01)
+    matching = match([alarm(5.52)], [first, second], statistic())
+    assert [item.outcome for item in matching.matches] == ["missed", "detected"]
+    assert matching.matches[0].watched == pytest.approx(0.49)
+
+
+def test_a_missed_contact_is_censored_where_the_window_or_the_log_ends():
+    matching = match([], [CONTACT, Contact(9.6, 9.8, 0.01)], statistic())
+    assert [item.watched for item in matching.matches] == pytest.approx([1.0, TIME[-1] - 9.6])
+
+
+times = st.floats(0.0, 9.9)
+
+
+@given(st.lists(times, max_size=12), st.lists(times, max_size=6), st.floats(0.0, 0.3))
+def test_every_alarm_is_counted_at_most_once_and_every_contact_once(alarm_times, onsets, uncertainty):
+    alarms = [alarm(time) for time in sorted(set(alarm_times))]
+    contacts = [Contact(onset, onset + 0.1, uncertainty) for onset in onsets]
+    matching = match(alarms, contacts, statistic())
+    taken = [item.alarm for item in matching.matches if item.alarm]
+    assert len(set(taken)) == len(taken) and not set(taken) & set(matching.false_alarms)
+    assert sorted(item.contact.start for item in matching.matches) == sorted(onsets)
+    for item in matching.matches:
+        if item.alarm:
+            assert item.contact.start - uncertainty <= item.alarm.time <= item.contact.start + 1.0
+
+
+@given(st.lists(times, max_size=8))
+def test_windows_never_overlap(onsets):
+    spans = windows([Contact(onset, onset, 0.05) for onset in onsets], 1.0)
+    assert all(before[2] <= after[1] for before, after in pairwise(spans))

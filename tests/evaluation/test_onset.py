@@ -69,6 +69,13 @@ def test_labels_serve_where_there_is_no_load_cell():
     assert contact.found_by == "label"
 
 
+def test_events_mark_the_beginning_of_contacts_and_a_rebound_is_none():
+    times = np.array([1.0, 1.2, 5.0, 6.5])
+    events = Recording("r", "r", ("a",), {"event": Series(times, np.array([1.0, 1.0, 0.0, 2.0]), "1")})
+    contacts = find_contacts(events, GATE_RULE)
+    assert [(item.start, item.found_by) for item in contacts] == [(1.0, "event"), (6.5, "event")]
+
+
 def test_without_any_ground_truth_the_error_says_what_to_map():
     with pytest.raises(RecordingError, match="force"):
         find_contacts(Recording("r", "r", ("a",), {"speed": Series(TIME, TIME, "m/s")}), GATE_RULE)
