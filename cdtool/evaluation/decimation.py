@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
+from cdtool.recording import BoolArray, FloatArray
 
 IndexArray = npt.NDArray[np.intp]
 
@@ -27,24 +27,21 @@ def kept_samples(time: FloatArray, values: FloatArray, pixels: int) -> IndexArra
         raise UsageError(f"pixels is {pixels}", "a plot is at least 2 pixels wide")
     if len(time) <= 4 * pixels:
         return np.arange(len(time))
+    edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
+    starts = np.unique([0, *edges.tolist()])
+    starts = starts[starts < len(time)]
+    column = np.repeat(np.arange(len(starts)), np.diff([*starts.tolist(), len(time)]))
     missing = np.isnan(values)
     low, high = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
-    edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
-    bounds = np.unique([0, *edges.tolist(), len(time)])
-    kept = {0, len(time) - 1}
-    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        if missing[first:last].any():
-            kept.add(first + int(missing[first:last].argmax()))
-            if missing[first:last].all():
-                continue
-        kept.add(_present(low, missing, first, last, smallest=True))
-        kept.add(_present(high, missing, first, last, smallest=False))
-    return np.array(sorted(kept))
+    least, greatest = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+    marks = (~missing & (low == least[column]), ~missing & (high == greatest[column]), missing)
+    ends = np.array([0, len(time) - 1])
+    return np.unique(np.concatenate([ends, *(_first_of_each(mark, column) for mark in marks)]))
 
 
-def _present(values: FloatArray, missing: npt.NDArray[np.bool_], first: int, last: int, *, smallest: bool) -> int:
-    part = values[first:last]
-    best = int(part.argmin() if smallest else part.argmax())
-    if missing[first + best]:  # every present value is infinite: any of them will do
-        best = int((~missing[first:last]).argmax())
-    return first + best
+def _first_of_each(mark: BoolArray, column: IndexArray) -> IndexArray:
+    """The first marked sample of each column of pixels that has one."""
+    at = np.flatnonzero(mark)
+    first = np.ones(len(at), dtype=bool)
+    first[1:] = column[at[1:]] != column[at[:-1]]
+    return at[first]

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cdtool.errors import UsageError
+from cdtool.evaluation.decimation import decimate, kept_samples
 from cdtool.recording import FloatArray
-from cdtool.report.decimation import decimate, kept_samples
 
 numbers = st.one_of(st.floats(-1e6, 1e6), st.just(float("nan")))
 series = st.integers(1, 600).flatmap(lambda n: arrays(np.float64, n, elements=numbers, fill=st.floats(-1.0, 1.0)))
