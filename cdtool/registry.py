@@ -50,6 +50,16 @@ class Registry:
         return {point.name: point for point in entry_points(group=f"cdtool.{self.kind}s")}
 
 
+def plugin_packages() -> dict[str, str]:
+    """The installed packages that bring plug-ins, with their versions: what a report has to name."""
+    return {
+        point.dist.name: point.dist.version
+        for kind in ("detectors", "thresholds", "machines", "formats")
+        for point in entry_points(group=f"cdtool.{kind}")
+        if point.dist is not None
+    }
+
+
 def load_plugin(point: EntryPoint, kind: str) -> Any:
     """The class of an entry point; a failing one is an error that names its package."""
     try:

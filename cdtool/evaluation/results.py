@@ -1,117 +1,206 @@
-"""Results: every verdict of a benchmark with raw figures and provenance. Versioned; statistics are derived from it."""
+"""Results: every verdict of a benchmark with raw figures and provenance. Statistics are derived from it.
+
+Conventions: times are seconds on the recording's own clock; None where there is no figure. Each field's meaning stands
+beside it: the published schema is made from it.
+"""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
-from cdtool.errors import RecordingError
+SCHEMA_VERSION = 2
 
-SCHEMA_VERSION = 1
+
+def meant(meaning: str, **default: Any) -> Any:
+    """A dataclass field with its meaning."""
+    return field(metadata={"meaning": meaning}, **default)
+
+
+@dataclass(frozen=True)
+class RecordingResult:
+    """One log that was scored."""
+
+    recording: str = meant("path of the log below the benchmark file")
+    group: str = meant("the benchmark's group that it belongs to")
+    sha256: str = meant("hash of the log")
+    seconds: float = meant("from the first sample of any channel to the last")
+    operations: int = meant("operations that it was cut into")
+    contacts: int = meant("true contacts in it")
+    campaign: str | None = meant("test campaign: recordings of one campaign are resampled together", default=None)
+    point: str | None = meant("test point: its force figures are averaged", default=None)
 
 
 @dataclass(frozen=True)
 class ContactResult:
-    """One contact seen by one detector; None where there is no figure."""
+    """One contact seen by one detector."""
 
-    recording: str
-    group: str
-    detector: str
-    joint: str | None
-    onset_s: float
-    onset_uncertainty_s: float
-    alarm_s: float | None
-    latency_ms: float | None
-    outcome: str
-    force_at_alarm_n: float | None
-    peak_force_n: float | None
-    clipped: bool = False
-    reason: str | None = None
+    recording: str = meant("path of the log below the benchmark file")
+    group: str = meant("the benchmark's group")
+    detector: str = meant("full name of the detector")
+    joint: str | None = meant("joint whose alarm detected the contact")
+    onset_s: float = meant("when the contact began")
+    onset_uncertainty_s: float = meant("how much earlier it may have begun")
+    alarm_s: float | None = meant("time of the sample that raised the alarm, debounce included")
+    latency_ms: float | None = meant(
+        "alarm less onset; 0 where the alarm came within the onset's uncertainty before it"
+    )
+    outcome: str = meant("detected, missed or not_assessable")
+    force_at_alarm_n: float | None = meant("load-cell force when the alarm rose")
+    peak_force_n: float | None = meant("largest load-cell force of the contact")
+    clipped: bool = meant("the alarm came before the onset, within its uncertainty", default=False)
+    reason: str | None = meant("why the contact could not be assessed", default=None)
+    contact: int = meant("number of the contact in its recording, from 1", default=1)
+    kind: str | None = meant("what a label file calls the contact", default=None)
+    found_by: str = meant("ground truth: load cell, label, event or label file", default="load cell")
+    watched_ms: float | None = meant("how long after the onset an alarm would have counted", default=None)
+    resolution_ms: float | None = meant("the latency is no finer than this", default=None)
+    side: str | None = meant("the limit that was crossed: above or below", default=None)
+    statistic: float | None = meant("value compared with the limit at the alarm, in the detector's unit", default=None)
+    limit: float | None = meant("limit at the alarm, in the detector's unit", default=None)
 
 
 @dataclass(frozen=True)
 class FalseAlarmResult:
     """One alarm without a contact."""
 
-    recording: str
-    group: str
-    detector: str
-    joint: str
-    time_s: float
+    recording: str = meant("operation: the log's path, with #n where it was cut into several")
+    group: str = meant("the benchmark's group")
+    detector: str = meant("full name of the detector")
+    joint: str = meant("joint that raised it")
+    time_s: float = meant("when")
+    side: str | None = meant("the limit that was crossed: above or below", default=None)
+    statistic: float | None = meant("value compared with the limit, in the detector's unit", default=None)
+    limit: float | None = meant("limit, in the detector's unit", default=None)
 
 
 @dataclass(frozen=True)
 class ExposureResult:
-    """How long and how often a detector watched in a group: the denominator of its false alarms.
+    """How long and how often a detector watched in a group: the denominator of its false alarms."""
 
-    `not_assessable` counts operations that it could judge nowhere; `not_judged` is the share of all samples by reason.
-    """
+    group: str = meant("the benchmark's group")
+    detector: str = meant("full name of the detector")
+    recordings: int = meant("logs")
+    operations: int = meant("operations")
+    hours: float = meant("time in which the signal could be judged")
+    not_assessable: int = meant("operations that it could judge nowhere", default=0)
+    not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)
 
-    group: str
-    detector: str
-    recordings: int
-    operations: int
-    hours: float
-    not_assessable: int = 0
-    not_judged: Mapping[str, float] = field(default_factory=dict)
+
+@dataclass(frozen=True)
+class ForceStepResult:
+    """One step of a force profile, held against one contact or one test point."""
+
+    name: str = meant("the step's name in the limits file")
+    from_s: float = meant("from this long after the onset")
+    at_most_n: float = meant("largest force allowed")
+    peak_n: float | None = meant("largest force in the step; of a point: what its tests come to")
+    time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
+    verdict: str = meant("pass, fail or not assessable")
+    reason: str | None = meant("why it is no pass", default=None)
+
+
+@dataclass(frozen=True)
+class ForceResult:
+    """One contact against a force profile."""
+
+    recording: str = meant("path of the log below the benchmark file")
+    group: str = meant("the benchmark's group")
+    contact: int = meant("number of the contact in its recording, from 1")
+    profile: str = meant("name of the profile in the limits file")
+    verdict: str = meant("pass, fail or not assessable")
+    peak_n: float | None = meant("largest force of the contact, corrected for the mass before the cell")
+    steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
+    point: str | None = meant("test point", default=None)
+    time_budget_ms: float | None = meant(
+        "when the first limit was exceeded, after the onset; null if never", default=None
+    )
+    reason: str | None = meant("why it is no pass", default=None)
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """The tests at one point against a force profile, averaged as the profile asks."""
+
+    point: str = meant("test point")
+    group: str = meant("the benchmark's group")
+    profile: str = meant("name of the profile in the limits file")
+    tests: int = meant("contacts at the point")
+    verdict: str = meant("pass, fail or not assessable")
+    steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
+    note: str = meant("how many tests were averaged")
+    reason: str | None = meant("why it is no pass", default=None)
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """One detector in one group with all its limits moved: a point of the latency against false-alarm curve."""
+
+    detector: str = meant("full name of the detector")
+    group: str = meant("group of impacts")
+    safety_factor: float = meant("limits' distance from the mean, in the threshold's unit of spread")
+    false_alarms: int = meant("in the impact-free group")
+    operations: int = meant("of the impact-free group")
+    hours: float = meant("watched in the impact-free group")
+    detected: int = meant("contacts")
+    missed: int = meant("contacts")
+    not_assessable: int = meant("contacts")
+    mean_ms: float | None = meant("latency of the detected contacts")
+    median_ms: float | None = meant("of the latency, missed contacts taken as censored; null where it is not reached")
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """How a detector's safety factor was set for a false-alarm budget."""
+
+    detector: str = meant("full name of the detector")
+    budget: str = meant("false alarms allowed")
+    safety_factor: float = meant("the factor set")
+    operations: int = meant("impact-free operations, each judged with a threshold that was not learned from it")
+    hours: float = meant("watched in them")
+    alarms: int = meant("alarms in them with that factor")
+
+
+@dataclass(frozen=True)
+class LimitResult:
+    """One limit of the benchmark file, held against one figure."""
+
+    limit: str = meant("key in [limits]")
+    detector: str = meant("full name of the detector")
+    group: str = meant("the benchmark's group")
+    figure: str = meant("name of the figure")
+    value: float | None = meant("the figure; null where it is not known or not finite")
+    least: float | None = meant("smallest value allowed")
+    largest: float | None = meant("largest value allowed")
+    outcome: str = meant("kept, broken or not assessable")
+    reason: str | None = meant("why it is not kept", default=None)
 
 
 @dataclass(frozen=True)
 class Skipped:
-    """A recording that was left out, and why."""
+    """A recording that was left out, or what is odd about one that was used."""
 
-    recording: str
-    reason: str
+    recording: str = meant("path of the log below the benchmark file, or a detector")
+    reason: str = meant("why")
 
 
 @dataclass(frozen=True)
 class Results:
     """All of it, in the order of the benchmark file."""
 
-    provenance: Mapping[str, Any]
-    detectors: tuple[str, ...]
-    groups: tuple[str, ...]
-    contacts: tuple[ContactResult, ...]
-    false_alarms: tuple[FalseAlarmResult, ...]
-    exposure: tuple[ExposureResult, ...]
-    skipped: tuple[Skipped, ...] = ()
-    findings: tuple[Skipped, ...] = ()
-    schema_version: int = field(default=SCHEMA_VERSION)
-
-    def to_json(self) -> str:
-        """Strict JSON: null where there is no figure."""
-        return json.dumps(_finite(asdict(self)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def read_results(path: Path) -> Results:
-    """Read results.json; raises RecordingError."""
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        if values["schema_version"] != SCHEMA_VERSION:
-            raise RecordingError(f"{path}: schema_version {values['schema_version']}", f"{SCHEMA_VERSION} is known")
-        return Results(
-            provenance=values["provenance"],
-            detectors=tuple(values["detectors"]),
-            groups=tuple(values["groups"]),
-            contacts=tuple(ContactResult(**item) for item in values["contacts"]),
-            false_alarms=tuple(FalseAlarmResult(**item) for item in values["false_alarms"]),
-            exposure=tuple(ExposureResult(**item) for item in values["exposure"]),
-            skipped=tuple(Skipped(**item) for item in values["skipped"]),
-            findings=tuple(Skipped(**item) for item in values["findings"]),
-        )
-    except (OSError, ValueError, KeyError, TypeError) as fault:
-        raise RecordingError(f"{path}: not a results file: {fault!r}", "write one with cdtool benchmark") from fault
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
+    provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the figures")
+    detectors: tuple[str, ...] = meant("full names")
+    groups: tuple[str, ...] = meant("groups of impacts, then the impact-free hold-out")
+    contacts: tuple[ContactResult, ...] = meant("one row a contact and detector")
+    false_alarms: tuple[FalseAlarmResult, ...] = meant("one row an alarm without a contact")
+    exposure: tuple[ExposureResult, ...] = meant("one row a group and detector")
+    recordings: tuple[RecordingResult, ...] = meant("one row a log that was scored", default=())
+    forces: tuple[ForceResult, ...] = meant("one row a contact with a force profile", default=())
+    points: tuple[PointResult, ...] = meant("one row a test point with a force profile", default=())
+    sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
+    calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
+    limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
+    skipped: tuple[Skipped, ...] = meant("what was left out", default=())
+    findings: tuple[Skipped, ...] = meant("what is odd about recordings that were used", default=())
+    schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)

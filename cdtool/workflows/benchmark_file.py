@@ -4,83 +4,131 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
 from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.force_limits import ForceProfile, profile_of, read_force_limits
+from cdtool.evaluation.labels import Labels, read_labels
+from cdtool.evaluation.limits import LimitRule, read_limits
 from cdtool.evaluation.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.alignment import ALIGNMENTS
-from cdtool.thresholds.signature import RULES, SIDES, Signature
+from cdtool.thresholds.fitted_signature import RULES, SIDES
+from cdtool.thresholds.signature import Signature
 from cdtool.workflows.runs import find_logs
 
 HOLDOUT = "holdout"
 
 
 @dataclass(frozen=True)
+class Group:
+    """One group of logs of impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
+
+    logs: tuple[Path, ...]
+    window: float
+    force: ForceProfile | None = None
+
+
+@dataclass(frozen=True)
 class BenchmarkFile:
-    """A validated benchmark file with its globs resolved."""
+    """A validated benchmark file with its globs resolved; `impacts` are the groups that are scored, hold-out last.
+
+    `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg].
+    """
 
     path: Path
     machine_file: MachineFile
     detectors: tuple[str, ...]
     watched: tuple[str, ...]
     operations: str
-    window: float
     threshold: str
+    budget: Budget | None
     signature: Signature
     debounce: int | None
     onset: OnsetRule
+    labels: Labels | None
+    synchronisation: float
+    mass_before_cell: float
     learn: tuple[Path, ...]
-    holdout: tuple[Path, ...]
-    impacts: Mapping[str, tuple[Path, ...]]
+    impacts: Mapping[str, Group]
+    campaigns: Mapping[Path, str]
+    points: Mapping[Path, str]
+    limits: tuple[LimitRule, ...]
     digest: str
+
+    @property
+    def activation(self) -> Activation:
+        """Debounce and re-arming."""
+        return Activation(self.debounce)
+
+    @property
+    def scoring(self) -> dict[str, Any]:
+        """How figures come about, for provenance: results can be compared only where all this is the same."""
+        return {
+            "onset": self.onset.described,
+            "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
+            "operations": self.operations,
+            "watched_joints": ", ".join(self.watched) or None,
+            "label_file": self.labels.source if self.labels else None,
+            "synchronisation_s": self.synchronisation,
+            "mass_before_cell_kg": self.mass_before_cell,
+            "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
+        }
 
     @property
     def groups(self) -> tuple[str, ...]:
         """The impact groups, then the hold-out."""
-        return (*self.impacts, HOLDOUT) if self.holdout else tuple(self.impacts)
+        return tuple(self.impacts)
 
 
-def read_benchmark_file(path: str | Path) -> BenchmarkFile:
-    """Read and check a benchmark file; raises ConfigurationError naming the key."""
+def read_benchmark_file(path: str | Path, learning: bool = True) -> BenchmarkFile:
+    """Read and check a benchmark file; raises ConfigurationError naming the key.
+
+    Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from.
+    """
     file = Path(path)
     root = Table(read_toml(file), str(file))
     base = file.parent
     machine_file = read_machine_file(base / root.text("machine"))
-    names = tuple(machine_file.detector(name).name for name in root.texts("detectors"))
+    wanted = root.texts("detectors", None if learning else ())
+    names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
     signature, debounce = _signature(root.table("signature"), machine_file.machine.default_sides)
-    learn = _logs(root.table("learn", required=True), base)
-    holdout = _logs(root.table(HOLDOUT), base) if HOLDOUT in root else ()
-    groups = root.table("impacts")
-    if HOLDOUT in groups.values:
-        raise groups.fault(HOLDOUT, "is the name of the impact-free group", "choose another name for the impacts")
-    impacts = {name: _logs(groups.table(name), base) for name in groups.values}
-    if not impacts and not holdout:
-        raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
+    learn = _logs(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    force = root.table("force")
+    impacts = _groups(root, base, root.number("window_s", 1.0, above=0.0), force)
+    onset = root.table("onset")
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
         detectors=names,
         watched=_watched(root, machine_file.machine.joints),
         operations=root.choice("operations", HOW_TO_CUT, "whole"),
-        window=root.number("window_s", 1.0, above=0.0),
         threshold=root.choice("threshold", THRESHOLDS.names(), "signature"),
+        budget=_budget(root),
         signature=signature,
         debounce=debounce,
-        onset=_onset(root.table("onset")),
+        labels=read_labels(base / onset.text("labels")) if "labels" in onset else None,
+        synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
+        onset=_onset(onset),
+        mass_before_cell=force.number("mass_before_cell_kg", 0.0, minimum=0.0),
         learn=learn,
-        holdout=holdout,
         impacts=impacts,
+        campaigns=_named(root.table("campaigns"), base),
+        points=_named(root.table("points"), base),
+        limits=read_limits(root.table("limits"), _names(machine_file, names), tuple(impacts)),
         digest=hashlib.sha256(file.read_bytes()).hexdigest(),
     )
+    force.finish()
     root.finish()
     _refuse_overlap(benchmark)
     return benchmark
@@ -98,10 +146,53 @@ def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
     return replace(setup, detectors=chosen)
 
 
+def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, Group]:
+    """The groups of impacts, then the hold-out."""
+    tables = root.table("impacts")
+    if HOLDOUT in tables.values:
+        raise tables.fault(HOLDOUT, "is the name of the impact-free group", "choose another name for the impacts")
+    profiles = read_force_limits(base / force.text("limits") if "limits" in force else None)
+    profile = force.text("profile", "")
+    groups = {}
+    for name in tables.values:
+        table = tables.table(name)
+        wanted = table.text("force_profile", profile)
+        own = table.number("window_s", window, above=0.0)
+        groups[name] = Group(_logs(table, base), own, profile_of(profiles, wanted) if wanted else None)
+    if HOLDOUT in root:
+        groups[HOLDOUT] = Group(_logs(root.table(HOLDOUT), base), window)
+    if not groups:
+        raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
+    return groups
+
+
 def _logs(table: Table, base: Path) -> tuple[Path, ...]:
     logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
     table.finish()
     return logs
+
+
+def _named(table: Table, base: Path) -> dict[Path, str]:
+    """Which campaign or test point each log belongs to."""
+    found: dict[Path, str] = {}
+    for name in table.values:
+        for path in _logs(table.table(name), base):
+            if path in found:
+                raise table.fault(name, f"names {path}, which '{found[path]}' does too", "a log belongs to one")
+            found[path] = name
+    return found
+
+
+def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, machine_file.detector(name).short_name) for name in detectors]
+
+
+def _budget(table: Table) -> Budget | None:
+    text = table.text("false_alarm_budget", "")
+    try:
+        return Budget.parse(text) if text else None
+    except UsageError as fault:
+        raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
 
 
 def _watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
@@ -148,7 +239,7 @@ def _onset(table: Table) -> OnsetRule:
 
 def _refuse_overlap(benchmark: BenchmarkFile) -> None:
     learned = {path.resolve() for path in benchmark.learn}
-    scored: Sequence[Path] = [*benchmark.holdout, *(path for group in benchmark.impacts.values() for path in group)]
+    scored = [path for group in benchmark.impacts.values() for path in group.logs]
     for path in scored:
         if path.resolve() in learned:
             raise ConfigurationError(

@@ -22,7 +22,8 @@ from cdtool.signature_store import (
     update_signature,
     with_run,
 )
-from cdtool.thresholds.signature import SPEED_TOLERANCE, FittedSignature, Signature
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.signature import SPEED_TOLERANCE, Signature
 from cdtool.workflows.runs import Progress, check_joints, load_runs
 
 
@@ -80,7 +81,22 @@ def fit_signatures(
     watched: Sequence[str] = (),
 ) -> tuple[tuple[FittedSignature, ...], list[Operation], list[Skipped]]:
     """A signature for each class, the runs used and those left out; raises SignatureError."""
-    rule = rule.for_machine(machine.default_sides)
+    pairs, skipped = signals_of(operations, machine, detector, watched, unread)
+    fitted, used, refused = fit_classes(pairs, rule.for_machine(machine.default_sides))
+    return fitted, used, [*skipped, *refused]
+
+
+def signals_of(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    watched: Sequence[str] = (),
+    unread: Sequence[Skipped] = (),
+) -> tuple[list[tuple[Operation, Signal]], list[Skipped]]:
+    """A detector's signal of each operation, and what was left out; raises SignatureError where none is left.
+
+    `unread`: what was left out before, for the reason in that error.
+    """
     skipped: list[Skipped] = []
     pairs: list[tuple[Operation, Signal]] = []
     for operation in operations:
@@ -92,8 +108,16 @@ def fit_signatures(
         reasons = [*unread, *skipped]
         reason = f"; first reason: {reasons[0].reason}" if reasons else ""
         raise SignatureError(f"no run to learn {detector.name} from{reason}", "check with cdtool info")
+    return pairs, skipped
+
+
+def fit_classes(
+    pairs: Sequence[tuple[Operation, Signal]], rule: Signature
+) -> tuple[tuple[FittedSignature, ...], list[Operation], list[Skipped]]:
+    """A signature for each class of motion, the runs used and those left out; raises SignatureError."""
     fitted: list[FittedSignature] = []
     used: list[Operation] = []
+    skipped: list[Skipped] = []
     refused: list[CdtoolError] = []
     for members in _by_class(pairs):
         try:

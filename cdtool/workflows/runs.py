@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -52,7 +53,12 @@ def in_order(
                 progress(i, len(items))
         return
     with ThreadPoolExecutor(jobs) as pool:
-        for i, made in enumerate(pool.map(work, items), 1):
+        # No more than that many are on their way: what was made waits for whoever takes it, and needs memory.
+        ahead = deque(pool.submit(work, item) for item in items[: 2 * jobs])
+        for i in range(1, len(items) + 1):
+            made = ahead.popleft().result()
+            if i + 2 * jobs <= len(items):
+                ahead.append(pool.submit(work, items[i + 2 * jobs - 1]))
             yield made
             if progress:
                 progress(i, len(items))

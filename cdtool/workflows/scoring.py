@@ -1,9 +1,8 @@
-"""One log of a benchmark: read, cut, detected by every detector, matched with its contacts."""
+"""One log of a benchmark: read, cut, detected by every detector, matched with its contacts; the rows that it gives."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -11,164 +10,162 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.activation import Activation
-from cdtool.clock import previous_value
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.evaluation.matching import Match, Matching, match
+from cdtool.evaluation.force_course import ForceCourse, force_course
+from cdtool.evaluation.force_verdict import ForceVerdict, judge
+from cdtool.evaluation.matching import match
 from cdtool.evaluation.onset import find_contacts
-from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
+from cdtool.evaluation.sweep import sweep
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
-from cdtool.recording import Contact
+from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.detection import contacts_of
+from cdtool.workflows.force_rows import force_rows
+from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.runs import load_operations, lost, shown_path, told
-
-
-@dataclass(frozen=True)
-class Trace:
-    """One operation with every detector's detection: what a plot needs."""
-
-    group: str
-    operation: Operation
-    contacts: tuple[Contact, ...]
-    detections: tuple[Detection, ...]
-    matchings: tuple[Matching, ...]
 
 
 @dataclass
 class Scored:
     """What one log gave."""
 
-    traces: list[Trace] = field(default_factory=list)
+    recording: RecordingResult | None = None
+    judged: list[Judged] = field(default_factory=list)
+    contacts: list[ContactResult] = field(default_factory=list)
+    false_alarms: list[FalseAlarmResult] = field(default_factory=list)
+    forces: list[ForceResult] = field(default_factory=list)
+    verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
     findings: list[Skipped] = field(default_factory=list)
-    digest: tuple[str, str] | None = None
+    source: str = ""
     reading: float = 0.0
     detecting: float = 0.0
 
 
-@dataclass
-class Exposure:
-    """How long one detector watched one group, added up operation by operation."""
+# What gives the detections of an operation; it names what failed in the log's `Scored`.
+Detect = Callable[[Operation, Scored], list[Detection]]
 
-    recordings: int = 0
-    operations: int = 0
-    seconds: float = 0.0
-    not_assessable: int = 0
-    samples: int = 0
-    not_judged: Counter[str] = field(default_factory=Counter)
 
-    def add(self, detection: Detection) -> None:
-        """Count one operation."""
-        self.operations += 1
-        self.seconds += detection.assessed_seconds
-        self.not_assessable += detection.verdict.outcome == "not assessable"
-        size = detection.statistic.status.size
-        self.samples += size
-        for reason, share in detection.statistic.shares().items():
-            self.not_judged[reason] += round(share * size)
+def detect_with(
+    setup: BenchmarkFile, detectors: Sequence[Any], thresholds: Mapping[str, tuple[FittedThreshold, ...]]
+) -> Detect:
+    """Detectors with their thresholds; one that fails on an operation is left out there and named."""
 
-    def result(self, group: str, detector: str) -> ExposureResult:
-        """The row of results.json."""
-        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.not_judged.items())}
-        hours = self.seconds / 3600.0
-        return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
+    def detect(operation: Operation, scored: Scored) -> list[Detection]:
+        found = []
+        for detector in detectors:
+            known = thresholds[detector.name]
+            try:
+                found.append(
+                    detect_operation(
+                        operation, setup.machine_file.machine, detector, known, setup.activation, setup.watched
+                    )
+                )
+            except CdtoolError as fault:
+                scored.skipped.append(Skipped(operation.name, str(fault)))
+        return found
+
+    return detect
 
 
 def score_log(
-    setup: BenchmarkFile,
-    group: str,
-    path: Path,
-    detectors: Sequence[Any],
-    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
-    activation: Activation,
+    setup: BenchmarkFile, group: str, path: Path, detect: Detect, factors: Mapping[str, FloatArray]
 ) -> Scored:
-    """A log's traces; a log or detector that fails is left out and named, and nothing is raised."""
+    """A log's rows; `factors`: the safety factors of the sweep by detector.
+
+    A log or detector that fails is left out and named, and nothing is raised.
+    """
     scored = Scored()
     begin = perf_counter()
     try:
         recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
-        contacts = [] if group == HOLDOUT else find_contacts(recording, setup.onset)
-        if group != HOLDOUT and not contacts:
-            raise RecordingError(
-                f"{path}: no contact found ({setup.onset.described})",
-                "lower [onset] above_n, or move the log to [holdout]",
-            )
+        contacts = _true_contacts(recording, group, setup, path)
     except CdtoolError as fault:
         scored.skipped.append(Skipped(shown_path(path, setup.path.parent), str(fault)))
         scored.reading = perf_counter() - begin
         return scored
     scored.reading = perf_counter() - begin
-    scored.digest = (recording.source, recording.digest)
+    scored.source = recording.source
     scored.findings = told(recording)
     scored.skipped += lost(recording)
+    scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     for contact in contacts:
         if not any(contacts_of(item, [contact]) for item in operations):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {setup.operations})"
             scored.skipped.append(Skipped(recording.name, text))
+    courses = _courses(recording, contacts, setup, scored)
+    profile = setup.impacts[group].force
+    if profile:
+        scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
+        scored.forces = force_rows(scored.recording, scored.verdicts, courses)
     for operation in operations:
         inside = contacts_of(operation, contacts)
-        detections, matchings = [], []
-        for detector in detectors:
-            try:
-                detection = detect_operation(
-                    operation,
-                    setup.machine_file.machine,
-                    detector,
-                    thresholds[detector.name],
-                    activation,
-                    setup.watched,
-                )
-            except CdtoolError as fault:
-                scored.skipped.append(Skipped(operation.name, str(fault)))
-                continue
-            detections.append(detection)
-            matchings.append(match(detection.verdict, inside, detection.statistic, setup.window))
-        scored.traces.append(Trace(group, operation, inside, tuple(detections), tuple(matchings)))
+        judged = _judge(setup, group, operation, inside, detect(operation, scored), factors)
+        scored.judged.append(judged)
+        scored.contacts += contact_rows(judged, recording, contacts, courses, setup.synchronisation)
+        scored.false_alarms += false_alarm_rows(judged)
     scored.detecting = perf_counter() - begin - scored.reading
     return scored
 
 
-def contact_results(trace: Trace) -> list[ContactResult]:
-    """A row for each contact and detector."""
-    recording = trace.operation.recording
-    return [
-        ContactResult(
-            recording=recording.name,
-            group=trace.group,
-            detector=detection.detector,
-            joint=detection.statistic.joints[found.alarm.joint] if found.alarm else None,
-            onset_s=found.contact.start,
-            onset_uncertainty_s=found.contact.uncertainty,
-            alarm_s=found.alarm.time if found.alarm else None,
-            latency_ms=1e3 * found.latency if found.alarm else None,
-            outcome=found.outcome,
-            force_at_alarm_n=_force_at_alarm(trace, found),
-            peak_force_n=found.contact.peak_force if np.isfinite(found.contact.peak_force) else None,
-            clipped=found.clipped,
-            reason=found.reason or None,
+def _true_contacts(recording: Recording, group: str, setup: BenchmarkFile, path: Path) -> list[Contact]:
+    if group == HOLDOUT:
+        return []
+    labelled = setup.labels.of(recording.name) if setup.labels else None
+    contacts = list(labelled) if labelled is not None else find_contacts(recording, setup.onset)
+    if not contacts:
+        rule = f"{setup.labels.source} names none" if labelled is not None and setup.labels else setup.onset.described
+        raise RecordingError(
+            f"{path}: no contact found ({rule})", "lower [onset] above_n, or move the log to [holdout]"
         )
-        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
-        for found in matching.matches
-    ]
+    return contacts
 
 
-def false_alarm_results(trace: Trace) -> list[FalseAlarmResult]:
-    """A row for each alarm without a contact."""
-    return [
-        FalseAlarmResult(
-            trace.operation.name, trace.group, detection.detector, detection.statistic.joints[alarm.joint], alarm.time
-        )
-        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
-        for alarm in matching.false_alarms
-    ]
+def _recording_result(
+    recording: Recording, group: str, path: Path, operations: int, contacts: int, setup: BenchmarkFile
+) -> RecordingResult:
+    return RecordingResult(
+        recording=recording.name,
+        group=group,
+        sha256=recording.digest,
+        seconds=recording.duration,
+        operations=operations,
+        contacts=contacts,
+        campaign=setup.campaigns.get(path),
+        point=setup.points.get(path),
+    )
 
 
-def _force_at_alarm(trace: Trace, found: Match) -> float | None:
-    recording = trace.operation.recording
-    if found.alarm is None or "force" not in recording:
-        return None
-    force = float(previous_value(recording["force"], np.array([found.alarm.time]))[0, 0])
-    return force if np.isfinite(force) else None
+def _courses(
+    recording: Recording, contacts: Sequence[Contact], setup: BenchmarkFile, scored: Scored
+) -> dict[int, ForceCourse]:
+    """The force over each contact by its number; one that has none is named."""
+    found: dict[int, ForceCourse] = {}
+    if "force" not in recording:
+        return found
+    ends = [*(contact.start for contact in contacts[1:]), float("inf")]
+    for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
+        try:
+            found[number] = force_course(recording, contact, setup.mass_before_cell, until)
+        except CdtoolError as fault:
+            scored.findings.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
+    return found
+
+
+def _judge(
+    setup: BenchmarkFile,
+    group: str,
+    operation: Operation,
+    contacts: tuple[Contact, ...],
+    detections: Sequence[Detection],
+    factors: Mapping[str, FloatArray],
+) -> Judged:
+    window = setup.impacts[group].window
+    matchings = tuple(match(item.verdict, contacts, item.statistic, window) for item in detections)
+    sweeps = tuple(
+        sweep(item, contacts, setup.activation, window, factors.get(item.detector, np.empty(0))) for item in detections
+    )
+    return Judged(group, operation, contacts, tuple(detections), matchings, sweeps)

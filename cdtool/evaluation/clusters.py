@@ -1,0 +1,50 @@
+"""Values that belong together: contacts of one recording (or test campaign) are not independent of each other.
+
+Conventions: a cluster is resampled, flipped or exchanged as a whole. Clusters and the values in them are sorted, so
+that nothing depends on the order in which recordings were read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import UsageError
+from cdtool.recording import FloatArray
+
+IntArray = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """`values` (n,), cluster by cluster, and the `number` (n,) of each one's cluster, 0 to k - 1; `counts` (k,)."""
+
+    values: FloatArray
+    number: IntArray
+    counts: IntArray
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    def sums(self, values: FloatArray) -> FloatArray:
+        """Sum (k,) over each cluster of something given for each value (n,)."""
+        return np.bincount(self.number, weights=values, minlength=len(self)).astype(np.float64)
+
+
+def clusters_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Clusters:
+    """Group values (n,) by their labels (n,); raises UsageError where they do not fit or a value is not finite."""
+    array, names = np.asarray(values, dtype=np.float64), list(labels)
+    if array.shape != (len(names),):
+        raise UsageError(f"values {array.shape} and clusters ({len(names)},) do not fit", "one label for every value")
+    if not np.all(np.isfinite(array)):
+        raise UsageError("a value is missing or infinite", "leave missed contacts out, and tell how many they are")
+    groups: dict[Hashable, list[float]] = {}
+    for name, value in zip(names, array.tolist(), strict=True):
+        groups.setdefault(name, []).append(value)
+    ordered = sorted(sorted(group) for group in groups.values())
+    counts = np.array([len(group) for group in ordered], dtype=np.intp)
+    in_order = np.array([value for group in ordered for value in group], dtype=np.float64)
+    return Clusters(in_order, np.repeat(np.arange(len(ordered)), counts), counts)

@@ -1,0 +1,116 @@
+"""Is one detector better than another on the same impacts? Paired, with Holm's correction over a group's questions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from cdtool.evaluation.paired import Difference, holm, mcnemar_p, paired_difference
+from cdtool.evaluation.results import ContactResult, Results
+from cdtool.evaluation.statistics import campaigns
+
+# A difference counts as shown below this, after correction.
+SIGNIFICANT = 0.05
+
+Key = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two detectors on the contacts of one group that both could assess.
+
+    `latency` [ms] is first less second over the contacts that both detected; `only_first_missed` and
+    `only_second_missed` count the others. The p are corrected (Holm) over all pairs of the group, latency and misses
+    together.
+    """
+
+    group: str
+    first: str
+    second: str
+    contacts: int
+    latency: Difference
+    latency_p: float
+    only_first_missed: int
+    only_second_missed: int
+    missed_p: float
+
+    @property
+    def faster(self) -> str | None:
+        """The detector that is shown to be faster."""
+        if not self.latency_p < SIGNIFICANT:
+            return None
+        return self.first if self.latency.mean.value < 0.0 else self.second
+
+    @property
+    def misses_less(self) -> str | None:
+        """The detector that is shown to miss fewer contacts."""
+        if not self.missed_p < SIGNIFICANT:
+            return None
+        return self.first if self.only_first_missed < self.only_second_missed else self.second
+
+
+def compare_detectors(results: Results) -> list[Comparison]:
+    """Every pair of detectors in every group of impacts, in the order of the benchmark file."""
+    clusters = campaigns(results)
+    rows: dict[tuple[str, str], dict[Key, ContactResult]] = {}
+    for contact in results.contacts:
+        rows.setdefault((contact.group, contact.detector), {})[contact.recording, contact.contact] = contact
+    found: list[Comparison] = []
+    for group in results.groups:
+        known = [name for name in results.detectors if (group, name) in rows]
+        made = [
+            _compare(group, first, second, rows[group, first], rows[group, second], clusters)
+            for first, second in combinations(known, 2)
+        ]
+        found += _corrected([item for item in made if item.contacts])
+    return found
+
+
+def pairs_of(
+    first: Mapping[Key, ContactResult], second: Mapping[Key, ContactResult]
+) -> list[tuple[ContactResult, ContactResult]]:
+    """The contacts that both could assess."""
+    both = [(first[key], second[key]) for key in first if key in second]
+    return [pair for pair in both if all(item.outcome != "not_assessable" for item in pair)]
+
+
+def latency_difference(pairs: Sequence[tuple[ContactResult, ContactResult]], clusters: Mapping[str, str]) -> Difference:
+    """Latency [ms] of the first less that of the second, over the contacts that both detected."""
+    differences, labels = [], []
+    for first, second in pairs:
+        if first.latency_ms is not None and second.latency_ms is not None:
+            differences.append(first.latency_ms - second.latency_ms)
+            labels.append(clusters.get(first.recording, first.recording))
+    return paired_difference(differences, labels)
+
+
+def only_one_missed(pairs: Sequence[tuple[ContactResult, ContactResult]]) -> tuple[int, int]:
+    """How many contacts only the first missed, and how many only the second."""
+    missed = [(first.outcome == "missed", second.outcome == "missed") for first, second in pairs]
+    return missed.count((True, False)), missed.count((False, True))
+
+
+def _compare(
+    group: str,
+    first: str,
+    second: str,
+    rows: Mapping[Key, ContactResult],
+    others: Mapping[Key, ContactResult],
+    clusters: Mapping[str, str],
+) -> Comparison:
+    pairs = pairs_of(rows, others)
+    difference = latency_difference(pairs, clusters)
+    only = only_one_missed(pairs)
+    missed_p = mcnemar_p(*only) if sum(only) else math.nan
+    return Comparison(group, first, second, len(pairs), difference, difference.p, *only, missed_p)
+
+
+def _corrected(comparisons: Sequence[Comparison]) -> list[Comparison]:
+    count = len(comparisons)
+    adjusted = holm([item.latency_p for item in comparisons] + [item.missed_p for item in comparisons])
+    return [
+        replace(item, latency_p=float(adjusted[i]), missed_p=float(adjusted[count + i]))
+        for i, item in enumerate(comparisons)
+    ]

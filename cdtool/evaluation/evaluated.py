@@ -1,0 +1,31 @@
+"""Results with all that is derived from them once, for every report: statistics, comparisons, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from cdtool.evaluation.comparison import Comparison, compare_detectors
+from cdtool.evaluation.limits import LimitRule, check_limits
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.statistics import Summary, summarise
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """What reports show: they compute nothing themselves."""
+
+    results: Results
+    summaries: tuple[Summary, ...]
+    comparisons: tuple[Comparison, ...]
+
+
+def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
+    """Derive the statistics; `limits` are checked and become rows of the results, else those in them stay.
+
+    Raises ConfigurationError where a limit names no figure of these results.
+    """
+    summaries = tuple(summarise(results))
+    if limits:
+        results = replace(results, limits=check_limits(limits, summaries))
+    return Evaluated(results, summaries, tuple(compare_detectors(results)))

@@ -1,0 +1,111 @@
+"""A stated number of false alarms, and the safety factor that keeps to it on impact-free operations."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.errors import UsageError
+from cdtool.evaluation.sweep import critical_factor, sweep
+from cdtool.pipeline import Detection
+
+_FORM = re.compile(r"\s*([0-9.eE+-]+)\s*/\s*([0-9.eE+-]*)\s*(op|operation|operations|h|hour|hours)\s*")
+# Where a count has to be looked for, factors are tried that many to an octave.
+_STEPS = 32
+
+
+@dataclass(frozen=True)
+class Budget:
+    """At most `rate` false alarms an operation or an hour."""
+
+    rate: float
+    per: Literal["operation", "hour"]
+
+    @classmethod
+    def parse(cls, text: str) -> Budget:
+        """From 1/1000op, 0.002/op, 1/8h or 0.1/h; raises UsageError."""
+        found = _FORM.fullmatch(text)
+        try:
+            count, exposure = float(found[1]), float(found[2] or 1.0)  # type: ignore[index]
+        except (TypeError, ValueError):
+            count = exposure = math.nan
+        if found is None or not (0.0 < count < math.inf and 0.0 < exposure < math.inf):
+            raise UsageError(f"false-alarm budget is '{text}'", "write 1/1000op (operations) or 0.1/h (hours)")
+        return cls(count / exposure, "hour" if found[3].startswith("h") else "operation")
+
+    def __str__(self) -> str:
+        short = "op" if self.per == "operation" else "h"
+        return f"1/{1.0 / self.rate:g}{short}" if self.rate < 1.0 else f"{self.rate:g}/{short}"
+
+    @property
+    def needed(self) -> float:
+        """The least exposure on which it can be set: one false alarm has to be allowed in it."""
+        return 1.0 / self.rate
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The safety factor that keeps a budget, and how many alarms it gives on the operations it was set on."""
+
+    factor: float
+    operations: int
+    hours: float
+    alarms: int
+
+
+def set_factor(budget: Budget, detections: Sequence[Detection], activation: Activation) -> Calibrated:
+    """The smallest safety factor with at most budget x exposure alarms in impact-free operations.
+
+    Each detection's threshold must not have been learned from its operation. An operation that could be judged nowhere
+    does not count. Raises UsageError, telling what is missing, where the exposure is smaller than `budget.needed`.
+    """
+    judged = [item for item in detections if item.assessed_seconds > 0.0]
+    hours = sum(item.assessed_seconds for item in judged) / 3600.0
+    exposure = float(len(judged)) if budget.per == "operation" else hours
+    if exposure * budget.rate < 1.0 - 1e-9:
+        raise UsageError(
+            f"false-alarm budget {budget} needs {budget.needed:g} impact-free {budget.per}s to be set, "
+            f"{exposure:.4g} could be judged",
+            f"add {budget.needed - exposure:.4g} to [learn], or choose a budget of 1/{math.floor(max(exposure, 1))} "
+            "or more",
+        )
+    allowed = math.floor(budget.rate * exposure + 1e-9)
+    if budget.per == "operation":
+        factor, alarms = _by_operation(judged, activation, allowed)
+    else:
+        factor, alarms = _by_count(judged, activation, allowed)
+    return Calibrated(factor, len(judged), hours, alarms)
+
+
+def _by_operation(detections: Sequence[Detection], activation: Activation, allowed: int) -> tuple[float, int]:
+    """The factor at which at most `allowed` operations alarm: the next one just does not."""
+    critical = np.sort([critical_factor(item, activation) for item in detections])[::-1]
+    factor = _just_above(float(critical[min(allowed, len(critical) - 1)]))
+    return factor, int(np.count_nonzero(critical > factor))
+
+
+def _by_count(detections: Sequence[Detection], activation: Activation, allowed: int) -> tuple[float, int]:
+    """The smallest factor of a fine grid from which on all alarms together are no more than allowed."""
+    critical = [critical_factor(item, activation) for item in detections]
+    top = _just_above(max(critical))
+    factors = top * 2.0 ** (-np.arange(6 * _STEPS) / _STEPS)
+    total = np.zeros(len(factors), dtype=np.int64)
+    for item, highest in zip(detections, critical, strict=True):
+        if highest > factors[-1]:
+            total += sweep(item, (), activation, 0.0, factors).false_alarms
+    enough = np.flatnonzero(total > allowed)
+    last = int(enough[0]) - 1 if len(enough) else len(factors) - 1
+    return float(factors[last]), int(total[last])
+
+
+def _just_above(factor: float) -> float:
+    if factor == math.inf:
+        raise UsageError("no safety factor keeps the budget: the limits have no spread", "learn from more runs")
+    # Below 0 no sample left even the middle of the band: any factor keeps the budget.
+    return max(factor * (1.0 + 1e-9), 1e-3)

@@ -1,0 +1,123 @@
+"""[limits]: what a figure may be at most or at least, so that a pipeline can act on it.
+
+Conventions: a key is detector.group.figure, or detector.figure for every group; `*` stands for all. A limit is kept,
+broken, or not assessable, which does not count as kept: nothing passes because nothing was measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cdtool.errors import ConfigurationError, nearest
+from cdtool.evaluation.results import LimitResult
+from cdtool.evaluation.statistics import COUNTED_ALWAYS, FIGURES, Summary
+from cdtool.tables import Table
+
+ALL = "*"
+
+
+@dataclass(frozen=True)
+class LimitRule:
+    """`figure` of a detector in a group has to lie within `least` and `largest`; `*`: of every one."""
+
+    key: str
+    detector: str
+    group: str
+    figure: str
+    least: float = -math.inf
+    largest: float = math.inf
+
+
+def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequence[str]) -> tuple[LimitRule, ...]:
+    """The rules of [limits]; `detectors` are full and short names. Raises ConfigurationError naming the key."""
+    full = {name: name for name, _ in detectors} | {short: name for name, short in detectors} | {ALL: ALL}
+    rules = []
+    for key in table.values:
+        detector, group, figure = _split(table, key)
+        if detector not in full:
+            raise table.fault(key, f"unknown detector '{detector}'", nearest(detector, full))
+        if group != ALL and group not in groups:
+            raise table.fault(key, f"unknown group '{group}'", nearest(group, [ALL, *groups]))
+        if figure not in FIGURES:
+            raise table.fault(key, f"unknown figure '{figure}'", nearest(figure, FIGURES))
+        least, largest = _bounds(table, key)
+        rules.append(LimitRule(key, full[detector], group, figure, least, largest))
+    return tuple(rules)
+
+
+def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tuple[LimitResult, ...]:
+    """Hold every rule against the figures that it names; raises ConfigurationError where it names none.
+
+    With `*` a group without contacts is left out where the figure needs contacts.
+    """
+    found: list[LimitResult] = []
+    for rule in rules:
+        named = [
+            item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
+        ]
+        meant = [item for item in named if item.contacts or rule.figure in COUNTED_ALWAYS]
+        if not meant:
+            raise ConfigurationError(
+                f"[limits] {rule.key}: there is no such figure in these results",
+                "a figure of contacts needs a group with contacts, and a detector that was run",
+            )
+        found += [_check(rule, item) for item in meant]
+    return tuple(found)
+
+
+def broken(limits: Sequence[LimitResult]) -> list[LimitResult]:
+    """Those that are not kept."""
+    return [item for item in limits if item.outcome != "kept"]
+
+
+def _check(rule: LimitRule, summary: Summary) -> LimitResult:
+    value = FIGURES[rule.figure](summary)
+    outcome, reason = "kept", None
+    if math.isnan(value):
+        outcome, reason = "not assessable", summary.why_undefined(rule.figure)
+    elif not rule.least <= value <= rule.largest:
+        outcome = "broken"
+        reason = f"{_text(value)} is {'more' if value > rule.largest else 'less'} than {_text(_crossed(rule, value))}"
+    return LimitResult(
+        limit=rule.key,
+        detector=summary.detector,
+        group=summary.group,
+        figure=rule.figure,
+        value=value if math.isfinite(value) else None,
+        least=rule.least if math.isfinite(rule.least) else None,
+        largest=rule.largest if math.isfinite(rule.largest) else None,
+        outcome=outcome,
+        reason=reason,
+    )
+
+
+def _crossed(rule: LimitRule, value: float) -> float:
+    return rule.largest if value > rule.largest else rule.least
+
+
+def _text(value: float) -> str:
+    return "not reached (too many missed)" if value == math.inf else f"{value:.6g}"
+
+
+def _split(table: Table, key: str) -> tuple[str, str, str]:
+    """Detector, group and figure; a group's name may hold dots itself."""
+    parts = key.split(".")
+    if len(parts) == 2:
+        return parts[0], ALL, parts[1]
+    if len(parts) < 2:
+        raise table.fault(key, "names no figure", 'write "detector.group.figure", e.g. "*.stiff.p95_ms"')
+    return parts[0], ".".join(parts[1:-1]), parts[-1]
+
+
+def _bounds(table: Table, key: str) -> tuple[float, float]:
+    part = table.table(key)
+    if "min" not in part and "max" not in part:
+        raise table.fault(key, "has no bound", "write { max = 50 }, { min = 1 } or both")
+    least = part.number("min") if "min" in part else -math.inf
+    largest = part.number("max") if "max" in part else math.inf
+    part.finish()
+    if least > largest:
+        raise table.fault(key, f"has min {least:g} above max {largest:g}", "exchange them")
+    return least, largest

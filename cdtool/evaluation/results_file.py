@@ -1,0 +1,105 @@
+"""results.json: strict JSON, checked against the layout of `Results` when it is read."""
+
+from __future__ import annotations
+
+import json
+import math
+import types
+from collections.abc import Mapping
+from dataclasses import asdict, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.results import SCHEMA_VERSION, Results
+
+Row = TypeVar("Row")
+
+
+def to_json(results: Results) -> str:
+    """Strict JSON: null where there is no figure."""
+    return json.dumps(_finite(asdict(results)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def read_results(path: Path) -> Results:
+    """Read results.json; raises RecordingError where it is none, or of another version."""
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
+    except (OSError, ValueError) as fault:
+        raise _no_results(path, str(fault)) from fault
+    if not isinstance(values, dict) or "schema_version" not in values:
+        raise _no_results(path, "no schema_version in it")
+    if values["schema_version"] != SCHEMA_VERSION:
+        raise RecordingError(
+            f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
+            "run cdtool benchmark again with this version",
+        )
+    try:
+        return build(Results, values, "results")
+    except (KeyError, TypeError, ValueError) as fault:
+        raise _no_results(path, str(fault)) from fault
+
+
+def build(kind: type[Row], values: Any, where: str) -> Row:
+    """A dataclass from JSON values, checked field by field; raises ValueError that names the field."""
+    if not isinstance(values, dict):
+        raise ValueError(f"{where} is no object")
+    known = _field_types(kind)  # type: ignore[arg-type]
+    for name in values:
+        if name not in known:
+            raise ValueError(f"{where} has an unknown field '{name}'")
+    made = {name: _value(known[name], value, f"{where}.{name}") for name, value in values.items()}
+    try:
+        return kind(**made)
+    except TypeError as fault:
+        raise ValueError(f"{where}: {fault}") from fault
+
+
+def _value(kind: Any, value: Any, where: str) -> Any:
+    origin = get_origin(kind)
+    if origin in (Union, types.UnionType):
+        if value is None:
+            return None
+        kind = next(item for item in get_args(kind) if item is not type(None))
+        return _value(kind, value, where)
+    if origin is tuple:
+        if not isinstance(value, list):
+            raise ValueError(f"{where} is no list")
+        item_kind = get_args(kind)[0]
+        return tuple(_value(item_kind, item, f"{where}[{i}]") for i, item in enumerate(value))
+    if origin is not None:
+        if not isinstance(value, dict):
+            raise ValueError(f"{where} is no object")
+        return value
+    if is_dataclass(kind):
+        return build(kind, value, where)  # type: ignore[arg-type]
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if kind is not Any and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
+        raise ValueError(f"{where} is {value!r}, no {kind.__name__}")
+    return value
+
+
+@cache
+def _field_types(kind: Any) -> Mapping[str, Any]:
+    hints = get_type_hints(kind)
+    return {item.name: hints[item.name] for item in fields(kind)}
+
+
+def _no_results(path: Path, why: str) -> RecordingError:
+    return RecordingError(f"{path}: not a results file: {why}", "write one with cdtool benchmark -o results.json")
+
+
+def _refuse(name: str) -> float:
+    raise ValueError(f"{name} is no JSON")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value

@@ -1,0 +1,77 @@
+"""One detection with all its limits moved: alarms and latencies as functions of the safety factor.
+
+The points of the curve of latency against false alarms (activity monitor operating characteristic, AMOC).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.activation import Activation, crossings_of
+from cdtool.detection import Status
+from cdtool.evaluation.matching import belongs, windows
+from cdtool.pipeline import Detection
+from cdtool.recording import Contact, FloatArray
+
+# Multiples of the safety factor that is set: a quarter to four times, eight steps an octave.
+MULTIPLES: FloatArray = 2.0 ** (np.arange(-16, 17) / 8.0)
+
+
+@dataclass(frozen=True)
+class Swept:
+    """For each of f safety factors: alarms that belong to no contact (f,), and latencies (f, contacts) [s].
+
+    A latency is NaN where the contact gave no alarm.
+    """
+
+    false_alarms: npt.NDArray[np.int64]
+    latency: FloatArray
+
+
+def sweep(
+    detection: Detection, contacts: Sequence[Contact], activation: Activation, window: float, factors: FloatArray
+) -> Swept:
+    """Alarms and latencies of a detection with its limits at each of `factors`; the rules are those of `match`."""
+    statistic, met_at = detection.statistic, detection.exceedance()
+    spans = windows(contacts, window)
+    order = np.argsort([contact.start for contact in contacts], kind="stable")
+    false_alarms = np.zeros(len(factors), dtype=np.int64)
+    latency = np.full((len(factors), len(contacts)), np.nan)
+    debounce = activation.samples(statistic.period)
+    for joint in range(met_at.shape[1]):
+        met = np.ascontiguousarray(met_at[:, joint])
+        status = np.ascontiguousarray(statistic.status[:, joint])
+        judged = met[status == Status.VALID]
+        highest = float(judged.max()) if len(judged) else -np.inf
+        for i in np.flatnonzero(factors < highest):
+            at, armed = crossings_of(statistic.time, met > factors[i], status, debounce, activation.rearm)
+            times = statistic.time[at]
+            false_alarms[i] += sum(not belongs(time, spans) for time in times[armed])
+            for column, (contact, opens, closes) in zip(order, spans, strict=True):
+                inside = times[(times >= opens) & (times <= closes)]
+                if len(inside):
+                    late = max(float(inside[0]) - contact.start, 0.0)
+                    latency[i, column] = np.fmin(latency[i, column], late)
+    return Swept(false_alarms, latency)
+
+
+def critical_factor(detection: Detection, activation: Activation) -> float:
+    """The largest safety factor below which an operation alarms: the highest debounced exceedance of any joint.
+
+    -inf where no run of judged samples is as long as the debounce.
+    """
+    statistic, met_at = detection.statistic, detection.exceedance()
+    debounce = activation.samples(statistic.period)
+    highest = -np.inf
+    for joint in range(met_at.shape[1]):
+        status = statistic.status[:, joint]
+        present = status != Status.GAP  # a missing sample is skipped, as by the activation
+        met = np.where(status == Status.VALID, met_at[:, joint], -np.inf)[present]
+        if len(met) >= debounce:
+            held = np.lib.stride_tricks.sliding_window_view(met, debounce).min(axis=1)
+            highest = max(highest, float(held.max()))
+    return highest

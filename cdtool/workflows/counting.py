@@ -1,0 +1,106 @@
+"""What a benchmark adds up operation by operation: exposure, and the curve of latency against false alarms."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cdtool.evaluation.results import ExposureResult, SweepResult
+from cdtool.evaluation.sweep import Swept
+from cdtool.pipeline import Detection
+from cdtool.recording import FloatArray
+from cdtool.workflows.judged import Judged
+
+
+@dataclass
+class Exposure:
+    """How long one detector watched one group."""
+
+    recordings: int = 0
+    operations: int = 0
+    seconds: float = 0.0
+    not_assessable: int = 0
+    samples: int = 0
+    not_judged: Counter[str] = field(default_factory=Counter)
+
+    def add(self, detection: Detection) -> None:
+        """Count one operation."""
+        self.operations += 1
+        self.seconds += detection.assessed_seconds
+        self.not_assessable += detection.verdict.outcome == "not assessable"
+        size = detection.statistic.status.size
+        self.samples += size
+        for reason, share in detection.statistic.shares().items():
+            self.not_judged[reason] += round(share * size)
+
+    def result(self, group: str, detector: str) -> ExposureResult:
+        """The row of results.json."""
+        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.not_judged.items())}
+        hours = self.seconds / 3600.0
+        return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
+
+
+@dataclass
+class SweepRows:
+    """The points of the curve: false alarms from the impact-free group, latencies from each group of impacts."""
+
+    factors: Mapping[str, FloatArray]
+    impact_free: str
+    _false_alarms: dict[str, np.ndarray] = field(default_factory=dict)
+    _watched: dict[str, tuple[int, float]] = field(default_factory=dict)
+    _latency: dict[tuple[str, str], list[FloatArray]] = field(default_factory=dict)
+    _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+    def add(self, group: str, detection: Detection, swept: Swept, judged: Judged) -> None:
+        """Count one operation of one detector."""
+        name = detection.detector
+        if name not in self.factors:
+            return
+        if group == self.impact_free:
+            self._false_alarms[name] = self._false_alarms.get(name, 0) + swept.false_alarms
+            operations, seconds = self._watched.get(name, (0, 0.0))
+            self._watched[name] = operations + 1, seconds + detection.assessed_seconds
+            return
+        matching = judged.matchings[judged.detections.index(detection)]
+        seen = np.array([match.outcome != "not_assessable" for match in matching.matches], dtype=bool)
+        self._latency.setdefault((name, group), []).append(swept.latency[:, seen])
+        self._blind[name, group] += int(np.count_nonzero(~seen))
+
+    def rows(self, detectors: Sequence[str], groups: Sequence[str]) -> Iterator[SweepResult]:
+        """A row for each detector, group of impacts and safety factor."""
+        for group in groups:
+            for name in detectors:
+                if name in self._watched and (name, group) in self._latency:
+                    yield from self._rows_of(name, group)
+
+    def _rows_of(self, name: str, group: str) -> Iterator[SweepResult]:
+        latency = 1e3 * np.concatenate(self._latency[name, group], axis=1)
+        operations, seconds = self._watched[name]
+        for i, factor in enumerate(self.factors[name]):
+            values = latency[i]
+            detected = values[np.isfinite(values)]
+            yield SweepResult(
+                detector=name,
+                group=group,
+                safety_factor=float(factor),
+                false_alarms=int(self._false_alarms[name][i]),
+                operations=operations,
+                hours=seconds / 3600.0,
+                detected=len(detected),
+                missed=len(values) - len(detected),
+                not_assessable=self._blind[name, group],
+                mean_ms=float(detected.mean()) if len(detected) else None,
+                median_ms=_median(values),
+            )
+
+
+def _median(values: FloatArray) -> float | None:
+    """The median [ms], a missed contact (NaN) being later than all; None where it is not reached."""
+    ordered = np.sort(np.where(np.isnan(values), np.inf, values))
+    if not len(ordered):
+        return None
+    middle = 0.5 * float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    return middle if np.isfinite(middle) else None

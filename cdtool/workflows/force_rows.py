@@ -1,0 +1,74 @@
+"""Force verdicts as rows of the results: a contact's, and a test point's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from cdtool.evaluation.force_course import ForceCourse
+from cdtool.evaluation.force_limits import ForceProfile
+from cdtool.evaluation.force_verdict import ForceVerdict, averaged
+from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult
+
+
+def force_rows(
+    recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+) -> list[ForceResult]:
+    """A row for each contact of a recording, by its number."""
+    return [
+        ForceResult(
+            recording=recording.recording,
+            group=recording.group,
+            contact=number,
+            profile=verdict.profile,
+            verdict=verdict.outcome,
+            peak_n=courses[number].peak,
+            steps=tuple(
+                ForceStepResult(
+                    name=item.step.name,
+                    from_s=item.step.from_s,
+                    at_most_n=item.step.at_most_n,
+                    peak_n=_known(item.peak),
+                    time_budget_ms=_known(1e3 * item.time_budget),
+                    verdict=item.outcome,
+                    reason=item.reason or None,
+                )
+                for item in verdict.steps
+            ),
+            point=recording.point,
+            time_budget_ms=_known(1e3 * verdict.time_budget),
+            reason=verdict.reason or None,
+        )
+        for number, verdict in verdicts.items()
+    ]
+
+
+def point_rows(
+    tests: Mapping[tuple[str, str], Sequence[ForceVerdict]], profiles: Mapping[str, ForceProfile | None]
+) -> list[PointResult]:
+    """A row for each (group, point) that has tests; `profiles` are the groups'."""
+    rows = []
+    for (group, point), verdicts in tests.items():
+        profile = profiles[group]
+        if profile is None:
+            continue
+        verdict = averaged(verdicts, profile)
+        steps = tuple(
+            ForceStepResult(
+                name=item.step.name,
+                from_s=item.step.from_s,
+                at_most_n=item.step.at_most_n,
+                peak_n=_known(item.force),
+                time_budget_ms=None,
+                verdict=item.outcome,
+                reason=item.reason or None,
+            )
+            for item in verdict.steps
+        )
+        note, reason = verdict.note, verdict.reason or None
+        rows.append(PointResult(point, group, profile.name, verdict.tests, verdict.outcome, steps, note, reason))
+    return rows
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

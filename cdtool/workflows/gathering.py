@@ -1,0 +1,112 @@
+"""The rows of many logs, gathered: by a benchmark of detectors, or of alarms that came from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.evaluation.force_verdict import ForceVerdict
+from cdtool.evaluation.results import CalibrationResult, RecordingResult, Results, Skipped
+from cdtool.evaluation.trace_choice import TraceChoice
+from cdtool.evaluation.traces import Trace, make_trace
+from cdtool.recording import FloatArray
+from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.counting import Exposure, SweepRows
+from cdtool.workflows.force_rows import point_rows
+from cdtool.workflows.judged import Judged
+from cdtool.workflows.scoring import Scored
+
+
+class Gathering:
+    """The rows of a benchmark, log by log in the order of the file, and the traces that are kept.
+
+    `names` are the detectors; `learned` has the hashes of the logs learned from, with their names.
+    """
+
+    def __init__(
+        self, setup: BenchmarkFile, names: Sequence[str], factors: Mapping[str, FloatArray], learned: Mapping[str, str]
+    ) -> None:
+        self.setup = setup
+        self.names = tuple(names)
+        self.learned = learned
+        self.scored: list[Scored] = []
+        self.skipped: list[Skipped] = []
+        self.findings: list[Skipped] = []
+        self._exposure: dict[tuple[str, str], Exposure] = {}
+        self._sweep = SweepRows(factors, HOLDOUT)
+        self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
+        self._logs = 0
+        self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
+
+    def add(self, group: str, scored: Scored) -> None:
+        """Take one log's rows; raises ConfigurationError where it was learned from, under whatever name."""
+        self._logs += 1
+        self.skipped += scored.skipped
+        self.findings += scored.findings
+        if scored.recording is None:
+            return
+        self._refuse_learned(scored.recording)
+        for judged in scored.judged:
+            for detection, swept in zip(judged.detections, judged.sweeps, strict=True):
+                self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
+                self._sweep.add(group, detection, swept, judged)
+            _offer(self._choice, self._logs - 1, judged)
+        for name in {detection.detector for judged in scored.judged for detection in judged.detections}:
+            self._exposure[group, name].recordings += 1
+        if scored.recording.point:
+            self._tests.setdefault((group, scored.recording.point), []).extend(scored.verdicts.values())
+        self.scored.append(replace(scored, judged=[], verdicts={}))
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """The traces that are kept."""
+        return self._choice.kept()
+
+    def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
+        """All of it; raises RecordingError where no log could be scored."""
+        if not self._exposure:
+            first = self.skipped[0] if self.skipped else None
+            reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
+            raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", "check with cdtool info")
+        profiles = {name: group.force for name, group in self.setup.impacts.items()}
+        return Results(
+            provenance=provenance,
+            detectors=self.names,
+            groups=self.setup.groups,
+            recordings=tuple(item.recording for item in self.scored if item.recording),
+            contacts=tuple(row for item in self.scored for row in item.contacts),
+            false_alarms=tuple(row for item in self.scored for row in item.false_alarms),
+            exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
+            forces=tuple(row for item in self.scored for row in item.forces),
+            points=tuple(point_rows(self._tests, profiles)),
+            sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
+            calibration=tuple(calibration),
+            skipped=tuple(self.skipped),
+            findings=tuple(self.findings),
+        )
+
+    def _refuse_learned(self, recording: RecordingResult) -> None:
+        if recording.sha256 and recording.sha256 in self.learned:
+            raise ConfigurationError(
+                f"{self.setup.path}: {recording.recording} holds the same bytes as {self.learned[recording.sha256]}, "
+                "which is learned from",
+                "a recording may be in [learn] or scored, not both",
+            )
+
+
+def _offer(choice: TraceChoice, number: int, judged: Judged) -> None:
+    pairs = list(zip(judged.detections, judged.matchings, strict=True))
+    missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
+    false = [item.detector for item, made in pairs if made.false_alarms]
+    words = [f"missed by {', '.join(missed)}"] if missed else []
+    words += [f"false alarm of {', '.join(false)}"] if false else []
+    slowest = max((match.latency for _, made in pairs for match in made.matches if match.alarm), default=0.0)
+
+    def make(why: str) -> Trace:
+        return make_trace(
+            judged.group, judged.operation, judged.contacts, judged.detections, judged.matchings, chosen=why
+        )
+
+    choice.offer(number, judged.group, len(judged.detections), "; ".join(words), slowest, make)

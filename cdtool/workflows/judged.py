@@ -1,0 +1,105 @@
+"""One operation with every detector's detection, its alarms held against the contacts, and the rows that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.force_course import ForceCourse, force_at
+from cdtool.evaluation.matching import Match, Matching
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult
+from cdtool.evaluation.sweep import Swept
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection
+from cdtool.recording import Contact, Recording
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One operation with every detector's detection and its alarms held against the contacts."""
+
+    group: str
+    operation: Operation
+    contacts: tuple[Contact, ...]
+    detections: tuple[Detection, ...]
+    matchings: tuple[Matching, ...]
+    sweeps: tuple[Swept, ...] = ()
+
+
+def contact_rows(
+    judged: Judged,
+    recording: Recording,
+    contacts: Sequence[Contact],
+    courses: Mapping[int, ForceCourse],
+    synchronisation: float,
+) -> list[ContactResult]:
+    """A row for each contact and detector; `synchronisation` [s]: how far the load cell's clock may be off."""
+    numbers = {contact: number for number, contact in enumerate(contacts, 1)}
+    cell = recording["force"].period if "force" in recording else 0.0
+    rows = []
+    for detection, matching in zip(judged.detections, judged.matchings, strict=True):
+        resolution = detection.statistic.period + (cell if np.isfinite(cell) else 0.0) + synchronisation
+        for found in matching.matches:
+            number = numbers[found.contact]
+            rows.append(_contact_row(judged, recording, detection, found, number, courses.get(number), resolution))
+    return rows
+
+
+def _contact_row(
+    judged: Judged,
+    recording: Recording,
+    detection: Detection,
+    found: Match,
+    number: int,
+    course: ForceCourse | None,
+    resolution: float,
+) -> ContactResult:
+    contact, alarm = found.contact, found.alarm
+    peak = course.peak if course else contact.peak_force
+    return ContactResult(
+        recording=recording.name,
+        group=judged.group,
+        detector=detection.detector,
+        joint=detection.statistic.joints[alarm.joint] if alarm else None,
+        onset_s=contact.start,
+        onset_uncertainty_s=contact.uncertainty,
+        alarm_s=alarm.time if alarm else None,
+        latency_ms=1e3 * found.latency if alarm else None,
+        outcome=found.outcome,
+        force_at_alarm_n=_known(force_at(course, found.latency)) if course and alarm else None,
+        peak_force_n=_known(peak),
+        clipped=found.clipped,
+        reason=found.reason or None,
+        contact=number,
+        kind=contact.kind or None,
+        found_by=contact.found_by,
+        watched_ms=1e3 * found.watched,
+        resolution_ms=1e3 * resolution,
+        side=alarm.side if alarm else None,
+        statistic=alarm.statistic if alarm else None,
+        limit=alarm.limit if alarm else None,
+    )
+
+
+def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
+    """A row for each alarm without a contact."""
+    return [
+        FalseAlarmResult(
+            recording=judged.operation.name,
+            group=judged.group,
+            detector=detection.detector,
+            joint=detection.statistic.joints[alarm.joint],
+            time_s=alarm.time,
+            side=alarm.side,
+            statistic=alarm.statistic,
+            limit=alarm.limit,
+        )
+        for detection, matching in zip(judged.detections, judged.matchings, strict=True)
+        for alarm in matching.false_alarms
+    ]
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None

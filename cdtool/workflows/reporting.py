@@ -1,0 +1,23 @@
+"""A benchmark's results again, from their file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.results_file import read_results
+from cdtool.evaluation.traces import Trace
+from cdtool.evaluation.traces_file import read_traces, traces_path
+
+
+def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]:
+    """The results with their statistics, the traces kept beside them, and a note where there are none.
+
+    Raises RecordingError where either file is damaged.
+    """
+    path = Path(results)
+    evaluated = evaluate(read_results(path))
+    beside = traces_path(path)
+    if not beside.exists():
+        return evaluated, (), f"{beside} is missing: no figures over time"
+    return evaluated, read_traces(beside), ""

@@ -1,0 +1,163 @@
+"""[limits]: which figures they name, and what becomes of them."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from cdtool.errors import ConfigurationError
+from cdtool.evaluation.limits import broken, check_limits, read_limits
+from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
+from cdtool.evaluation.statistics import FIGURES, summarise
+from cdtool.tables import Table
+
+DETECTORS = [("momentum", "gm"), ("friction_ekf", "feekf")]
+GROUPS = ("stiff", "soft.2", "holdout")
+
+
+def contact(detector: str, group: str, latency: float | None, outcome: str = "detected") -> ContactResult:
+    return ContactResult(
+        f"{group}-{latency}-{outcome}",
+        group,
+        detector,
+        "gate",
+        5.0,
+        0.001,
+        5.0,
+        latency,
+        outcome,
+        300.0,
+        900.0,
+        watched_ms=1000.0,
+    )
+
+
+def results() -> Results:
+    contacts = [contact("momentum", "stiff", x) for x in (10.0, 20.0, 30.0, 40.0)]
+    contacts += [contact("friction_ekf", "stiff", 10.0), contact("friction_ekf", "stiff", None, "missed")]
+    contacts += [contact("momentum", "soft.2", None, "not_assessable")]
+    contacts += [contact("friction_ekf", "soft.2", 70.0)]
+    exposure = [ExposureResult(group, name, 4, 4, 0.5) for group in GROUPS for name, _ in DETECTORS]
+    alarm = FalseAlarmResult("h", "holdout", "momentum", "gate", 1.0)
+    return Results({}, ("momentum", "friction_ekf"), GROUPS, tuple(contacts), (alarm,), tuple(exposure))
+
+
+SUMMARIES = summarise(results())
+
+
+def rules(text: str):
+    return read_limits(Table(tomllib.loads(text), "b.toml", "limits."), DETECTORS, GROUPS)
+
+
+def check(text: str):
+    return check_limits(rules(text), SUMMARIES)
+
+
+def test_a_short_name_a_group_and_a_figure_name_one_limit():
+    (limit,) = check('"gm.stiff.mean_ms" = { max = 25.0 }')
+    assert (limit.detector, limit.group, limit.value, limit.outcome) == ("momentum", "stiff", 25.0, "kept")
+    assert broken([limit]) == []
+
+
+def test_above_the_largest_and_below_the_least_are_broken_with_the_reason():
+    (high,) = check('"gm.stiff.max_ms" = { max = 39.9 }')
+    assert high.outcome == "broken" and high.reason == "40 is more than 39.9"
+    (low,) = check('"feekf.stiff.detected" = { min = 2 }')
+    assert low.outcome == "broken" and low.reason == "1 is less than 2"
+
+
+def test_a_star_stands_for_every_detector_and_every_group_with_contacts():
+    limits = check('"*.*.missed" = { max = 0 }')
+    assert [(item.detector, item.group, item.outcome) for item in limits] == [
+        ("momentum", "stiff", "kept"),
+        ("friction_ekf", "stiff", "broken"),
+        ("momentum", "soft.2", "kept"),
+        ("friction_ekf", "soft.2", "kept"),
+    ]
+
+
+def test_two_parts_mean_every_group_and_a_groups_name_may_hold_dots():
+    assert len(check('"*.false_alarms_per_hour" = { max = 2.0 }')) == 6
+    (limit,) = check('"feekf.soft.2.mean_ms" = { max = 80 }')
+    assert limit.group == "soft.2"
+
+
+def test_what_could_not_be_assessed_does_not_pass():
+    (limit,) = check('"gm.soft.2.mean_ms" = { max = 100 }')
+    assert limit.outcome == "not assessable" and limit.value is None
+    assert limit.reason == "none of 1 contacts could be assessed"
+    assert broken([limit]) == [limit]
+
+
+def test_a_quantile_that_is_not_reached_breaks_its_limit():
+    (limit,) = check('"feekf.stiff.p95_ms" = { max = 1000 }')
+    assert limit.outcome == "broken" and limit.value is None and "not reached" in limit.reason
+
+
+def test_false_alarms_are_counted_in_groups_without_contacts():
+    (limit,) = check('"gm.holdout.false_alarms_per_hour" = { max = 1.9 }')
+    assert limit.value == 2.0 and limit.outcome == "broken"
+    (bound,) = check('"feekf.holdout.false_alarms_per_hour_at_most" = { max = 6.0 }')
+    assert bound.value == pytest.approx(-math.log(0.05) / 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('"gmm.stiff.mean_ms" = { max = 1 }', "unknown detector 'gmm'.*gm"),
+        ('"gm.stif.mean_ms" = { max = 1 }', "unknown group 'stif'.*stiff"),
+        ('"gm.stiff.mean" = { max = 1 }', "unknown figure 'mean'.*mean_ms"),
+        ('"gm" = { max = 1 }', "names no figure"),
+        ('"gm.stiff.mean_ms" = { }', "has no bound"),
+        ('"gm.stiff.mean_ms" = 5', "a table"),
+        ('"gm.stiff.mean_ms" = { max = 1, min = 2 }', "min 2 above max 1"),
+        ('"gm.stiff.mean_ms" = { maximum = 1, max = 2 }', "unknown key"),
+        ('"gm.stiff.mean_ms" = { max = "fast" }', "a number"),
+    ],
+)
+def test_a_wrong_limit_is_one_line_that_names_its_key(text, said):
+    with pytest.raises(ConfigurationError, match=rf"(?s)b\.toml: limits\..*{said}"):
+        rules(text)
+
+
+def test_a_figure_of_contacts_in_a_group_without_any_is_an_error():
+    with pytest.raises(ConfigurationError, match="no such figure"):
+        check('"gm.holdout.p95_ms" = { max = 1 }')
+
+
+def test_a_detector_that_was_not_run_is_an_error():
+    with pytest.raises(ConfigurationError, match="no such figure"):
+        check_limits(
+            rules('"gm.stiff.p95_ms" = { max = 1 }'), [item for item in SUMMARIES if item.detector != "momentum"]
+        )
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_every_figure_is_a_number_or_undefined_with_a_reason(figure):
+    for summary in SUMMARIES:
+        value = FIGURES[figure](summary)
+        assert isinstance(value, int | float)
+        assert summary.why_undefined(figure)
+
+
+def test_a_missed_contact_makes_the_largest_latency_infinite():
+    by_name = {(item.detector, item.group): item for item in SUMMARIES}
+    assert by_name["friction_ekf", "stiff"].max_ms == math.inf
+    assert by_name["momentum", "stiff"].max_ms == 40.0
+
+
+def test_campaigns_widen_the_interval_of_the_mean():
+    from cdtool.evaluation.results import RecordingResult
+
+    base = results()
+    rows = [contact("momentum", "stiff", 10.0 * (i // 5) + 0.1 * (i % 5)) for i in range(20)]
+    alone = replace(base, contacts=tuple(rows))
+    recordings = tuple(
+        RecordingResult(row.recording, "stiff", "", 8.0, 1, 1, campaign=f"day {i // 5}") for i, row in enumerate(rows)
+    )
+    by_day = replace(alone, recordings=recordings)
+    width = [next(s.mean for s in summarise(item) if s.contacts) for item in (alone, by_day)]
+    assert width[1].high - width[1].low > 1.3 * (width[0].high - width[0].low)

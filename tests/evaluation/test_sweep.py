@@ -1,0 +1,135 @@
+"""A detection with its limits moved gives what matching gives with those limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.activation import Activation
+from cdtool.detection import Band, Signal, Status, Verdict
+from cdtool.errors import UsageError
+from cdtool.evaluation.false_alarm_budget import Budget, set_factor
+from cdtool.evaluation.matching import match
+from cdtool.evaluation.sweep import MULTIPLES, critical_factor, sweep
+from cdtool.motion import MotionClass
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection, judge
+from cdtool.recording import Contact, Recording, Series
+from cdtool.thresholds.limit import FittedLimit
+
+TIME = np.arange(8000) * 1e-3
+RECORDING = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, np.ones((8000, 2)), "m/s")})
+OPERATION = Operation(RECORDING, MotionClass(1, 1.0))
+ACTIVATION = Activation(3, rearm=0.2)
+LIMIT = FittedLimit((0.0,), (0.0,), (1.0,), (1.0,), safety_factor=3.0)
+
+
+def detection(seed: int, factor: float = 3.0) -> Detection:
+    """Coloured noise on two joints with contacts' steps, a gap and a stretch that is not applicable."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0.0, 0.2, (8100, 2)).cumsum(axis=0)
+    values = noise[100:] - noise[:-100]
+    values[3000:3200, 0] += 8.0
+    values[6000:6100, 1] -= 9.0
+    status = np.zeros((8000, 2), dtype=np.uint8)
+    status[1000:1050] = Status.GAP
+    status[4000:4500] = Status.NOT_APPLICABLE
+    signal = Signal(TIME, values, status, "N", joints=("a", "b"))
+    return judge(OPERATION, "d", signal, (LIMIT.with_safety_factor(factor),), ACTIVATION)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_each_step_is_what_matching_says_with_those_limits(seed):
+    contacts = [Contact(3.0, 3.2, 0.005), Contact(6.0, 6.1, 0.005)]
+    factors = 3.0 * MULTIPLES
+    swept = sweep(detection(seed), contacts, ACTIVATION, 1.0, factors)
+    assert swept.false_alarms[0] > 0 and swept.false_alarms[-1] == 0
+    for i, factor in enumerate(factors):
+        moved = detection(seed, float(factor))
+        matching = match(moved.verdict, contacts, moved.statistic, 1.0)
+        assert len(matching.false_alarms) == swept.false_alarms[i]
+        np.testing.assert_allclose([item.latency for item in matching.matches], swept.latency[i])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_above_the_critical_factor_there_is_no_alarm_and_below_it_there_is_one(seed):
+    critical = critical_factor(detection(seed), ACTIVATION)
+    assert detection(seed, critical * 1.000001).verdict.outcome == "no alarm"
+    assert detection(seed, critical * 0.999999).verdict.outcome == "alarm"
+
+
+def test_too_short_a_run_of_judged_samples_has_no_critical_factor():
+    blind = replace(detection(0), threshold=None)
+    assert critical_factor(blind, ACTIVATION) == -np.inf
+
+
+@pytest.mark.parametrize(
+    ("text", "rate", "per", "shown"),
+    [
+        ("1/1000op", 1e-3, "operation", "1/1000op"),
+        ("0.002/op", 2e-3, "operation", "1/500op"),
+        ("1/8h", 0.125, "hour", "1/8h"),
+        (" 2 / hour ", 2.0, "hour", "2/h"),
+        ("1e-3/operations", 1e-3, "operation", "1/1000op"),
+    ],
+)
+def test_budgets_are_read(text, rate, per, shown):
+    budget = Budget.parse(text)
+    assert (budget.rate, budget.per, str(budget)) == (pytest.approx(rate), per, shown)
+
+
+@pytest.mark.parametrize("text", ["", "1000", "1/0op", "-1/op", "1/1000 runs", "1/nan op", "inf/h"])
+def test_what_is_no_budget_is_refused_with_an_example(text):
+    with pytest.raises(UsageError, match="1/1000op"):
+        Budget.parse(text)
+
+
+def test_the_factor_is_the_smallest_that_keeps_the_budget_by_operation():
+    runs = [detection(seed) for seed in range(20)]
+    made = set_factor(Budget(0.1, "operation"), runs, ACTIVATION)
+    critical = sorted((critical_factor(run, ACTIVATION) for run in runs), reverse=True)
+    assert made.factor == pytest.approx(critical[2], rel=1e-8) and made.alarms == 2
+    alarming = [detection(seed, made.factor).verdict.outcome == "alarm" for seed in range(20)]
+    assert sum(alarming) == 2 and made.operations == 20
+
+
+def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
+    runs = [detection(seed) for seed in range(20)]
+    hours = sum(run.assessed_seconds for run in runs) / 3600.0
+    budget = Budget(4.5 / hours, "hour")
+    made = set_factor(budget, runs, ACTIVATION)
+
+    def alarms(factor: float) -> int:
+        return sum(len(detection(seed, factor).verdict.alarms) for seed in range(20))
+
+    assert alarms(made.factor) == made.alarms <= 4 < alarms(made.factor * 2.0 ** (-1.5 / 32))
+
+
+def test_too_small_an_exposure_is_refused_and_told_what_is_missing():
+    with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 could be judged.*add 980"):
+        set_factor(Budget(1e-3, "operation"), [detection(seed) for seed in range(20)], ACTIVATION)
+
+
+def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
+    runs = [detection(seed) for seed in range(12)]
+    status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
+    blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
+    with pytest.raises(UsageError, match="11 could be judged"):
+        set_factor(Budget(1 / 12, "operation"), [blind, *runs[1:]], ACTIVATION)
+
+
+def test_limits_without_spread_cannot_be_set():
+    stuck = FittedLimit((0.0,), (0.0,), (0.0,), (0.0,), safety_factor=3.0)
+    runs = [replace(detection(seed), threshold=stuck) for seed in range(4)]
+    with pytest.raises(UsageError, match="no spread"):
+        set_factor(Budget(0.5, "operation"), runs, ACTIVATION)
+
+
+def test_a_detection_without_a_threshold_never_alarms():
+    statistic = detection(0).statistic
+    nothing = np.full(statistic.values.shape, np.nan)
+    blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not assessable"))
+    swept = sweep(blind, [Contact(3.0, 3.1, 0.0)], ACTIVATION, 1.0, MULTIPLES)
+    assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
