@@ -48,6 +48,15 @@ class Budget:
         """The least exposure on which it can be set: one false alarm has to be allowed in it."""
         return 1.0 / self.rate
 
+    def check(self, exposure: float, detector: str) -> None:
+        """Raise UsageError, telling what is missing, where the exposure is too small to set it on."""
+        if exposure * self.rate < 1.0 - 1e-9:
+            raise UsageError(
+                f"{detector}: false-alarm budget {self} needs {self.needed:g} impact-free {self.per}s to be set, "
+                f"{exposure:.4g} could be judged",
+                f"add {self.needed - exposure:.4g} to [learn], or choose a larger budget",
+            )
+
 
 @dataclass(frozen=True)
 class Calibrated:
@@ -59,7 +68,7 @@ class Calibrated:
     alarms: int
 
 
-def set_factor(budget: Budget, detections: Sequence[Detection], activation: Activation) -> Calibrated:
+def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], activation: Activation) -> Calibrated:
     """The smallest safety factor with at most budget x exposure alarms in impact-free operations.
 
     Each detection's threshold must not have been learned from its operation. An operation that could be judged nowhere
@@ -68,13 +77,7 @@ def set_factor(budget: Budget, detections: Sequence[Detection], activation: Acti
     judged = [item for item in detections if item.assessed_seconds > 0.0]
     hours = sum(item.assessed_seconds for item in judged) / 3600.0
     exposure = float(len(judged)) if budget.per == "operation" else hours
-    if exposure * budget.rate < 1.0 - 1e-9:
-        raise UsageError(
-            f"false-alarm budget {budget} needs {budget.needed:g} impact-free {budget.per}s to be set, "
-            f"{exposure:.4g} could be judged",
-            f"add {budget.needed - exposure:.4g} to [learn], or choose a budget of 1/{math.floor(max(exposure, 1))} "
-            "or more",
-        )
+    budget.check(exposure, detector)
     allowed = math.floor(budget.rate * exposure + 1e-9)
     if budget.per == "operation":
         factor, alarms = _by_operation(judged, activation, allowed)

@@ -18,8 +18,8 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import BenchmarkFile
 from cdtool.workflows.learning import fit_classes, signals_of
 
-# Runs are judged by what the other four fifths teach.
-FOLDS = 5
+# Runs are judged by what the other nine tenths teach.
+FOLDS = 10
 
 Pair = tuple[Operation, Signal]
 Fit = Callable[[Sequence[Pair]], tuple[tuple[FittedThreshold, ...], list[Skipped]]]
@@ -84,6 +84,8 @@ def _calibrate(
     budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, activation: Activation
 ) -> CalibrationResult:
     """Set the factor on every run, each judged by thresholds that were learned from runs of other folds."""
+    if budget.per == "operation":
+        budget.check(len(pairs), detector)
     detections: list[Detection] = []
     for fold in range(FOLDS):
         others = [pair for i, pair in enumerate(pairs) if i % FOLDS != fold]
@@ -91,15 +93,12 @@ def _calibrate(
             fitted, _ = fit(others)
         except SignatureError as fault:
             raise UsageError(
-                f"false-alarm budget {budget}: {detector} cannot learn from four fifths of the runs: {fault.message}",
+                f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {fault.message}",
                 "add runs to [learn], or do without a budget",
             ) from fault
         held_out = [pair for i, pair in enumerate(pairs) if i % FOLDS == fold]
         detections += [judge(operation, detector, signal, fitted, activation) for operation, signal in held_out]
-    try:
-        made = set_factor(budget, detections, activation)
-    except UsageError as fault:
-        raise UsageError(f"{detector}: {fault.message}", fault.hint) from fault
+    made = set_factor(budget, detector, detections, activation)
     return CalibrationResult(detector, str(budget), made.factor, made.operations, made.hours, made.alarms)
 
 

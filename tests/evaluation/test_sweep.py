@@ -88,7 +88,7 @@ def test_what_is_no_budget_is_refused_with_an_example(text):
 
 def test_the_factor_is_the_smallest_that_keeps_the_budget_by_operation():
     runs = [detection(seed) for seed in range(20)]
-    made = set_factor(Budget(0.1, "operation"), runs, ACTIVATION)
+    made = set_factor(Budget(0.1, "operation"), "d", runs, ACTIVATION)
     critical = sorted((critical_factor(run, ACTIVATION) for run in runs), reverse=True)
     assert made.factor == pytest.approx(critical[2], rel=1e-8) and made.alarms == 2
     alarming = [detection(seed, made.factor).verdict.outcome == "alarm" for seed in range(20)]
@@ -99,7 +99,7 @@ def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
     runs = [detection(seed) for seed in range(20)]
     hours = sum(run.assessed_seconds for run in runs) / 3600.0
     budget = Budget(4.5 / hours, "hour")
-    made = set_factor(budget, runs, ACTIVATION)
+    made = set_factor(budget, "d", runs, ACTIVATION)
 
     def alarms(factor: float) -> int:
         return sum(len(detection(seed, factor).verdict.alarms) for seed in range(20))
@@ -109,7 +109,7 @@ def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
 
 def test_too_small_an_exposure_is_refused_and_told_what_is_missing():
     with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 could be judged.*add 980"):
-        set_factor(Budget(1e-3, "operation"), [detection(seed) for seed in range(20)], ACTIVATION)
+        set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
 def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
@@ -117,14 +117,14 @@ def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
     status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
     blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
     with pytest.raises(UsageError, match="11 could be judged"):
-        set_factor(Budget(1 / 12, "operation"), [blind, *runs[1:]], ACTIVATION)
+        set_factor(Budget(1 / 12, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
 
 
 def test_limits_without_spread_cannot_be_set():
     stuck = FittedLimit((0.0,), (0.0,), (0.0,), (0.0,), safety_factor=3.0)
     runs = [replace(detection(seed), threshold=stuck) for seed in range(4)]
     with pytest.raises(UsageError, match="no spread"):
-        set_factor(Budget(0.5, "operation"), runs, ACTIVATION)
+        set_factor(Budget(0.5, "operation"), "d", runs, ACTIVATION)
 
 
 def test_a_detection_without_a_threshold_never_alarms():
