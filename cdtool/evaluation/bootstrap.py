@@ -48,11 +48,13 @@ def bca(
     from leaving one cluster out. Fewer than 3 clusters: no bounds (NaN). Nothing varies: the interval is the value.
     Ties can leave the acceleration undefined; then the percentiles of the same resamples stand.
     Too short with few clusters, above all for the standard deviation (docs/statistics.md has the measured coverage).
-    Raises UsageError for an unknown statistic, values that are not finite or arrays that do not fit.
+    Raises UsageError for an unknown statistic, no resamples, values that are not finite or arrays that do not fit.
     """
     check_level(level)
     if statistic not in _STATISTICS:
         raise UsageError(f"unknown statistic '{statistic}'", nearest(statistic, _STATISTICS))
+    if resamples < 1:
+        raise UsageError(f"resamples is {resamples}", f"at least 1; {RESAMPLES} is usual")
     groups = clusters_of(values, clusters)
     resampled = _STATISTICS[statistic](groups)
     fewest = 2 if statistic == "std" else 1

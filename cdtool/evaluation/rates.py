@@ -21,7 +21,7 @@ def poisson_rate(count: int, exposure: float, level: float = 0.95) -> Interval:
     Low: chi2((1 - level) / 2; 2 x) / (2 T), 0 for x = 0; high: chi2((1 + level) / 2; 2 x + 2) / (2 T); x = `count`
     events in T = `exposure` (hours, operations), chi2(p; f) the quantile with f degrees of freedom. Exposure 0: value
     NaN, [0, inf). Assumes that events come independently at a steady rate: several from one cause are too many.
-    Raises UsageError for a negative count or exposure, or for events without any exposure.
+    Raises UsageError for a negative count or exposure.
     """
     check_level(level)
     _check_exposure(count, exposure)
@@ -107,8 +107,6 @@ def _check_exposure(count: int, exposure: float) -> None:
     check_count("number of events", count)
     if not (exposure >= 0.0 and math.isfinite(exposure)):
         raise UsageError(f"exposure is {exposure:g}", "hours or operations, 0 or more")
-    if count and exposure == 0.0:
-        raise UsageError(f"{count} events in an exposure of 0", "give the hours or operations that were watched")
 
 
 def _check_share(count: int, n: int) -> None:

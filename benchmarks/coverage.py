@@ -1,0 +1,233 @@
+"""How often do the intervals of the evaluation hold the true figure? Each should in 95 of 100 tests.
+
+python benchmarks/coverage.py [repetitions]
+
+The exact intervals (missed share, false-alarm rate) are enumerated: no chance in it. The others are simulated on
+latencies whose true figures are known. Seeded by row, so the figures do not depend on the number of cores.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+from timing import environment, table
+
+from cdtool.evaluation.bootstrap import bca
+from cdtool.evaluation.interval import Interval
+from cdtool.evaluation.kaplan_meier import latency_quantile
+from cdtool.evaluation.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
+
+REPETITIONS = 1000
+# Enough for coverage; the intervals that cdtool prints use 9999.
+RESAMPLES = 1999
+STATISTICS = ("mean", "median", "std")
+NOMINAL = 0.95
+LEAST_BCA = 0.9
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Latencies:
+    """Latencies [ms] whose figures are known: each share of them has one distribution."""
+
+    groups: tuple[tuple[float, Any], ...]
+
+    def draw(self, rng: np.random.Generator, n: int) -> Floats:
+        which = rng.choice(len(self.groups), n, p=[share for share, _ in self.groups])
+        return np.choose(which, [group.rvs(n, random_state=rng) for _, group in self.groups])
+
+    def later(self, latency: float | Floats) -> Any:
+        """The share above a latency."""
+        return sum(share * group.sf(latency) for share, group in self.groups)
+
+    def quantile(self, share: float) -> float:
+        return float(optimize.brentq(lambda latency: self.later(latency) - 1.0 + share, 0.0, 1e4))
+
+    def figure(self, statistic: str) -> float:
+        if statistic == "median":
+            return self.quantile(0.5)
+        mean = sum(share * group.mean() for share, group in self.groups)
+        square = sum(share * (group.var() + group.mean() ** 2) for share, group in self.groups)
+        return float(mean if statistic == "mean" else math.sqrt(square - mean**2))
+
+    def watched(self, missed: float) -> float:
+        """Mean of an exponential time of watching that ends before this share of the alarms."""
+        middles = (np.arange(4000) + 0.5) / 4000
+        return float(optimize.brentq(lambda mean: np.mean(self.later(-mean * np.log(middles))) - missed, 1.0, 1e4))
+
+
+LATENCIES = {
+    "normal, 40 +- 6 ms": Latencies(((1.0, stats.norm(40, 6)),)),
+    "lognormal, 30 ms, sigma 0.5": Latencies(((1.0, stats.lognorm(0.5, scale=30)),)),
+    "gamma, shape 2, mean 30 ms": Latencies(((1.0, stats.gamma(2, scale=15)),)),
+    "80 % at 38, 20 % at 80 ms": Latencies(((0.8, stats.norm(38, 4)), (0.2, stats.norm(80, 8)))),
+    "50 % at 38, 50 % at 80 ms": Latencies(((0.5, stats.norm(38, 4)), (0.5, stats.norm(80, 8)))),
+}
+# Recordings, contacts in each, and the latencies: half of the variance lies between recordings.
+RECORDINGS = ((30, 4), (10, 10), (5, 10))
+RECORDED = Latencies(((1.0, stats.norm(40, 6)),))
+CENSORED = ("lognormal, 30 ms, sigma 0.5", "80 % at 38, 20 % at 80 ms")
+MISSED = (0.0, 0.1, 0.3)
+
+
+def main(repetitions: int) -> int:
+    """Print every table; 0 if the exact intervals and those of mean and median at n = 30 cover what they should."""
+    print(f"== coverage of 95 % intervals [%]\n{environment()}", flush=True)
+    held = print_exact()
+    error = 100 * math.sqrt(NOMINAL * (1 - NOMINAL) / repetitions)
+    print(f"\nsimulated: {repetitions} tests each, standard error of a figure about {error:.1f}", flush=True)
+    samples = [(name, n) for n in (30, 10) for name in LATENCIES]
+    cut = [(name, n, missed) for name in CENSORED for n in (30, 100) for missed in MISSED]
+    with ProcessPoolExecutor() as pool:
+        independent = [Row(pool, bootstrap_hits, sample, repetitions) for sample in samples]
+        recordings = [Row(pool, recording_hits, numbers, repetitions) for numbers in RECORDINGS]
+        quantiles = [Row(pool, quantile_hits, sample, repetitions) for sample in cut]
+        held &= print_bootstrap(samples, independent)
+        print_recordings(recordings)
+        print_quantiles(cut, quantiles)
+    return 0 if held else 1
+
+
+class Row:
+    """The repetitions of one row as jobs of a pool, in chunks with a seed each."""
+
+    CHUNKS = 8
+
+    def __init__(self, pool: Executor, hits: Callable[..., Floats], sample: tuple[Any, ...], repetitions: int) -> None:
+        number = max(1, repetitions // self.CHUNKS)
+        self.jobs: list[Future[Floats]] = [pool.submit(hits, *sample, number, seed) for seed in range(self.CHUNKS)]
+
+    def shares(self) -> Floats:
+        return np.mean([job.result() for job in self.jobs], axis=0)
+
+
+def print_exact() -> bool:
+    """Enumerated: the least coverage over every true share or rate, for three ways to deal with a count of 0."""
+    found = {f"missed share of {n}": missed_coverage(n) for n in (5, 10, 30, 100, 300)}
+    found["false alarms, up to 40 expected"] = false_alarm_coverage(40.0)
+    print("\nexact intervals, least coverage over every true value")
+    table(("", "interval", "at most", "mixed"), [(title, *map(percent, least)) for title, least in found.items()])
+    print("mixed: the one-sided bound where the count is 0 (or all), the interval elsewhere; cdtool does not use it")
+    sound = all(min(interval, at_most) >= NOMINAL - 1e-9 for interval, at_most, _ in found.values())
+    return said("interval and at most hold any true value with 95 %", sound)
+
+
+def missed_coverage(n: int) -> list[float]:
+    counts = np.arange(n + 1)
+    intervals = np.array([(i.low, i.high) for i in (binomial_share(int(x), n) for x in counts)])
+    at_most = np.array([(0.0, binomial_at_most(int(x), n)) for x in counts])
+    mixed = np.vstack((at_most[:1], intervals[1:-1], 1.0 - at_most[:1, ::-1]))
+    rules = (intervals, at_most, mixed)
+    return [least_coverage(rule, lambda share: stats.binom.pmf(counts, n, share), 1.0) for rule in rules]
+
+
+def false_alarm_coverage(highest: float) -> list[float]:
+    # Counts of three times what is expected at most: more do not happen.
+    counts = np.arange(3 * int(highest))
+    intervals = np.array([(i.low, i.high) for i in (poisson_rate(int(x), 1.0) for x in counts)])
+    at_most = np.array([(0.0, poisson_at_most(int(x), 1.0)) for x in counts])
+    mixed = np.vstack((at_most[:1], intervals[1:]))
+    rules = (intervals, at_most, mixed)
+    return [least_coverage(rule, lambda mean: stats.poisson.pmf(counts, mean), highest) for rule in rules]
+
+
+def least_coverage(bounds: Floats, probabilities: Callable[[float], Floats], highest: float) -> float:
+    """Least chance that the bounds hold the true value, up to the highest: it lies just beside a bound."""
+    beside = (bounds.ravel()[:, np.newaxis] * (1.0 - 1e-9, 1.0 + 1e-9)).ravel()
+    true = beside[(beside > 0.0) & (beside < highest)]
+    return min(float(probabilities(value)[(bounds[:, 0] <= value) & (value <= bounds[:, 1])].sum()) for value in true)
+
+
+def bootstrap_hits(name: str, n: int, repetitions: int, seed: int) -> Floats:
+    """Share of the tests whose BCa interval holds the true mean, median and standard deviation."""
+    rng, latencies = np.random.default_rng((seed, n)), LATENCIES[name]
+    true = [latencies.figure(statistic) for statistic in STATISTICS]
+    hits = np.zeros(len(STATISTICS))
+    for _ in range(repetitions):
+        sample = latencies.draw(rng, n)
+        hits += [holds(bca(sample, range(n), s, resamples=RESAMPLES), t) for s, t in zip(STATISTICS, true, strict=True)]
+    return hits / repetitions
+
+
+def recording_hits(recordings: int, contacts: int, repetitions: int, seed: int) -> Floats:
+    """The same, resampled by recording (three figures) and, wrongly, by contact (three more)."""
+    rng = np.random.default_rng((seed, recordings))
+    recording = np.repeat(np.arange(recordings), contacts)
+    mean, std = RECORDED.figure("mean"), RECORDED.figure("std")
+    hits = np.zeros((2, len(STATISTICS)))
+    for _ in range(repetitions):
+        between = rng.normal(size=recordings)[recording]
+        sample = mean + std * math.sqrt(0.5) * (between + rng.normal(size=len(recording)))
+        for row, clusters in enumerate((recording, range(len(recording)))):
+            for column, statistic in enumerate(STATISTICS):
+                interval = bca(sample, clusters, statistic, resamples=RESAMPLES)
+                hits[row, column] += holds(interval, RECORDED.figure(statistic))
+    return hits.ravel() / repetitions
+
+
+def quantile_hits(name: str, n: int, missed: float, repetitions: int, seed: int) -> Floats:
+    """Share of the tests whose interval holds the true median and P95; share with an upper limit of either."""
+    rng, latencies = np.random.default_rng((seed, n)), LATENCIES[name]
+    true = [latencies.quantile(share) for share in (0.5, 0.95)]
+    mean = latencies.watched(missed) if missed else math.inf
+    hits = np.zeros((2, 2))
+    for _ in range(repetitions):
+        latency, watched = latencies.draw(rng, n), mean * rng.exponential(size=n)
+        found = [latency_quantile(np.minimum(latency, watched), latency > watched, share) for share in (0.5, 0.95)]
+        hits += [
+            [holds(interval, value) for interval, value in zip(found, true, strict=True)],
+            [math.isfinite(interval.high) for interval in found],
+        ]
+    return hits.ravel() / repetitions
+
+
+def holds(interval: Interval, true: float) -> bool:
+    return interval.low <= true <= interval.high
+
+
+def print_bootstrap(samples: Sequence[tuple[str, int]], rows: Sequence[Row]) -> bool:
+    """BCa on independent contacts; whether mean and median cover 90 % with 30 of them."""
+    found = {sample: row.shares() for sample, row in zip(samples, rows, strict=True)}
+    print("\nBCa, independent contacts")
+    table(("", *STATISTICS), [(f"{name}, n = {n}", *map(percent, shares)) for (name, n), shares in found.items()])
+    least = min(float(shares[:2].min()) for (_, n), shares in found.items() if n == 30)
+    return said(f"mean and median, n = 30: at least {percent(LEAST_BCA)}", least >= LEAST_BCA)
+
+
+def print_recordings(rows: Sequence[Row]) -> None:
+    lines = []
+    for (recordings, contacts), row in zip(RECORDINGS, rows, strict=True):
+        shares = list(map(percent, row.shares()))
+        lines.append((f"{recordings} recordings of {contacts}, resampled by recording", *shares[:3]))
+        lines.append((f"{recordings} recordings of {contacts}, wrongly by contact", *shares[3:]))
+    print("\nBCa, contacts of a recording alike (half of the variance between recordings)")
+    table(("", *STATISTICS), lines)
+
+
+def print_quantiles(cut: Sequence[tuple[str, int, float]], rows: Sequence[Row]) -> None:
+    print("\nKaplan-Meier quantiles, missed at random times of watching; bounded: has an upper limit")
+    titles = [f"{name}, n = {n}, {100 * missed:.0f} % missed" for name, n, missed in cut]
+    head = ("", "median", "P95", "median bounded", "P95 bounded")
+    table(head, [(title, *map(percent, row.shares())) for title, row in zip(titles, rows, strict=True)])
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.1f}"
+
+
+def said(text: str, good: bool) -> bool:
+    print(f"{'ok  ' if good else 'FAIL'}  {text}", flush=True)
+    return good
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else REPETITIONS))
