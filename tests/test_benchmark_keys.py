@@ -80,7 +80,7 @@ def test_a_budget_sets_the_safety_factor_on_the_runs_learned_from(gate):
     rows = {item.detector: item for item in done.results.calibration}
     assert set(rows) == {"friction_ekf", "momentum"}
     for row in rows.values():
-        assert (row.budget, row.operations, row.alarms) == ("1/4op", 12, 3)
+        assert (row.budget, row.operations, row.alarms) == ("1/4op", 12, 2)
         assert 0.5 < row.safety_factor < 5.5
     faster = {item.detector: item.mean_ms for item in done.evaluated.summaries}
     slower = {item.detector: item.mean_ms for item in run(gate, HEAD, LEARN, ONSET, STIFF).evaluated.summaries}

@@ -69,8 +69,10 @@ class Calibrated:
 
 
 def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], activation: Activation) -> Calibrated:
-    """The smallest safety factor with at most budget x exposure alarms in impact-free operations.
+    """The smallest safety factor that is expected to keep the budget, from impact-free operations.
 
+    Just above the c-th largest of n operations' critical factors the chance of an alarm is c / (n + 1) on average, so
+    that c - 1 alarms are allowed in them, c = floor(budget (n + 1)); by hours likewise, one less than the budget gives.
     Each detection's threshold must not have been learned from its operation. An operation that could be judged nowhere
     does not count. Raises UsageError, telling what is missing, where the exposure is smaller than `budget.needed`.
     """
@@ -78,7 +80,8 @@ def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], a
     hours = sum(item.assessed_seconds for item in judged) / 3600.0
     exposure = float(len(judged)) if budget.per == "operation" else hours
     budget.check(exposure, detector)
-    allowed = math.floor(budget.rate * exposure + 1e-9)
+    exchangeable = exposure + 1.0 if budget.per == "operation" else exposure
+    allowed = math.floor(budget.rate * exchangeable + 1e-9) - 1
     if budget.per == "operation":
         factor, alarms = _by_operation(judged, activation, allowed)
     else:

@@ -6,11 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from cdtool.activation import Activation
 from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.evaluation.explanation import explain_operation
+from cdtool.evaluation.explanation_words import words
 from cdtool.evaluation.force_verdict import ForceVerdict
+from cdtool.evaluation.matching import Matching
 from cdtool.evaluation.results import CalibrationResult, RecordingResult, Results, Skipped
 from cdtool.evaluation.trace_choice import TraceChoice
 from cdtool.evaluation.traces import Trace, make_trace
+from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.counting import Exposure, SweepRows
@@ -52,7 +57,7 @@ class Gathering:
             for detection, swept in zip(judged.detections, judged.sweeps, strict=True):
                 self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
                 self._sweep.add(group, detection, swept, judged)
-            _offer(self._choice, self._logs - 1, judged)
+            _offer(self._choice, self._logs - 1, judged, self.setup.activation)
         for name in {detection.detector for judged in scored.judged for detection in judged.detections}:
             self._exposure[group, name].recordings += 1
         if scored.recording.point:
@@ -96,7 +101,7 @@ class Gathering:
             )
 
 
-def _offer(choice: TraceChoice, number: int, judged: Judged) -> None:
+def _offer(choice: TraceChoice, number: int, judged: Judged, activation: Activation) -> None:
     pairs = list(zip(judged.detections, judged.matchings, strict=True))
     missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
     false = [item.detector for item, made in pairs if made.false_alarms]
@@ -106,7 +111,20 @@ def _offer(choice: TraceChoice, number: int, judged: Judged) -> None:
 
     def make(why: str) -> Trace:
         return make_trace(
-            judged.group, judged.operation, judged.contacts, judged.detections, judged.matchings, chosen=why
+            judged.group,
+            judged.operation,
+            judged.contacts,
+            judged.detections,
+            judged.matchings,
+            [_explained(detection, matching, activation) for detection, matching in pairs],
+            why,
         )
 
     choice.offer(number, judged.group, len(judged.detections), "; ".join(words), slowest, make)
+
+
+def _explained(detection: Detection, matching: Matching, activation: Activation) -> list[str]:
+    """Why each alarm came and each contact was missed; nothing of alarms that came from elsewhere."""
+    if detection.threshold is None:
+        return []
+    return [line for item in explain_operation(detection, matching, activation) for line in words(item)]
