@@ -108,9 +108,10 @@ def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
     results = cdtool.benchmark(folder / "benchmark.toml").results
     exposure = {(item.group, item.detector): (item.recordings, item.operations) for item in results.exposure}
     assert exposure["push", "momentum"] == (1, 6) and exposure["holdout", "pure_torque"] == (1, 6)
-    rows = [(row.recording, row.detector, row.outcome) for row in results.contacts]
-    names = ("hits.csv#2", "hits.csv#3", "hits.csv#6")
-    assert rows == [(name, detector, "detected") for name in names for detector in ("momentum", "pure_torque")]
+    rows = [(row.recording, row.contact, row.detector, row.outcome) for row in results.contacts]
+    assert rows == [
+        ("hits.csv", number, detector, "detected") for number in (1, 2, 3) for detector in ("momentum", "pure_torque")
+    ]
     assert all(10.0 < row.latency_ms < 150.0 for row in results.contacts)
     assert results.false_alarms == () and results.skipped == ()
     assert results.contacts[0].force_at_alarm_n > 10.0

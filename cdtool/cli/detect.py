@@ -10,7 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.cli.console import leave, number, plain, print_error, print_json, print_skipped, progress, table
-from cdtool.cli.options import DebounceOption, JointsOption, JsonOption, MachineOption, OperationsOption, listed
+from cdtool.cli.options import (
+    DebounceOption,
+    DetectorOption,
+    JointsOption,
+    JsonOption,
+    LimitOption,
+    MachineOption,
+    OnsetAboveOption,
+    OnsetBackToOption,
+    OperationsOption,
+    SignatureOption,
+    figure_name,
+    limits_of,
+    listed,
+)
 from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
@@ -27,25 +41,17 @@ _SHOWN, _STRETCHES = 6, 3
 def detect(
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     machine: MachineOption,
-    signature: Annotated[
-        Path | None, typer.Option("--signature", "-s", help="Signature file from cdtool learn-signature.")
-    ] = None,
-    limit: Annotated[
-        str, typer.Option("--limit", help="Instead: |signal| below this; one value, or one a joint, as 40,inf,40.")
-    ] = "",
-    detector: Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")] = None,
+    signature: SignatureOption = None,
+    limit: LimitOption = "",
+    detector: DetectorOption = None,
     joints: JointsOption = "",
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z, m in the link's frame.")
     ] = "",
     operations: OperationsOption = "whole",
     debounce: DebounceOption = None,
-    onset_above: Annotated[
-        float | None, typer.Option("--onset-above", help="Onset: load cell above this [N]. Default: from its noise.")
-    ] = None,
-    onset_back_to: Annotated[
-        float | None, typer.Option("--onset-back-to", help="Onset: followed back to this [N]. Default: half of it.")
-    ] = None,
+    onset_above: OnsetAboveOption = None,
+    onset_back_to: OnsetBackToOption = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
@@ -62,7 +68,7 @@ def detect(
     from cdtool.workflows.runs import lost
 
     machine_file = read_machine_file(machine)
-    limits = _limits(limit)
+    limits = limits_of(limit)
     contact = ContactPoint.parse(contact_at) if contact_at else None
     plot_names = _plot_names(plot, logs)
     done: list[tuple[Path, Detected]] = []
@@ -120,22 +126,11 @@ def detect(
     leave(skipped)
 
 
-def _limits(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(",")) if text else ()
-    except ValueError:
-        raise UsageError(f"--limit is '{text}'", "numbers separated by commas, inf for a joint not watched") from None
-
-
 def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
-    from cdtool.report.figures import SUFFIXES
-
     if plot is None:
         return {}
     if len(logs) == 1 and not plot.is_dir():
-        if plot.suffix.lower() not in SUFFIXES:
-            raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")
-        return {logs[0]: plot}
+        return {logs[0]: figure_name(plot)}
     if plot.suffix:
         raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
     plot.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from cdtool.errors import UsageError
+
 MachineOption = Annotated[Path, typer.Option("--machine", "-m", help="Machine file (TOML); see docs/machine-file.md.")]
 OperationsOption = Annotated[
     str,
@@ -21,6 +23,27 @@ DebounceOption = Annotated[
     int | None,
     typer.Option("--debounce", help="Samples in succession outside the band that raise an alarm. Default: 9 ms."),
 ]
+SignatureOption = Annotated[
+    Path | None, typer.Option("--signature", "-s", help="Signature file from cdtool learn-signature.")
+]
+LimitOption = Annotated[
+    str, typer.Option("--limit", help="Instead: |signal| below this; one value, or one a joint, as 40,inf,40.")
+]
+DetectorOption = Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")]
+OnsetAboveOption = Annotated[
+    float | None, typer.Option("--onset-above", help="Onset: load cell above this [N]. Default: from its noise.")
+]
+OnsetBackToOption = Annotated[
+    float | None, typer.Option("--onset-back-to", help="Onset: followed back to this [N]. Default: half of it.")
+]
+OutputOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="Where to, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
+    ),
+]
 JobsOption = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Logs read and analysed side by side.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
@@ -28,3 +51,20 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 def listed(text: str) -> tuple[str, ...]:
     """The names in a comma-separated list."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def limits_of(text: str) -> tuple[float, ...]:
+    """The numbers of --limit; raises UsageError."""
+    try:
+        return tuple(float(part) for part in text.split(",")) if text else ()
+    except ValueError:
+        raise UsageError(f"--limit is '{text}'", "numbers separated by commas, inf for a joint not watched") from None
+
+
+def figure_name(plot: Path) -> Path:
+    """The file of --plot; raises UsageError where its name is none of a figure."""
+    from cdtool.report.figures import SUFFIXES
+
+    if plot.suffix.lower() not in SUFFIXES:
+        raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")
+    return plot

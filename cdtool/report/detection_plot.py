@@ -11,13 +11,13 @@ import numpy as np
 
 from cdtool.detection import Alarm
 from cdtool.evaluation.matching import Match
+from cdtool.evaluation.traces import Course, Span
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact
 from cdtool.report.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.outcome import outcome_words
 from cdtool.report.panels import (
     Legend,
-    Span,
     count_from,
     draw_alarm,
     draw_force,
@@ -112,15 +112,16 @@ def _column(
     parts = [item for item in found.detections if _overlap(item, span)]
     colour = look_of(found.detections[0].detector).colour if found.detections else "0.35"
     for axes, joint in zip(rows, joints, strict=False):
-        frame_signal(axes, [(item.statistic, item.band) for item in parts], joint, span, headroom=2.0)
+        frame_signal(axes, [Course.of(item, joint) for item in parts], span, headroom=2.0)
         for item in parts:
-            draw_signal(axes, item, joint, span, legend)
+            draw_signal(axes, Course.of(item, joint), item.detector, span, legend)
             for alarm in item.verdict.alarms:
                 if alarm.joint == joint:
                     draw_alarm(axes, alarm, colour, legend)
     draw_trigger(rows[len(joints)], parts, colour)
     if len(rows) > len(joints) + 1:
-        draw_force(rows[-1], found.recording["force"], span, contact=bool(matches))
+        force = found.recording["force"]
+        draw_force(rows[-1], force.time, force.values[:, 0], span, contact=bool(matches))
     for axes in rows:
         for made in matches:
             draw_onset(axes, made.contact.start, legend)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.detection import REASONS, Alarm, Band, Signal, Status
+from cdtool.detection import REASONS, Alarm, Status
+from cdtool.evaluation.decimation import decimate, kept_samples
+from cdtool.evaluation.traces import Course, Span
 from cdtool.pipeline import Detection
-from cdtool.recording import BoolArray, FloatArray, Series
-from cdtool.report.decimation import decimate, kept_samples
+from cdtool.recording import BoolArray, FloatArray
 from cdtool.report.style import BAND, FORCE, HATCHES, LIMIT, ONSET_DASHES, UNJUDGED, look_of
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _PIXELS = 1000
-Span = tuple[float, float]
 
 
 class Legend:
@@ -53,35 +53,31 @@ class Legend:
         return [handle for kind, handle in known.items() if kind in self._seen]
 
 
-def draw_signal(axes: Axes, detection: Detection, joint: int, span: Span, legend: Legend) -> None:
+def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: Legend) -> None:
     """Signal, limits and normal band of one joint within `span` [s], and where it is not judged."""
-    part = _within(detection.statistic.time, span)
-    time = detection.statistic.time[part]
-    if not len(time):
+    part = course.within(span)
+    if not len(part.time):
         return
-    value = detection.statistic.values[part, joint]
-    status = detection.statistic.status[part, joint]
-    judged = np.where(status == 0, value, np.nan)
-    axes.plot(*decimate(time, value, _PIXELS), color=UNJUDGED, linewidth=0.8, zorder=2)
-    axes.plot(*decimate(time, judged, _PIXELS), color=look_of(detection.detector).colour, zorder=3)
+    judged = part.status == 0
+    axes.plot(*decimate(part.time, part.value, _PIXELS), color=UNJUDGED, linewidth=0.8, zorder=2)
+    value = np.where(judged, part.value, np.nan)
+    axes.plot(*decimate(part.time, value, _PIXELS), color=look_of(detector).colour, zorder=3)
     legend.add("signal")
-    _draw_band(axes, time, detection.band.lower[part, joint], detection.band.upper[part, joint], status == 0, legend)
-    _draw_unjudged(axes, time, status, span, legend)
+    _draw_band(axes, part.time, part.lower, part.upper, judged, legend)
+    _draw_unjudged(axes, part.time, part.status, span, legend)
 
 
-def frame_signal(axes: Axes, parts: Iterable[tuple[Signal, Band]], joint: int, span: Span, headroom: float) -> None:
+def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: float) -> None:
     """Set the vertical range: all limits and judged values within `span`, excursions up to `headroom` bands beyond."""
     values, normal, limits = [], [], []
-    for signal, band in parts:
-        part = _within(signal.time, span)
-        value = signal.values[part, joint]
-        judged = value[signal.status[part, joint] == 0]
-        values.append(judged if len(judged) else value)
+    for course in courses:
+        part = course.within(span)
+        judged = part.value[part.status == 0]
+        values.append(judged if len(judged) else part.value)
         if not len(judged):
-            normal.append(value)
-        lower, upper = band.lower[part, joint], band.upper[part, joint]
-        normal.append(value[(value >= lower) & (value <= upper) & (signal.status[part, joint] == 0)])
-        limits += [lower, upper]
+            normal.append(part.value)
+        normal.append(part.value[(part.value >= part.lower) & (part.value <= part.upper) & (part.status == 0)])
+        limits += [part.lower, part.upper]
     inside, bounds = _finite(values), _finite([*normal, *limits])
     if not len(inside) and not len(bounds):
         return
@@ -95,12 +91,12 @@ def frame_signal(axes: Axes, parts: Iterable[tuple[Signal, Band]], joint: int, s
     axes.set_ylim(low - margin, high + margin)
 
 
-def draw_force(axes: Axes, series: Series, span: Span, *, contact: bool) -> None:
-    """The load cell; without a contact its noise is kept small."""
+def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, contact: bool) -> None:
+    """The load cell (n,) over time (n,) [s]; without a contact its noise is kept small."""
     axes.margins(y=0.06 if contact else 1.2)
-    part = _within(series.time, span)
+    part = (time >= span[0]) & (time <= span[1])
     if part.any():
-        axes.plot(*decimate(series.time[part], series.values[part, 0], _PIXELS), color=FORCE, linewidth=0.9)
+        axes.plot(*decimate(time[part], force[part], _PIXELS), color=FORCE, linewidth=0.9)
 
 
 def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str) -> None:
@@ -189,11 +185,6 @@ def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span,
             zorder=0.5,
         )
         legend.add(reason)
-
-
-def _within(time: FloatArray, span: Span) -> BoolArray:
-    inside: BoolArray = (time >= span[0]) & (time <= span[1])
-    return inside
 
 
 def _finite(parts: Sequence[FloatArray]) -> FloatArray:

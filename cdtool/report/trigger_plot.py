@@ -3,179 +3,173 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from cdtool.evaluation.matching import Match, Matching
-from cdtool.pipeline import Detection
-from cdtool.recording import Contact
-from cdtool.report.figures import drawing, label, new_figure, save, unit_label
-from cdtool.report.panels import Legend, Span, count_from, draw_force, draw_onset, draw_signal, frame_signal
+from cdtool.evaluation.traces import Panel, Seen, Span, Trace
+from cdtool.report.figures import Margins, drawing, label, save, stacked_panels, text_width, unit_label
+from cdtool.report.panels import Legend, count_from, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.style import look_of
-from cdtool.workflows.scoring import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SHORTEST_VIEW, _LONGEST_VIEW = 0.3, 1.2
 _STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One detector and what became of the contact that is shown."""
-
-    detection: Detection
-    matching: Matching
-    match: Match | None
-
-    @property
-    def late(self) -> float:
-        return self.match.latency if self.match and self.match.alarm else math.inf
-
-    @property
-    def joint(self) -> int:
-        alarms = self.detection.verdict.alarms
-        if self.match and self.match.alarm:
-            return self.match.alarm.joint
-        return alarms[0].joint if alarms else self.detection.leading
-
-    @property
-    def trigger(self) -> float | None:
-        """When the trigger rises [s]: the contact's alarm, or the first one of a run without contacts."""
-        if self.match:
-            return self.match.alarm.time if self.match.alarm else None
-        alarms = self.detection.verdict.alarms
-        return alarms[0].time if alarms else None
+_WIDTH = 9.0
+_FORCE, _ROW = 0.98, 0.66
+_NAME_SIZE, _VERDICT_SIZE, _DETAIL_SIZE = 9, 10, 8
+# From the axis to a row's name, with the numbers of its ticks between them; from the axis to a verdict [points].
+_TICKS, _AWAY = 44.0, 8.0
+_LEGEND_COLUMNS, _LEGEND_ROW = 4, 0.18
 
 
 def plot_triggers(trace: Trace, path: Path) -> None:
     """Draw the load cell with the contact's onset, below it a row a detector, the fastest first.
 
-    Of several contacts the first that most detectors noticed is shown. Raises UsageError, CdtoolError (see `save`).
+    Raises UsageError, CdtoolError (see `save`).
     """
     with drawing():
         save(_figure(trace), path)
 
 
 def _figure(trace: Trace) -> Figure:
-    contact = _contact(trace)
-    rows = sorted(_rows(trace, contact), key=lambda row: (row.late, row.match is not None and _blind(row)))
-    recording = trace.operation.recording
-    span = _view(rows, contact, (recording.start, recording.end))
-    forced = "force" in recording and len(recording["force"]) > 0
-    heights = [1.3] * forced + [0.85] * len(rows)
-    figure = new_figure(9.0, 1.4 + sum(heights))
-    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
+    contact = trace.shown
+    rows = sorted(trace.panels, key=lambda row: (_late(trace, row), contact is not None and _blind(trace, row)))
+    forced = len(trace.force) > 0
+    heights = [_FORCE] * forced + [_ROW] * len(rows)
+    figure, panels = stacked_panels(_WIDTH, heights, _margins(trace, rows), gap=0.14)
     legend = Legend(None)
     if forced:
-        draw_force(panels[0], recording["force"], span, contact=contact is not None)
-        _name(panels[0], f"load cell\n[{unit_label(recording['force'].unit)}]")
+        draw_force(panels[0], trace.force_time, trace.force, trace.view, contact=contact is not None)
+        panels[0].locator_params(axis="y", nbins=4)
+        _name(panels[0], "load cell\n[N]")
     for axes, row in zip(panels[int(forced) :], rows, strict=True):
-        _draw_row(axes, row, span, legend)
+        _draw_row(axes, trace, row, trace.view, legend)
     for axes in panels:
         if contact:
             draw_onset(axes, contact.start, legend)
-        axes.set_xlim(span)
+    panels[-1].set_xlim(trace.view)
     panels[-1].set_xlabel("time from contact onset [ms]" if contact else "time [s]")
     if contact:
-        step = next((step for step in _STEPS if (span[1] - span[0]) / step <= 12), _STEPS[-1])
+        step = next((step for step in _STEPS if (trace.view[1] - trace.view[0]) / step <= 12), _STEPS[-1])
         count_from(panels[-1], contact.start, step)
-    figure.align_ylabels()
-    figure.suptitle(_title(trace, contact), fontsize=10, x=0.01, ha="left")
-    figure.legend(handles=legend.handles(), loc="outside lower left", ncols=4)
+    height = figure.get_figheight()
+    figure.text(0.01, 1.0 - 0.06 / height, _title(trace), fontsize=10, ha="left", va="top")
+    figure.legend(handles=legend.handles(), loc="lower left", ncols=_LEGEND_COLUMNS, borderaxespad=0.2)
     return figure
 
 
-def _draw_row(axes: Axes, row: _Row, span: Span, legend: Legend) -> None:
-    detection = row.detection
-    frame_signal(axes, [(detection.statistic, detection.band)], row.joint, span, headroom=1.5)
-    draw_signal(axes, detection, row.joint, span, legend)
+def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
+    """Room for the names at the left, the verdicts at the right, and a legend of as many rows as there may be."""
+    names = [_row_name(trace, row) for row in rows]
+    verdicts = [_verdict(trace, row) for row in rows]
+    verdict = text_width([words for words, _ in verdicts], _VERDICT_SIZE)
+    # Bold letters are wider than those that are measured.
+    right = max(1.2 * verdict, text_width([detail for _, detail in verdicts], _DETAIL_SIZE))
+    left = text_width([*names, "load cell"], _NAME_SIZE) + _TICKS / 72.0
+    kinds = 5 + len({code for row in rows for code in row.course.within(trace.view).status.tolist() if code})
+    return Margins(
+        left + 0.08, right + _AWAY / 72.0 + 0.1, 0.34, 0.52 + _LEGEND_ROW * math.ceil(kinds / _LEGEND_COLUMNS)
+    )
+
+
+def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) -> None:
+    frame_signal(axes, [row.course], span, headroom=1.5)
+    draw_signal(axes, row.course, row.detector, span, legend)
     axes.locator_params(axis="y", nbins=3)
-    colour = look_of(detection.detector).colour
-    if row.trigger is not None:
-        axes.axvspan(row.trigger, span[1], color=colour, alpha=0.25, linewidth=0, zorder=1.5)
-        axes.axvline(row.trigger, color=colour, linewidth=2.2, zorder=4)
+    colour = look_of(row.detector).colour
+    trigger = _trigger(trace, row)
+    if trigger is not None:
+        axes.axvspan(trigger, span[1], color=colour, alpha=0.25, linewidth=0, zorder=1.5)
+        axes.axvline(trigger, color=colour, linewidth=2.2, zorder=4)
         legend.add("trigger")
-    names = detection.statistic.joints
-    joint = f" {label(names[row.joint], 14)}" if len(detection.operation.recording.joints) > 1 else ""
-    _name(axes, f"{label(detection.detector, 24)}\n[{unit_label(detection.statistic.unit)}]{joint}")
-    verdict, detail = _verdict(row)
+    _name(axes, _row_name(trace, row))
+    verdict, detail = _verdict(trace, row)
     axes.annotate(
         verdict,
         (1.0, 0.5),
         xycoords="axes fraction",
-        xytext=(8, 0),
+        xytext=(_AWAY, 0),
         textcoords="offset points",
         va="bottom" if detail else "center",
-        fontsize=10,
+        fontsize=_VERDICT_SIZE,
         fontweight="bold",
     )
     axes.annotate(
         detail,
         (1.0, 0.5),
         xycoords="axes fraction",
-        xytext=(8, -3),
+        xytext=(_AWAY, -3),
         textcoords="offset points",
         va="top",
-        fontsize=8,
+        fontsize=_DETAIL_SIZE,
     )
 
 
-def _verdict(row: _Row) -> tuple[str, str]:
-    verdict = row.detection.verdict
-    if _blind(row):
-        return "not assessable", fill(label(verdict.reason, 66), 24)
-    count = len(row.matching.false_alarms)
+def _seen(trace: Trace, row: Panel) -> Seen | None:
+    return row.seen[trace.contact] if trace.contact >= 0 else None
+
+
+def _late(trace: Trace, row: Panel) -> float:
+    seen = _seen(trace, row)
+    return seen.late if seen and seen.outcome == "detected" else math.inf
+
+
+def _trigger(trace: Trace, row: Panel) -> float | None:
+    """When the trigger rises [s]: the contact's alarm, or the first one of a run without contacts."""
+    seen = _seen(trace, row)
+    if seen:
+        return seen.alarm if seen.outcome == "detected" else None
+    return row.alarms[0] if row.alarms else None
+
+
+def _blind(trace: Trace, row: Panel) -> bool:
+    seen = _seen(trace, row)
+    return seen.outcome == "not_assessable" if seen else row.blind
+
+
+def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
+    seen = _seen(trace, row)
+    if _blind(trace, row):
+        return "not assessable", fill(label((seen.reason if seen else "") or row.reason, 66), 24)
+    count = len(row.false_alarms)
     false = f"{count} false {'alarm' if count == 1 else 'alarms'}" if count else ""
-    if row.match is None:
+    if seen is None:
         return (false or "no alarm"), ""
-    if row.match.alarm:
-        return f"{1e3 * row.late:.0f} ms", false
+    if seen.outcome == "detected":
+        return f"{1e3 * seen.late:.0f} ms", false
     return "missed", false
 
 
-def _blind(row: _Row) -> bool:
-    if row.match:
-        return row.match.outcome == "not_assessable"
-    return row.detection.verdict.outcome == "not assessable"
+def _row_name(trace: Trace, row: Panel) -> str:
+    joint = f" {label(row.joint, 14)}" if trace.joints > 1 else ""
+    return f"{label(row.detector, 24)}\n[{unit_label(row.unit)}]{joint}"
 
 
 def _name(axes: Axes, text: str) -> None:
-    axes.set_ylabel(text, rotation=0, ha="right", va="center", labelpad=6)
+    """Names in one line below each other, whatever the numbers beside them."""
+    axes.annotate(
+        text,
+        (0.0, 0.5),
+        xycoords="axes fraction",
+        xytext=(-_TICKS, 0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=_NAME_SIZE,
+    )
 
 
-def _contact(trace: Trace) -> Contact | None:
-    def noticed(contact: Contact) -> int:
-        return sum(bool(m.alarm) for matching in trace.matchings for m in matching.matches if m.contact == contact)
-
-    return max(trace.contacts, key=noticed, default=None)
-
-
-def _rows(trace: Trace, contact: Contact | None) -> list[_Row]:
-    return [
-        _Row(detection, matching, next((m for m in matching.matches if m.contact == contact), None))
-        for detection, matching in zip(trace.detections, trace.matchings, strict=True)
-    ]
-
-
-def _view(rows: list[_Row], contact: Contact | None, whole: Span) -> Span:
-    if contact is None:
-        return whole
-    latest = max((row.late for row in rows if math.isfinite(row.late)), default=0.0)
-    length = min(max(1.25 * latest, _SHORTEST_VIEW), _LONGEST_VIEW)
-    return max(contact.start - 0.25 * length, whole[0]), min(contact.start + length, whole[1])
-
-
-def _title(trace: Trace, contact: Contact | None) -> str:
-    words = [f"{label(trace.group, 40)}  ·  {label(trace.operation.name, 50)}"]
+def _title(trace: Trace) -> str:
+    words = [f"{label(trace.group, 40)}  ·  {label(trace.recording, 50)}"]
+    contact = trace.shown
     if contact is None:
         words.append("no contact")
     elif len(trace.contacts) > 1:
-        words.append(f"contact {trace.contacts.index(contact) + 1} of {len(trace.contacts)}")
+        words.append(f"contact {trace.contact + 1} of {len(trace.contacts)}")
     if contact and math.isfinite(contact.peak_force):
         words.append(f"peak {contact.peak_force:.0f} N")
     return "  ·  ".join(words)

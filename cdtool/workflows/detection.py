@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from cdtool.activation import Activation
@@ -24,13 +24,15 @@ from cdtool.workflows.runs import check_joints, load_operations
 class Detected:
     """A log, what the detector says of each of its operations, and the contacts where the log has ground truth.
 
-    `matchings` hold each operation's alarms against its contacts, in the order of `detections`.
+    `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `activation` is what
+    raised the alarms.
     """
 
     recording: Recording
     detections: tuple[Detection, ...]
     contacts: tuple[Contact, ...]
     matchings: tuple[Matching, ...]
+    activation: Activation = field(default_factory=Activation)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -84,7 +86,7 @@ def detect(
     matchings = tuple(
         match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window) for item in detections
     )
-    return Detected(recording, detections, contacts, matchings)
+    return Detected(recording, detections, contacts, matchings, activation)
 
 
 def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:

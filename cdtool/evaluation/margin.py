@@ -1,0 +1,140 @@
+"""How far a statistic is from its limits, over time, and how near it came to an alarm.
+
+Conventions: the margin is the distance from the statistic to its nearest limit, in the signal's unit: positive inside,
+negative outside the band. The share of the limit is the safety factor at which the sample would meet its limit, over
+the one that is set: 0 in the middle of the band (what was learned as normal, or 0 for a hand-set limit), 1 at the
+limit, more outside, below 0 where it leans to the side without a limit. So it is the same for bands of one and of two
+sides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.detection import REASONS, Status
+from cdtool.pipeline import Detection
+from cdtool.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The statistic at a time [s] against its nearest limit, both in the signal's unit.
+
+    `margin` and `share` are NaN where the sample could not be judged, and `reason` tells why.
+    """
+
+    time: float
+    statistic: float
+    limit: float
+    margin: float
+    share: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How near a joint came to an alarm: its `nearest` sample, and the `longest` run of samples outside the band.
+
+    `outside_from` [s] is where that run began, NaN without one. `held` is the largest share of the limit that was kept
+    for the whole debounce: with `held` times the safety factor it would have alarmed; NaN where it was never judged for
+    so long. `latched_from` [s]: outside since then, with its crossing before the contact; NaN otherwise.
+    """
+
+    joint: str
+    nearest: Moment
+    longest: int
+    outside_from: float
+    held: float
+    latched_from: float = math.nan
+
+
+@dataclass(frozen=True)
+class JointMargin:
+    """One joint's `margin` [signal's unit] and `share` of the limit, both (n,), NaN where it could not be judged."""
+
+    detection: Detection
+    joint: int
+    margin: FloatArray
+    share: FloatArray
+
+    @property
+    def name(self) -> str:
+        """The joint's name."""
+        return self.detection.statistic.joints[self.joint]
+
+    @property
+    def time(self) -> FloatArray:
+        """(n,) [s]."""
+        return self.detection.statistic.time
+
+    def moment(self, k: int) -> Moment:
+        """Sample k."""
+        statistic, band, j = self.detection.statistic, self.detection.band, self.joint
+        time, value = float(self.time[k]), float(statistic.values[k, j])
+        reason = REASONS.get(int(statistic.status[k, j]), "")
+        if reason:
+            return Moment(time, value, math.nan, math.nan, math.nan, reason)
+        lower, upper = float(band.lower[k, j]), float(band.upper[k, j])
+        limit = upper if upper - value <= value - lower else lower
+        return Moment(time, value, limit, float(self.margin[k]), float(self.share[k]))
+
+    def moments(self, times: Sequence[float]) -> tuple[Moment, ...]:
+        """At each of `times` [s] the last sample so far; in order of time, each sample once."""
+        # An alarm less 5 ms is the sample 5 ms before it, whatever the last bit of the difference is.
+        at = np.searchsorted(self.time, np.asarray(times) + 1e-9, side="right") - 1
+        return tuple(self.moment(int(k)) for k in np.unique(at[at >= 0]))
+
+    def runs(self) -> npt.NDArray[np.int64]:
+        """Runs outside the band, as the activation counts them (r, 3): first and last sample, how many.
+
+        Missing samples do not break a run and do not count.
+        """
+        present = np.flatnonzero(self.detection.statistic.status[:, self.joint] != Status.GAP)
+        outside = np.concatenate(([False], self.margin[present] < 0.0, [False]))
+        edges = np.flatnonzero(np.diff(outside.astype(np.int8)))
+        first, after = edges[::2], edges[1::2]
+        return np.column_stack((present[first], present[after - 1], after - first)).astype(np.int64)
+
+    def approach(self, start: float, end: float, debounce: int) -> Approach | None:
+        """How near it came to an alarm from `start` to `end` [s]; None where it has no limit or was never judged."""
+        first, after = np.searchsorted(self.time, start), np.searchsorted(self.time, end, side="right")
+        margin = self.margin[first:after]
+        if not np.isfinite(margin).any():
+            return None
+        nearest = self.moment(int(first + np.nanargmin(margin)))
+        runs = self.runs()
+        runs = runs[(runs[:, 1] >= first) & (runs[:, 0] < after)]
+        latched = math.nan
+        if len(runs) and np.count_nonzero(self.margin[runs[0, 0] : first] < 0.0) >= debounce:
+            latched = float(self.time[runs[0, 0]])
+            runs = runs[1:]
+        longest, since = 0, math.nan
+        if len(runs):
+            best = runs[int(np.argmax(runs[:, 2]))]
+            longest, since = int(best[2]), float(self.time[best[0]])
+        present = self.detection.statistic.status[first:after, self.joint] != Status.GAP
+        return Approach(self.name, nearest, longest, since, _held(self.share[first:after][present], debounce), latched)
+
+
+def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
+    """The margin of every column of a detection's statistic. Without a threshold the share of the limit is NaN."""
+    statistic, band = detection.statistic, detection.band
+    share = np.full(statistic.values.shape, np.nan)
+    if detection.threshold is not None:
+        share = detection.exceedance() / detection.threshold.safety_factor
+    margin = np.minimum(band.upper - statistic.values, statistic.values - band.lower)
+    margin, share = (np.where(statistic.valid, item, np.nan) for item in (margin, share))
+    return tuple(JointMargin(detection, j, margin[:, j], share[:, j]) for j in range(margin.shape[1]))
+
+
+def _held(share: FloatArray, debounce: int) -> float:
+    """The largest share that `debounce` samples in succession all had; one that was not judged (NaN) breaks them."""
+    if len(share) < debounce:
+        return math.nan
+    least = np.lib.stride_tricks.sliding_window_view(share, debounce).min(axis=1)
+    return math.nan if np.isnan(least).all() else float(np.nanmax(least))

@@ -1,0 +1,137 @@
+"""Which channel moved first: a diagnosis after the fact, for people.
+
+Conventions: it looks at the recording before and after the event; no detector, no threshold and no latency depends on
+it. Times are seconds on the recording's own clock. The load cell and labels are never looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cdtool.detection import WHOLE_MACHINE
+from cdtool.errors import UsageError, nearest
+from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
+
+# What is asked of the machine. The reference torque is none: it is a controller's output and answers a contact.
+COMMANDS = ("reference_position", "reference_speed")
+
+# How far ahead of its line a channel is tried before the event [s]: the further, the less it keeps to it.
+_AHEAD = (0.05, 0.1, 0.2)
+# Noises off its line at which a channel has moved, and to which the movement is followed back.
+_MOVED, _BACK_TO = 6.0, 2.0
+_SUCCESSION = 3
+_ENOUGH = 10
+# A standard deviation from the median absolute deviation of Gaussian noise, and of rounding to a step of 1.
+_MAD, _ROUNDING = 1.4826, 1.0 / math.sqrt(12.0)
+# Rounding errors of computed values: below this share of the channel's size nothing has moved.
+_SMALLEST = 1e-9
+
+
+@dataclass(frozen=True)
+class Movement:
+    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason."""
+
+    channel: str
+    joint: str
+    time: float
+    direction: Literal["up", "down", ""] = ""
+    reason: str = ""
+
+
+def which_moved_first(
+    recording: Recording, joint: str, around: float, *, before: float = 0.5, lead: float = 0.05, after: float = 0.5
+) -> tuple[Movement, ...]:
+    """The measured and reference channels of a joint in the order in which they moved, those that did not behind them.
+
+    A channel moves at the first of 3 samples in succession more than 6 noises off the straight line through its
+    `before` seconds up to `around - lead`, followed back to 2 noises; it is looked for until `around + after` [s]. The
+    noise is how far the channel usually was off such a line, as far ahead of it (at most 0.2 s), in those seconds: a
+    median absolute deviation, and at least the rounding of a quantised channel. `joint` may be the whole machine. Fails
+    where a channel swings slowly, or where the motion changed within the second before; a channel that is filtered
+    moves late. Raises UsageError for an unknown joint.
+    """
+    names = recording.joints if (joint,) == WHOLE_MACHINE else (joint,)
+    for name in names:
+        if name not in recording.joints:
+            raise UsageError(f"{recording.name}: unknown joint '{name}'", nearest(name, recording.joints))
+    begin = around - lead
+    found = []
+    for channel in (*MEASURED, *REFERENCES):
+        if channel not in recording:
+            continue
+        series = recording[channel].between(begin - 2.0 * before - _AHEAD[-1], around + after)
+        for name in names:
+            column = series.values[:, recording.joints.index(name)]
+            present = np.isfinite(column)
+            found.append(_movement(channel, name, series.time[present], column[present], begin, before))
+    return tuple(sorted(found, key=lambda item: (math.isnan(item.time), item.time)))
+
+
+def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, begin: float, before: float) -> Movement:
+    off = _off_line(time, value, np.full(len(time), begin), before)
+    quiet = (time >= begin - before) & (time <= begin)
+    # A log that begins shortly before the event has nothing to try: then the line's own residuals have to do.
+    usual = [_usual(_off_line(time, value, time - ahead, before)[quiet], off[quiet]) for ahead in _AHEAD]
+    later = np.flatnonzero(time > begin)
+    if len(later) < _SUCCESSION or not np.isfinite([*usual, *off[later]]).all():
+        return Movement(channel, joint, math.nan, reason="too few samples")
+    least = max(_ROUNDING * _step(value[time <= begin]), _SMALLEST * float(np.abs(value).max()))
+    noise = np.maximum(np.interp(time[later] - begin, _AHEAD, usual), least)
+    off = off[later]
+    outside = np.abs(off) > _MOVED * noise
+    run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
+    if not run.any():
+        return Movement(channel, joint, math.nan, reason="within its usual range")
+    first = int(np.argmax(run))
+    upward = bool(off[first] > 0.0)
+    calm = np.flatnonzero((off if upward else -off)[:first] <= _BACK_TO * noise[:first])
+    start = int(calm[-1]) + 1 if len(calm) else 0
+    return Movement(channel, joint, float(time[later[start]]), "up" if upward else "down")
+
+
+def _usual(tried: FloatArray, residuals: FloatArray) -> float:
+    """How far a channel usually is off its line: a standard deviation; NaN with too few samples."""
+    for off in (tried, residuals):
+        known = off[np.isfinite(off)]
+        if len(known) >= _ENOUGH:
+            return _MAD * float(np.median(np.abs(known)))
+    return math.nan
+
+
+def _off_line(time: FloatArray, value: FloatArray, ends: FloatArray, length: float) -> FloatArray:
+    """For each sample its distance from the least-squares line through the `length` seconds up to its entry of `ends`.
+
+    NaN where that stretch holds too few samples, or less than half of its length.
+    """
+    if not len(time):
+        return np.empty(0)
+    # Sums from the first sample on, about it and about the mean: so they keep their digits at any time and offset.
+    t, v = time - time[0], value - value.mean()
+    first = np.searchsorted(time, ends - length, side="left")
+    after = np.searchsorted(time, ends, side="right")
+    count = (after - first).astype(np.float64)
+
+    def total(terms: FloatArray) -> FloatArray:
+        sums = np.concatenate(([0.0], np.cumsum(terms)))
+        difference: FloatArray = sums[after] - sums[first]
+        return difference
+
+    held = time[np.maximum(after, 1) - 1] - time[np.minimum(first, len(time) - 1)]
+    enough = (count >= _ENOUGH) & (held >= 0.5 * length)
+    count = np.maximum(count, 1.0)
+    mean_t, mean_v = total(t) / count, total(v) / count
+    variance = total(t * t) / count - mean_t**2
+    covariance = total(t * v) / count - mean_t * mean_v
+    slope = np.divide(covariance, variance, out=np.zeros(len(t)), where=enough)
+    return np.where(enough, v - mean_v - slope * (t - mean_t), np.nan)
+
+
+def _step(value: FloatArray) -> float:
+    """The smallest step between samples, that of a quantised channel; 0 for a channel that does not change."""
+    steps = np.abs(np.diff(value))
+    steps = steps[steps > _SMALLEST * np.abs(value).max(initial=0.0)]
+    return float(steps.min()) if len(steps) else 0.0

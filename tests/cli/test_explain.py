@@ -1,0 +1,195 @@
+"""`cdtool explain` as a user meets it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from tests.command import Outcome, cdtool
+
+GATE = Path(__file__).parents[2] / "sample_logs" / "gate"
+
+
+@pytest.fixture
+def explain(gate_folder: Path) -> Callable[..., Outcome]:
+    def run(log: str, *arguments: object) -> Outcome:
+        return cdtool("explain", gate_folder / log, "-m", gate_folder / "machine.toml", *arguments)
+
+    return run
+
+
+def margins(text: str) -> list[list[float]]:
+    """The rows of numbers of the tables that are printed."""
+    rows = [line.split() for line in text.splitlines()]
+    return [[float(cell) for cell in row] for row in rows if row and all(is_number(cell) for cell in row)]
+
+
+def is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def test_the_help_holds_an_example():
+    done = cdtool("explain", "--help")
+    assert done.status == 0 and "Example: cdtool explain" in done.out
+
+
+def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_first(explain, feekf_signature, tmp_path):
+    plot = tmp_path / "why.svg"
+    done = explain("stiff/01.csv", "-s", feekf_signature, "--plot", plot)
+    assert done.status == 0 and done.err == ""
+    told = " ".join(done.out.split())
+    assert "ms after the contact (onset at" in told and "load cell)" in told
+    assert "gate: above its upper limit" in told and "needs 9 samples outside in succession" in told
+    assert "Moved first: acceleration down" in told
+    assert "Within their usual range: reference_position, reference_speed." in told
+    rows = margins(done.out)
+    assert [row[1] for row in rows if row[0] != 0.0] == pytest.approx([-100, -50, -20, -10, -5, 0])
+    for _, _, signal, limit, margin, share in rows:
+        assert margin == pytest.approx(limit - signal, abs=1.1)  # four digits of each are printed
+        assert (margin < 0.0) == (share > 100.0)
+    assert max(map(len, done.out.splitlines())) <= 100
+    assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
+
+
+def test_a_missed_contact_is_told_with_how_near_it_came(explain):
+    done = explain("soft/02.csv", "-d", "pi", "--limit", "30")
+    told = " ".join(done.out.split())
+    assert done.status == 0
+    assert "missed: no alarm in the 1000 ms that were watched" in told
+    assert "from its limit of" in told and "For 9 samples in succession it stood at" in told
+    assert "The first that pure_inertia reads: acceleration" in told
+    assert max(map(len, done.out.splitlines())) <= 100
+
+
+def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
+    done = explain("holdout/01.csv", "-d", "gm", "--limit", "100")
+    told = " ".join(done.out.split())
+    assert done.status == 0
+    assert "false alarm at" in told and "no contact belongs to it" in told
+    assert "The command moved first" in told
+    assert "from onset" not in told and "to alarm" in told
+
+
+def test_a_quiet_log_says_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
+    done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
+    assert done.status == 0 and "no alarm, and no contact without one" in " ".join(done.out.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
+    done = explain("soft/01.csv", "-d", "pi", "--limit", "30", "--json")
+    values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
+    (missed,) = values["missed"]
+    assert values["alarms"] == [] and values["verdicts"][0]["verdict"] == "no alarm"
+    near = missed["joints"][0]
+    assert missed["outcome"] == "missed" and missed["debounce_samples"] == 9
+    assert near["nearest"]["margin"] == pytest.approx(30.0 - abs(near["nearest"]["statistic"]))
+    assert near["nearest"]["share_of_limit"] == pytest.approx(abs(near["nearest"]["statistic"]) / 30.0)
+    assert near["outside_before_contact_from_s"] is None
+    still = [item for item in missed["moved"] if item["time_s"] is None]
+    assert {item["reason"] for item in still} == {"within its usual range"}
+
+
+def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_folder):
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    machine = ("-m", gate_folder / "machine.toml", "-s", feekf_signature, "--json")
+    (detected,) = json.loads(cdtool("detect", gate_folder / "stiff/01.csv", *machine).out)
+    for key in ("time_s", "joint", "side", "statistic", "limit"):
+        assert alarm[key] == detected["alarms"][0][key]
+    assert alarm["onset_s"] == detected["contacts"][0]["onset_s"] and alarm["role"] == "detection"
+    assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(0.008)
+
+
+def test_the_debounce_that_is_given_is_the_one_that_is_told(explain):
+    for debounce in (1, 4):
+        done = explain("stiff/01.csv", "-d", "gm", "--limit", "250", "--debounce", debounce, "--json")
+        (alarm,) = json.loads(done.out)["alarms"]
+        assert alarm["debounce_samples"] == debounce
+        assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(1e-3 * (debounce - 1))
+
+
+def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
+    done = explain("stiff/01.csv", "-d", "gm", "--limit", "100", "--plot", tmp_path)
+    events = done.out.count(", momentum: ")
+    assert events >= 2
+    assert [path.name for path in sorted(tmp_path.iterdir())] == [f"{i:03d}_01.png" for i in range(1, events + 1)]
+
+
+def test_an_arm_is_explained_joint_by_joint():
+    arm = GATE.parent / "arm" / "trial_1"
+    done = cdtool("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm", "--limit", "4", "--json")
+    (alarm,) = json.loads(done.out)["alarms"]
+    assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
+    assert alarm["moved"][0]["channel"] == "acceleration"
+    assert "position" in alarm["detector_reads"]  # the model of coupled links needs the pose
+
+
+@pytest.mark.parametrize(
+    ("log", "arguments", "words"),
+    [
+        ("stiff/01.csv", ("--limit", "250"), ("a limit belongs to a detector",)),
+        ("stiff/01.csv", ("-d", "gm"), ("a signature or a limit",)),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
+        ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--plot", "why.gif"), ("why.gif", ".svg")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "at least 1")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
+        ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(explain, log, arguments, words):
+    done = explain(log, *arguments)
+    assert done.status == 2 and done.out == ""
+    assert done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
+    assert all(word in done.err for word in words), done.err
+
+
+def test_a_log_of_which_a_part_is_lost_is_explained_and_ends_with_3(gate_folder, feekf_signature, tmp_path):
+    half = tmp_path / "half.csv"
+    half.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes()[:-20])
+    done = cdtool("explain", half, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    assert done.status == 3 and "alarm at" in done.out and "last line" in done.err
+
+
+def test_names_from_files_cannot_command_the_terminal(explain, gate_folder, tmp_path):
+    evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
+    evil.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes())
+    done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", "250")
+    assert done.status == 0 and "\x1b" not in done.out and "\u202e" not in done.out
+
+
+def test_the_same_explanation_comes_from_python(gate_folder, feekf_signature, explain):
+    from cdtool.evaluation.explanation_words import words
+
+    explained = api.explain(gate_folder / "stiff/01.csv", gate_folder / "machine.toml", signature=feekf_signature)
+    ((_, event),) = explained.events
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    assert alarm["words"] == words(event) and alarm["time_s"] == event.alarm.time
+
+
+def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypatch):
+    root = GATE.parents[1]
+    page = (root / "docs" / "explain.md").read_text(encoding="utf-8")
+    (tmp_path / "sample_logs").symlink_to(root / "sample_logs")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```(?:sh|text)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 6
+    for commands, shown in zip(blocks[::2], blocks[1::2], strict=True):
+        for line in commands.splitlines():
+            words = [[*sorted(Path().glob(word))] if "*" in word else [word] for word in shlex.split(line)]
+            done = cdtool(*itertools.chain(*words[1:]))
+            assert done.status == 0, done.err
+        printed = [line.rstrip() for line in done.out.split("\nplot written")[0].rstrip().splitlines()]
+        assert printed == shown.splitlines()
