@@ -1,0 +1,55 @@
+"""`cdtool score`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from cdtool.cli.console import plain, print_skipped, progress
+from cdtool.cli.options import JobsOption, JsonOption, OutputOption
+from cdtool.cli.summary_table import finish, show_limits, show_table
+
+
+def score(
+    triggers: Annotated[
+        Path, typer.Argument(help="CSV with recording, time_s and, if several, detector.", metavar="TRIGGERS")
+    ],
+    benchmark: Annotated[
+        Path, typer.Option("--benchmark", "-b", help="Benchmark file: the recordings, their contacts, the rules.")
+    ],
+    output: OutputOption = None,
+    clock: Annotated[
+        Literal["recording", "source"],
+        typer.Option("--clock", help="Trigger times on the recording's clock as cdtool shows it, or the source's."),
+    ] = "recording",
+    listed_only: Annotated[
+        bool, typer.Option("--listed-only", help="Leave recordings out that have no row; else: watched, no alarm.")
+    ] = False,
+    jobs: JobsOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Score the trigger times of any controller or program in the way of cdtool benchmark.
+
+    Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
+    """
+    from cdtool.evaluation.results_file import to_json
+    from cdtool.report.outputs import Report, check_outputs, write_outputs
+    from cdtool.workflows.score_triggers import score as run
+
+    targets = output or []
+    check_outputs(targets)
+    with progress("scoring") as advance:
+        done = run(triggers, benchmark, clock=clock, listed_only=listed_only, jobs=jobs, progress=advance)
+    results = done.evaluated.results
+    written = write_outputs(Report(done.evaluated, done.traces), targets)
+    print_skipped(results.skipped, results.findings)
+    if as_json:
+        typer.echo(to_json(results), nl=False)
+    else:
+        show_table(done.evaluated)
+        show_limits(done.evaluated)
+        for path in written:
+            typer.echo(f"written: {plain(path)}")
+    finish(done.evaluated)

@@ -1,0 +1,133 @@
+"""The figures of a benchmark in the terminal, what became of its limits, and the exit status that follows."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cdtool.cli.console import leave, number, plain, table
+from cdtool.errors import ExitStatus
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.evaluated import Evaluated
+    from cdtool.evaluation.interval import Interval
+    from cdtool.evaluation.statistics import Summary
+
+_SHOWN = 10
+
+
+def show_table(evaluated: Evaluated) -> None:
+    """The thesis's table 5.1 for each group, with what its figures have to be read beside."""
+    columns = [("group", "left"), ("detector", "left")]
+    names = (
+        "mean ms\n(95 %)",
+        "std\nms",
+        "median ms\n(95 %)",
+        "P95\nms",
+        "n",
+        "missed",
+        "n.a.",
+        "false\nalarms",
+        "ops",
+    )
+    columns += [(name, "right") for name in names]
+    table(columns, [_row(item) for item in evaluated.summaries])
+    provenance = evaluated.results.provenance
+    typer.echo("latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable;")
+    typer.echo(f"median and P95 count missed contacts; ops: operations scored; onset: {plain(provenance.get('onset'))}")
+    if provenance.get("watched_joints"):
+        typer.echo(f"joints watched, of all: {plain(provenance['watched_joints'])}")
+    for item in evaluated.results.calibration:
+        typer.echo(
+            f"{plain(item.detector)}: safety factor {item.safety_factor:.3g} for a budget of {plain(item.budget)}: "
+            f"{item.alarms} false alarms in {item.operations} operations ({item.hours:.3g} h) that it was set on"
+        )
+    _show_bounds(evaluated)
+    _show_forces(evaluated.results)
+
+
+def show_limits(evaluated: Evaluated) -> None:
+    """One line for each limit that is not kept, and how many are."""
+    limits = evaluated.results.limits
+    if not limits:
+        return
+    failed = [item for item in limits if item.outcome != "kept"]
+    for item in failed[:_SHOWN]:
+        name = f"{item.detector}.{item.group}.{item.figure}"
+        typer.echo(f"limit {item.outcome}: {plain(name)}: {plain(item.reason)} (limit {plain(item.limit)})")
+    if len(failed) > _SHOWN:
+        typer.echo(f"limit broken: and {len(failed) - _SHOWN} more")
+    typer.echo(f"limits: {len(limits) - len(failed)} of {len(limits)} kept")
+
+
+def finish(evaluated: Evaluated) -> None:
+    """End with 1 where a limit is not kept, else with 3 where something was left out."""
+    if any(item.outcome != "kept" for item in evaluated.results.limits):
+        raise typer.Exit(ExitStatus.LIMIT_BROKEN)
+    leave(evaluated.results.skipped)
+
+
+def _row(item: Summary) -> tuple[Any, ...]:
+    if not item.contacts:
+        return item.group, item.detector, *(("-",) * 7), item.false_alarms, item.operations
+    return (
+        item.group,
+        item.detector,
+        interval(item.mean),
+        number(item.std.value, 2),
+        interval(item.median),
+        quantile(item.p95.value),
+        item.detected,
+        item.missed,
+        item.not_assessable,
+        item.false_alarms,
+        item.operations,
+    )
+
+
+def interval(item: Interval) -> str:
+    """A figure with its interval, as 38.2 (36.0 to 41.1)."""
+    if not math.isfinite(item.value):
+        return quantile(item.value)
+    if math.isnan(item.low) or math.isnan(item.high):
+        return number(item.value)
+    above = "..." if item.high == math.inf else number(item.high)
+    return f"{number(item.value)} ({number(item.low)} to {above})"
+
+
+def quantile(value: float) -> str:
+    """A quantile; infinite where too many contacts were missed to reach it."""
+    return "not reached" if value == math.inf else number(value)
+
+
+def _show_bounds(evaluated: Evaluated) -> None:
+    """What few contacts and short hours do not show: the bounds of each group's rarest events."""
+    for group in evaluated.results.groups:
+        items = [item for item in evaluated.summaries if item.group == group]
+        clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
+        if clean:
+            least = max(item.missed_at_most for item in clean)
+            names = ", ".join(item.detector for item in clean)
+            typer.echo(f"{plain(group)}: 0 missed ({plain(names)}) means at most {100.0 * least:.2g} % (95 %)")
+        quiet = [item for item in items if not item.contacts and not item.false_alarms and item.operations]
+        if quiet:
+            rate = max(item.at_most_per_operation for item in quiet)
+            names = ", ".join(item.detector for item in quiet)
+            typer.echo(f"{plain(group)}: 0 false alarms ({plain(names)}) means at most {rate:.2g} an operation (95 %)")
+
+
+def _show_forces(results: Any) -> None:
+    rows = [(f"{item.group}, point {item.point}", item) for item in results.points]
+    counted: dict[tuple[str, str], list[str]] = {}
+    for item in results.forces:
+        counted.setdefault((item.group, item.profile), []).append(item.verdict)
+    for (group, profile), verdicts in counted.items():
+        counts = ", ".join(f"{verdicts.count(word)} {word}" for word in ("pass", "fail", "not assessable"))
+        typer.echo(f"force, {plain(group)}, {plain(profile)}: {counts}")
+    for where, item in rows:
+        reason = f": {item.reason}" if item.reason else ""
+        typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {item.verdict} ({plain(item.note)}){plain(reason)}")
+    if results.forces:
+        typer.echo("force verdicts are evidence about recordings, not a certificate")
