@@ -1,6 +1,6 @@
 """How often do the intervals of the evaluation hold the true figure? Each should in 95 of 100 tests.
 
-python benchmarks/coverage.py [repetitions]
+python benchmarks/interval_coverage.py [repetitions]
 
 The exact intervals (missed share, false-alarm rate) are enumerated: no chance in it. The others are simulated on
 latencies whose true figures are known. Seeded by row, so the figures do not depend on the number of cores.

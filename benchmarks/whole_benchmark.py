@@ -15,7 +15,7 @@ from time import perf_counter
 
 from timing import environment, table
 
-from cdtool.report.outputs import write_outputs
+from cdtool.report.outputs import Report, write_outputs
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.workflows.benchmark import Benchmark, benchmark
 
@@ -36,7 +36,7 @@ def measure(jobs: int) -> None:
             begin = perf_counter()
             done = benchmark(logs / "benchmark.toml", jobs=jobs)
             reported = perf_counter()
-            write_outputs(done, [_new_folder(Path(folder), number)])
+            write_outputs(Report(done.evaluated, done.traces), [_new_folder(Path(folder), number)])
             end = perf_counter()
             rows.append(_row(number, end - begin, reported - begin, end - reported, done))
         print(f"{size:.0f} MB of CSV, {len(done.results.detectors)} detectors, {jobs} job(s)\n")

@@ -7,7 +7,7 @@ campaigns) are flipped or exchanged as a whole, since the contacts of one are no
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,9 @@ from cdtool.evaluation.clusters import Clusters, IntArray, clusters_of
 from cdtool.evaluation.interval import Interval, check_level
 from cdtool.evaluation.rates import check_count
 from cdtool.recording import FloatArray
+
+# Up to so many clusters every sign pattern is tried.
+MOST_ENUMERATED = 13
 
 
 @dataclass(frozen=True)
@@ -55,18 +58,8 @@ def paired_difference(
     from scipy import stats
 
     sums = groups.sums(groups.values)
-    flipped = stats.permutation_test(
-        (sums,),
-        _sum,
-        permutation_type="samples",
-        vectorized=True,
-        n_resamples=RESAMPLES,
-        batch=max(1, BATCH // k),
-        axis=-1,
-        rng=np.random.default_rng(seed),
-    )
     signed_rank = float(stats.wilcoxon(sums / groups.counts).pvalue) if np.any(sums) else 1.0
-    return Difference(mean, float(flipped.pvalue), signed_rank, n, k)
+    return Difference(mean, _flipped_p(sums, seed), signed_rank, n, k)
 
 
 def unpaired_difference(
@@ -184,5 +177,32 @@ def _means(groups: Clusters) -> FloatArray:
     return np.asarray(groups.sums(groups.values) / groups.counts)
 
 
-def _sum(values: FloatArray, axis: int) -> FloatArray:
-    return np.asarray(values.sum(axis))
+def _flipped_p(sums: FloatArray, seed: int) -> float:
+    """Sign-flip test of sums (k,) by cluster, two-sided.
+
+    By itself rather than scipy's permutation test: a product with signs is ten times as fast with thousands of them.
+    """
+    k, observed = len(sums), float(sums.sum())
+    # Equal sums come out in another order of addition: what differs by rounding alone is as far out.
+    slack = 1e-12 * float(np.abs(sums).sum())
+    below = above = 0
+    for signs in _all_signs(k) if k <= MOST_ENUMERATED else _drawn_signs(k, seed):
+        flipped = signs @ sums
+        below += int(np.count_nonzero(flipped <= observed + slack))
+        above += int(np.count_nonzero(flipped >= observed - slack))
+    least = min(below, above)
+    share = least / 2**k if k <= MOST_ENUMERATED else (least + 1) / (RESAMPLES + 1)
+    return min(1.0, 2.0 * share)
+
+
+def _all_signs(k: int) -> Iterator[FloatArray]:
+    bits = (np.arange(2**k)[:, np.newaxis] >> np.arange(k)) & 1
+    yield (1 - 2 * bits).astype(np.float64)
+
+
+def _drawn_signs(k: int, seed: int) -> Iterator[FloatArray]:
+    rng = np.random.default_rng(seed)
+    batch = max(1, BATCH // k)
+    for first in range(0, RESAMPLES, batch):
+        bits = rng.integers(0, 2, (min(batch, RESAMPLES - first), k), dtype=np.int8)
+        yield (1 - 2 * bits).astype(np.float64)
