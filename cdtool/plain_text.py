@@ -11,7 +11,10 @@ _NONCHARACTERS = frozenset("\ufffe\uffff")
 
 def plain(text: object) -> str:
     """Text without control characters or direction marks that a terminal or a page would obey; "?" in their place."""
-    return "".join("?" if _is_active(character) else character for character in str(text))
+    given = str(text)
+    if given.isprintable():  # nothing in it is active: the common case, and much faster
+        return given
+    return "".join("?" if _is_active(character) else character for character in given)
 
 
 def shorten(text: str, length: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,7 @@ import typer
 from cdtool.errors import CdtoolError, ExitStatus
 from cdtool.evaluation.results import Skipped
 from cdtool.plain_text import plain as plain
+from cdtool.strict_json import strict_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -31,7 +31,7 @@ def print_error(fault: CdtoolError) -> None:
 
 def print_json(value: Any) -> None:
     """Strict JSON on stdout; NaN and infinity are null."""
-    typer.echo(json.dumps(_strict(value), indent=1, ensure_ascii=False, allow_nan=False))
+    typer.echo(strict_json(value))
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = ()) -> None:
@@ -96,13 +96,3 @@ def progress(what: str) -> Iterator[Progress | None]:
 
 def _without_name(item: Skipped) -> str:
     return item.reason.removeprefix(f"{item.recording}: ")
-
-
-def _strict(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(key): _strict(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_strict(item) for item in value]
-    return value

@@ -148,6 +148,7 @@ class SweepResult:
     not_assessable: int = meant("contacts")
     mean_ms: float | None = meant("latency of the detected contacts")
     median_ms: float | None = meant("of the latency, missed contacts taken as censored; null where it is not reached")
+    in_use: bool = meant("the benchmark's own limits", default=False)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import types
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
@@ -13,13 +12,14 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
+from cdtool.strict_json import strict_json
 
 Row = TypeVar("Row")
 
 
 def to_json(results: Results) -> str:
-    """Strict JSON: null where there is no figure."""
-    return json.dumps(_finite(asdict(results)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    """Strict JSON: null where there is no figure; characters that a terminal would obey are escaped."""
+    return strict_json(asdict(results)) + "\n"
 
 
 def read_results(path: Path) -> Results:
@@ -93,13 +93,3 @@ def _no_results(path: Path, why: str) -> RecordingError:
 
 def _refuse(name: str) -> float:
     raise ValueError(f"{name} is no JSON")
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value

@@ -24,7 +24,8 @@ class Summary:
     """Latency [ms] over the contacts, shares, rates, and the counts to read them with; intervals at 95 %.
 
     `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. `missed_share`
-    is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and `peak_force` [N] are medians of the detected contacts.
+    is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
+    `peak_force` [N] are medians of the detected contacts.
     """
 
     detector: str

@@ -20,6 +20,7 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.evaluation.traces import Course, Panel, Seen, Trace
 from cdtool.recording import Contact, FloatArray
+from cdtool.strict_json import finite, strict_json
 
 SCHEMA_VERSION = 1
 NO_LIMIT = 1_000_000_000
@@ -37,8 +38,7 @@ def traces_path(results: Path) -> Path:
 def encode_traces(traces: Sequence[Trace]) -> bytes:
     """All traces as gzipped JSON; the same bytes for the same traces."""
     values = {"schema_version": SCHEMA_VERSION, "traces": [trace_values(trace) for trace in traces]}
-    text = json.dumps(values, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    return gzip.compress(text.encode("utf-8", "replace"), compresslevel=6, mtime=0)
+    return gzip.compress(strict_json(values, compact=True).encode("utf-8"), compresslevel=6, mtime=0)
 
 
 def read_traces(path: Path) -> tuple[Trace, ...]:
@@ -63,7 +63,7 @@ def trace_values(trace: Trace) -> dict[str, Any]:
         "group": trace.group,
         "start": trace.start,
         "end": trace.end,
-        "contacts": [_finite(asdict(contact)) for contact in trace.contacts],
+        "contacts": [finite(asdict(contact)) for contact in trace.contacts],
         "contact": trace.contact,
         "view": list(trace.view),
         "joints": trace.joints,
@@ -83,7 +83,7 @@ def _panel_values(panel: Panel, start: float) -> dict[str, Any]:
         "joint": panel.joint,
         "verdict": panel.verdict,
         "reason": panel.reason,
-        "seen": [_finite(asdict(seen)) for seen in panel.seen],
+        "seen": [finite(asdict(seen)) for seen in panel.seen],
         "alarms": list(panel.alarms),
         "false_alarms": list(panel.false_alarms),
         "why": list(panel.why),
@@ -153,12 +153,6 @@ def _decoded(values: dict[str, Any]) -> FloatArray:
     return np.where(np.abs(numbers) == NO_LIMIT, np.copysign(np.inf, numbers), decoded)
 
 
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: None if isinstance(item, float) and not math.isfinite(item) else item for key, item in values.items()
-    }
-
-
 def _numbers(values: dict[str, Any]) -> dict[str, Any]:
-    """The inverse of `_finite`: every null of a contact or an outcome is a number that is not known."""
+    """The inverse of `finite`: every null of a contact or an outcome is a number that is not known."""
     return {key: math.nan if item is None else item for key, item in values.items()}

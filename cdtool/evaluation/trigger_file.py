@@ -6,16 +6,13 @@ alarm. A row without a time: watched, no alarm. A row with blind_until_s: from t
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
-from cdtool.errors import ConfigurationError, nearest
-
-_COLUMNS = ("recording", "time_s", "detector", "blind_until_s")
+from cdtool.errors import ConfigurationError
+from cdtool.evaluation.named_rows import NamedRow, by_recording, read_named_rows
 
 
 @dataclass
@@ -28,69 +25,46 @@ class Triggered:
 
 @dataclass(frozen=True)
 class TriggerFile:
-    """The rows of a trigger file by detector and recording."""
+    """The rows of a trigger file by detector and recording, as the file names them."""
 
     path: Path
-    rows: dict[str, dict[str, Triggered]]
+    rows: Mapping[str, Mapping[str, Triggered]]
     digest: str
 
-    def of(self, detector: str, recording: str) -> Triggered | None:
-        """What a detector said of a recording, by its path or its file's name; None where no row names it."""
-        by_name = self.rows[detector]
-        return by_name.get(recording) or by_name.get(PurePosixPath(recording).name)
+    def assigned(self, recordings: Collection[str]) -> tuple[dict[str, dict[str, Triggered]], list[str]]:
+        """What each detector said of each of the recordings, and the names that mean none of them.
+
+        Raises ConfigurationError where a file's name alone fits several.
+        """
+        meant = by_recording(self.path, {name for by_name in self.rows.values() for name in by_name}, recordings)
+        said: dict[str, dict[str, Triggered]] = {}
+        for detector, by_name in self.rows.items():
+            of_detector = said.setdefault(detector, {})
+            for name, item in by_name.items():
+                recording = meant[name]
+                if recording is not None:
+                    both = of_detector.setdefault(recording, Triggered())
+                    both.alarms += item.alarms
+                    both.blind += item.blind
+        return said, sorted(name for name, recording in meant.items() if recording is None)
 
 
 def read_triggers(path: Path) -> TriggerFile:
     """Read and check a trigger file; raises ConfigurationError with the line."""
-    try:
-        content = path.read_bytes()
-        reader = csv.DictReader(content.decode("utf-8-sig").splitlines(), strict=True)
-        names = [name.strip() for name in reader.fieldnames or ()]
-        reader.fieldnames = names
-        _check_columns(path, names)
-        rows: dict[str, dict[str, Triggered]] = {}
-        for row in reader:
-            _take(path, reader.line_num, row, rows)
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise ConfigurationError(f"{path}: no trigger file: {fault}", "a UTF-8 CSV file is needed") from fault
+    rows: dict[str, dict[str, Triggered]] = {}
+    for row in read_named_rows(path, ("recording", "time_s"), ("detector", "blind_until_s"), "trigger"):
+        by_name = rows.setdefault(row.text("detector") or path.stem, {})
+        _take(row, by_name.setdefault(row.recording, Triggered()))
     if not rows:
         raise ConfigurationError(f"{path}: holds no row", "write one a trigger; an empty time_s: watched, no alarm")
-    return TriggerFile(path, rows, hashlib.sha256(content).hexdigest())
+    return TriggerFile(path, rows, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
-def _check_columns(path: Path, names: Sequence[str]) -> None:
-    for name in names:
-        if name not in _COLUMNS:
-            raise ConfigurationError(f"{path} line 1: unknown column '{name}'", nearest(name, _COLUMNS))
-    for name in _COLUMNS[:2]:
-        if name not in names:
-            raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"known: {', '.join(_COLUMNS)}")
-
-
-def _take(path: Path, line: int, row: Mapping[str, str | None], rows: dict[str, dict[str, Triggered]]) -> None:
-    recording = (row["recording"] or "").strip().replace("\\", "/")
-    if not recording:
-        raise ConfigurationError(f"{path} line {line}: no recording is named", "write its path in column recording")
-    detector = (row.get("detector") or "").strip() or path.stem
-    said = rows.setdefault(detector, {}).setdefault(recording, Triggered())
-    time, until = (_seconds(path, line, name, row.get(name)) for name in ("time_s", "blind_until_s"))
+def _take(row: NamedRow, said: Triggered) -> None:
+    time, until = row.seconds("time_s"), row.seconds("blind_until_s")
     if until is not None:
         if time is None or until < time:
-            raise ConfigurationError(
-                f"{path} line {line}: blind from {time} until {until}", "time_s is the begin, and comes first"
-            )
+            raise row.fault(f"blind from {time} until {until}", "time_s is the begin, and comes first")
         said.blind.append((time, until))
     elif time is not None:
         said.alarms.append(time)
-
-
-def _seconds(path: Path, line: int, name: str, text: str | None) -> float | None:
-    if not (text or "").strip():
-        return None
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ConfigurationError(f"{path} line {line}: {name} is '{text}'", "a number of seconds is needed")
-    return value

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.detectors import DETECTORS
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import Results, Skipped
@@ -22,7 +23,7 @@ from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors, with_only
 from cdtool.workflows.calibration import learn_thresholds, that_can_run
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
@@ -62,6 +63,7 @@ def benchmark(
     where the runs learned from are too few for the budget.
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
+    limits = len(setup.limits)
     setup = with_detectors(setup, detectors) if detectors else setup
     setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget else setup
     machine_file = setup.machine_file
@@ -73,7 +75,11 @@ def benchmark(
     left_out: list[Skipped] = []
     if list(detectors) == ["all"]:
         used, left_out = that_can_run(used, learn.operations, machine_file.machine)
-        setup = replace(setup, detectors=tuple(detector.name for detector in used))
+        left_out += [Skipped(name, f"left out: {fault}") for name, fault in DETECTORS.broken_plugins().items()]
+        setup = with_only(setup, [detector.name for detector in used])
+    if len(setup.limits) < limits:
+        words = f"{limits - len(setup.limits)} of {limits} limits are on detectors that were not run: not checked"
+        left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
     detect = detect_with(setup, used, learned.thresholds)

@@ -14,7 +14,8 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force_limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.labels import Labels, read_labels
-from cdtool.evaluation.limits import LimitRule, read_limits
+from cdtool.evaluation.limits import ALL, LimitRule, read_limits
+from cdtool.evaluation.named_rows import by_recording
 from cdtool.evaluation.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
@@ -23,7 +24,7 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.alignment import ALIGNMENTS
 from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import find_logs
+from cdtool.workflows.runs import find_logs, shown_path
 
 HOLDOUT = "holdout"
 
@@ -74,6 +75,7 @@ class BenchmarkFile:
         """How figures come about, for provenance: results can be compared only where all this is the same."""
         return {
             "onset": self.onset.described,
+            "separation_s": self.onset.separation,
             "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
             "operations": self.operations,
             "watched_joints": ", ".join(self.watched) or None,
@@ -89,10 +91,11 @@ class BenchmarkFile:
         return tuple(self.impacts)
 
 
-def read_benchmark_file(path: str | Path, learning: bool = True) -> BenchmarkFile:
+def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Sequence[str] = ()) -> BenchmarkFile:
     """Read and check a benchmark file; raises ConfigurationError naming the key.
 
-    Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from.
+    Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from, and
+    [limits] may be on the detectors `also_known`.
     """
     file = Path(path)
     root = Table(read_toml(file), str(file))
@@ -113,11 +116,11 @@ def read_benchmark_file(path: str | Path, learning: bool = True) -> BenchmarkFil
         detectors=names,
         watched=_watched(root, machine_file.machine.joints),
         operations=root.choice("operations", HOW_TO_CUT, "whole"),
-        threshold=root.choice("threshold", THRESHOLDS.names(), "signature"),
+        threshold=root.choice("threshold", THRESHOLDS.names(plugins=True), "signature"),
         budget=_budget(root),
         signature=signature,
         debounce=debounce,
-        labels=read_labels(base / onset.text("labels")) if "labels" in onset else None,
+        labels=_labels(onset, base, impacts),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=_onset(onset),
         mass_before_cell=force.number("mass_before_cell_kg", 0.0, minimum=0.0),
@@ -125,7 +128,9 @@ def read_benchmark_file(path: str | Path, learning: bool = True) -> BenchmarkFil
         impacts=impacts,
         campaigns=_named(root.table("campaigns"), base),
         points=_named(root.table("points"), base),
-        limits=read_limits(root.table("limits"), _names(machine_file, names), tuple(impacts)),
+        limits=read_limits(
+            root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
+        ),
         digest=hashlib.sha256(file.read_bytes()).hexdigest(),
     )
     force.finish()
@@ -139,11 +144,17 @@ def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
 
     Raises ConfigurationError for an unknown name, UsageError for one that is named twice.
     """
-    known = DETECTORS.names(plugins=True) if list(names) == ["all"] else names
+    known = DETECTORS.usable_names() if list(names) == ["all"] else names
     chosen = tuple(setup.machine_file.detector(name).name for name in known)
     if len(set(chosen)) < len(chosen):
         raise UsageError(f"detectors {', '.join(names)} name one twice", "name each once")
-    return replace(setup, detectors=chosen)
+    return with_only(setup, chosen)
+
+
+def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
+    """The same with these detectors, and with the limits that are on them or on every one."""
+    limits = tuple(rule for rule in setup.limits if rule.detector in (ALL, *detectors))
+    return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
 def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, Group]:
@@ -193,6 +204,16 @@ def _budget(table: Table) -> Budget | None:
         return Budget.parse(text) if text else None
     except UsageError as fault:
         raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
+
+
+def _labels(onset: Table, base: Path, groups: Mapping[str, Group]) -> Labels | None:
+    """The label file; a file's name alone may not fit several of the recordings that are scored."""
+    if "labels" not in onset:
+        return None
+    path = base / onset.text("labels")
+    labels = read_labels(path)
+    by_recording(path, labels.contacts, {shown_path(log, base) for group in groups.values() for log in group.logs})
+    return labels
 
 
 def _watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:

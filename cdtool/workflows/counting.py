@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.evaluation.results import ExposureResult, SweepResult
 from cdtool.evaluation.sweep import Swept
@@ -79,7 +80,10 @@ class SweepRows:
     def _rows_of(self, name: str, group: str) -> Iterator[SweepResult]:
         latency = 1e3 * np.concatenate(self._latency[name, group], axis=1)
         operations, seconds = self._watched[name]
+        in_use = len(self.factors[name]) // 2
         for i, factor in enumerate(self.factors[name]):
+            if i < min(_loudest(self._false_alarms[name]), in_use):
+                continue
             values = latency[i]
             detected = values[np.isfinite(values)]
             yield SweepResult(
@@ -94,7 +98,13 @@ class SweepRows:
                 not_assessable=self._blind[name, group],
                 mean_ms=float(detected.mean()) if len(detected) else None,
                 median_ms=_median(values),
+                in_use=i == in_use,
             )
+
+
+def _loudest(false_alarms: npt.NDArray[np.int64]) -> int:
+    """The largest factor with the most false alarms: below it the signal hardly returns, and new alarms get fewer."""
+    return int(np.flatnonzero(false_alarms == false_alarms.max())[-1])
 
 
 def _median(values: FloatArray) -> float | None:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.limits import ALL
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.traces import Trace
 from cdtool.evaluation.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
+from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.gathering import Gathering
@@ -25,6 +28,7 @@ from cdtool.workflows.scoring import Scored, score_log
 # A trigger counts as held for this long [s], and another within it as the same.
 _HELD = 0.5
 _CLOCK_RATE = 1000.0
+_STRANGER = "the benchmark file does not score it: its rows are left out"
 
 
 @dataclass(frozen=True)
@@ -47,45 +51,74 @@ def score(
     """Score the trigger times of any program against the contacts of a benchmark file's recordings.
 
     `clock`: trigger times are seconds on the recording's own clock, as cdtool shows them, or on the source's (an
-    epoch, say). A recording without a row counts as watched without an alarm, and is named; `listed_only` leaves it
-    out. Raises ConfigurationError for a wrong file, RecordingError where nothing could be scored.
+    epoch, say). A recording that a detector has no row for counts as watched without an alarm; `listed_only` leaves
+    it out. Of the file's [limits] those on `*` and on the trigger file's detectors are checked. Raises
+    ConfigurationError for a wrong file, RecordingError where nothing could be scored.
     """
-    setup = read_benchmark_file(benchmark, learning=False)
     given = read_triggers(Path(triggers))
     names = tuple(given.rows)
-    work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+    setup = read_benchmark_file(benchmark, learning=False, also_known=names)
     base = setup.path.parent
+    work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     known = {shown_path(path, base) for _, path in work}
+    said, strangers = given.assigned(known)
     gathered = Gathering(setup, names, {}, {})
-    gathered.skipped += _strangers(given, known)
-    unlisted = [name for name in sorted(known) if not any(given.of(detector, name) for detector in names)]
-    if unlisted:
-        became = "left out" if listed_only else "taken as watched without an alarm"
-        words = f"{len(unlisted)} of {len(known)} recordings have no row: {became}"
-        gathered.findings.append(Skipped(str(given.path), words))
-    if listed_only:
-        work = [item for item in work if shown_path(item[1], base) not in set(unlisted)]
+    gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
+    gathered.findings += _unlisted(given, said, known, listed_only)
 
     def detect(operation: Operation, _: Scored) -> list[Detection]:
         log = operation.name.removesuffix(f"#{operation.number}")
         shift = operation.recording.origin if clock == "source" else 0.0
-        return [_detection(operation, name, given.of(name, log) or Triggered(), shift) for name in names]
+        asked = [name for name in names if log in said[name] or not listed_only]
+        return [_detection(operation, name, said[name].get(log, Triggered()), shift) for name in asked]
 
     def one(item: tuple[str, Path]) -> Scored:
-        return score_log(setup, item[0], item[1], detect, {})
+        scored = score_log(setup, item[0], item[1], detect, {})
+        for name in names:
+            scored.skipped += _beside(scored, name, said[name], clock)
+        return scored
 
+    if listed_only:
+        work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     for (group, _), scored in zip(work, in_order(one, work, jobs, progress), strict=True):
         gathered.add(group, scored)
     results = gathered.results(_provenance(setup, given, clock))
-    return Score(evaluate(results), gathered.traces)
+    rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
+    return Score(evaluate(results, rules), gathered.traces)
 
 
-def _strangers(given: TriggerFile, known: set[str]) -> list[Skipped]:
-    """Recordings with rows that the benchmark file does not name."""
-    below = {PurePosixPath(name).name for name in known}
-    named = {recording for by_name in given.rows.values() for recording in by_name}
-    why = "the benchmark file does not score it: its triggers are left out"
-    return [Skipped(name, why) for name in sorted(named) if name not in known and name not in below]
+def _unlisted(
+    given: TriggerFile, said: Mapping[str, Mapping[str, Triggered]], known: Collection[str], listed_only: bool
+) -> list[Skipped]:
+    """How many recordings a detector has no row for, and what became of them."""
+    became = "left out" if listed_only else "taken as watched without an alarm"
+    found = []
+    for detector, by_name in said.items():
+        missing = sorted(set(known) - set(by_name))
+        if missing:
+            words = f"{detector}: {len(missing)} of {len(known)} recordings have no row: {became}; first {missing[0]}"
+            found.append(Skipped(str(given.path), words))
+    return found
+
+
+def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock: str) -> list[Skipped]:
+    """Rows about times in which nothing was recorded: mostly those of another clock."""
+    if scored.recording is None or scored.recording.recording not in said:
+        return []
+    name, item = scored.recording.recording, said[scored.recording.recording]
+    parts = [judged.operation.recording for judged in scored.judged]
+    shift = parts[0].origin if clock == "source" else 0.0
+    spans = [(part.start + shift, part.end + shift) for part in parts]
+    rows = [(at, at) for at in item.alarms] + item.blind
+    outside = [begin for begin, end in rows if all(end < first or begin > last for first, last in spans)]
+    if not outside:
+        return []
+    words = f"{detector}: {len(outside)} of {len(rows)} rows lie in no operation, the first at {outside[0]:.3f} s"
+    first, last = spans[0][0], spans[-1][1]
+    if any(not first <= at <= last for at in outside):
+        other = "recording" if clock == "source" else "source"
+        words += f"; recorded is {first:.3f} to {last:.3f} s: another clock? try --clock {other}"
+    return [Skipped(name, words)]
 
 
 def _detection(operation: Operation, detector: str, said: Triggered, shift: float) -> Detection:
@@ -117,4 +150,5 @@ def _provenance(setup: BenchmarkFile, given: TriggerFile, clock: str) -> dict[st
         "triggers_sha256": given.digest,
         "trigger_clock": clock,
         **setup.scoring,
+        "plugins": plugin_packages(),
     }

@@ -1,27 +1,38 @@
-"""Results and the statistics that are derived from them."""
+"""Results, their file, and the statistics that are derived from them."""
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import (
+    SCHEMA_VERSION,
+    CalibrationResult,
     ContactResult,
     ExposureResult,
     FalseAlarmResult,
+    ForceResult,
+    ForceStepResult,
+    LimitResult,
+    PointResult,
+    RecordingResult,
     Results,
     Skipped,
-    read_results,
+    SweepResult,
 )
+from cdtool.evaluation.results_file import read_results, to_json
 from cdtool.evaluation.statistics import summarise
 
 
 def contact(latency: float | None, outcome: str = "detected", detector: str = "momentum") -> ContactResult:
     alarm = None if latency is None else 5.0 + 1e-3 * latency
-    return ContactResult("a.csv", "stiff", detector, "gate", 5.0, 0.001, alarm, latency, outcome, 100.0, math.nan)
+    return ContactResult(
+        "a.csv", "stiff", detector, "gate", 5.0, 0.001, alarm, latency, outcome, 100.0, math.nan, watched_ms=1000.0
+    )
 
 
 RESULTS = Results(
@@ -42,30 +53,92 @@ RESULTS = Results(
 )
 
 
+# One row of every kind.
+STEP = ForceStepResult("dynamic", 0.0, 400.0, math.inf, 3.0, "fail", "too much")
+FULL = replace(
+    RESULTS,
+    recordings=(RecordingResult("a.csv", "stiff", "c0ffee", 7.0, 1, 5, "monday", "edge"),),
+    forces=(ForceResult("a.csv", "stiff", 1, "gap", "fail", 500.0, (STEP, STEP), "edge", 3.0, "too much"),),
+    points=(PointResult("edge", "stiff", "gap", 3, "fail", (STEP,), "mean of 3", "too much"),),
+    sweep=(SweepResult("momentum", "stiff", 5.5, 0, 9, 0.5, 3, 1, 1, 30.0, None),),
+    calibration=(CalibrationResult("momentum", "1/1000op", 6.0, 3000, 5.0, 1),),
+    limits=(LimitResult("momentum.*.missed", "momentum", "stiff", "missed", 1.0, None, 0.0, "broken", "1 is more"),),
+    findings=(Skipped("a.csv", "a gap"),),
+)
+
+
 def test_a_summary_counts_what_its_mean_leaves_out():
     momentum, torque, holdout, _ = summarise(RESULTS)
-    assert (momentum.mean_ms, momentum.median_ms, momentum.std_ms) == pytest.approx((30.0, 20.0, 26.4575), rel=1e-5)
+    assert (momentum.mean_ms, momentum.median_ms, momentum.std_ms) == pytest.approx((30.0, 40.0, 26.4575), rel=1e-5)
     assert (momentum.contacts, momentum.detected, momentum.missed, momentum.not_assessable) == (5, 3, 1, 1)
     assert math.isnan(torque.mean_ms) and torque.missed == 1
     assert (holdout.false_alarms, holdout.operations, holdout.hours) == (1, 9, 0.5)
 
 
 def test_the_json_is_strict_and_has_null_where_there_is_no_figure():
-    values = json.loads(RESULTS.to_json(), parse_constant=lambda name: pytest.fail(name))
+    values = json.loads(to_json(RESULTS), parse_constant=lambda name: pytest.fail(name))
     assert values["contacts"][0]["peak_force_n"] is None and values["contacts"][3]["latency_ms"] is None
-    assert values["provenance"]["gain"] is None and values["schema_version"] == 1
+    assert values["provenance"]["gain"] is None and values["schema_version"] == SCHEMA_VERSION
 
 
 def test_results_survive_writing_and_reading(tmp_path):
     path = tmp_path / "results.json"
-    path.write_text(RESULTS.to_json())
+    path.write_text(to_json(FULL), encoding="utf-8")
     again = read_results(path)
-    assert again.to_json() == RESULTS.to_json() and again.detectors == RESULTS.detectors
+    assert to_json(again) == to_json(FULL)
+    assert again.forces[0].steps[1] == replace(STEP, peak_n=None)
+    assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
 
 
-@pytest.mark.parametrize("content", ["", "{}", '{"schema_version": 2}', "[]", '{"schema_version": 1}'])
+def test_no_name_makes_json_that_a_terminal_obeys_or_that_cannot_be_written(tmp_path):
+    name = "a\x1b[31m\x9b31m\u202egnp.exe\u2028\udc80 碰撞"
+    text = to_json(replace(RESULTS, skipped=(Skipped(name, name),)))
+    assert not set(name) & set(text) - set("a[31mgnp.ex 碰撞")
+    path = tmp_path / "results.json"
+    path.write_text(text, encoding="utf-8")
+    assert read_results(path).skipped == (Skipped(name, name),)
+
+
+def test_a_number_without_decimals_is_read_as_one_with(tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(to_json(RESULTS).replace('"onset_s": 5.0', '"onset_s": 5'), encoding="utf-8")
+    assert isinstance(read_results(path).contacts[0].onset_s, float)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{}", "[]", '{"schema_version": 2}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
+)
 def test_what_is_no_results_file_is_one_clear_error(tmp_path, content):
     path = tmp_path / "results.json"
-    path.write_text(content)
+    path.write_text(content, encoding="utf-8")
     with pytest.raises(RecordingError, match=r"results\.json"):
+        read_results(path)
+
+
+def test_another_version_is_named_with_the_way_out(tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(to_json(RESULTS).replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
+    with pytest.raises(RecordingError, match=r"schema_version is 99, this cdtool knows 2") as fault:
+        read_results(path)
+    assert "benchmark" in fault.value.hint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"latency_ms": 10.0', '"latency_ms": "10"', r"results\.contacts\[0\]\.latency_ms is '10', no float"),
+        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is True, no int"),
+        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, no int"),
+        ('"clipped": false', '"cliped": false', r"unknown field 'cliped'"),
+        ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: .*onset_s"),
+        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is None"),
+        ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is no list"),
+    ],
+)
+def test_a_wrong_field_is_named(tmp_path, old, new, words):
+    path = tmp_path / "results.json"
+    text = to_json(FULL)
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RecordingError, match=words):
         read_results(path)

@@ -1,0 +1,100 @@
+"""A small CSV that a person or a program writes about recordings, as a label or trigger file: checked line by line.
+
+Conventions: UTF-8, separated by commas, one header line. `recording` is the path below the benchmark file, or the
+file's name alone where that is unique. Every row has as many cells as the header, so that a decimal comma is noticed.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from cdtool.errors import ConfigurationError, nearest
+
+
+@dataclass(frozen=True)
+class NamedRow:
+    """One row: the recording that it is about, its cells by column, and file and line for messages."""
+
+    where: str
+    recording: str
+    cells: Mapping[str, str]
+
+    def text(self, name: str) -> str:
+        """A cell without the blanks around it; empty where the column is absent."""
+        return self.cells.get(name, "").strip()
+
+    def seconds(self, name: str) -> float | None:
+        """A finite number, None where the cell is empty; raises ConfigurationError."""
+        text = self.text(name)
+        if not text:
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.fault(f"{name} is '{text}'", "a number of seconds is needed")
+        return value
+
+    def fault(self, problem: str, hint: str) -> ConfigurationError:
+        """An error about this row."""
+        return ConfigurationError(f"{self.where}: {problem}", hint)
+
+
+def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
+    """The rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        header = [name.strip() for name in next(reader, [])]
+        _check_header(path, header, required, [*required, *optional])
+        return [_row(path, reader.line_num, header, cells) for cells in reader if cells]
+    except (OSError, UnicodeDecodeError, csv.Error) as fault:
+        raise ConfigurationError(f"{path}: no {what} file: {fault}", "a UTF-8 CSV file is needed") from fault
+
+
+def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:
+    """Which of the recordings each name of a file means, None for none of them.
+
+    Raises ConfigurationError where a file's name alone fits several.
+    """
+    found: dict[str, str | None] = {}
+    for name in names:
+        meant = [name] if name in recordings else []
+        if not meant and "/" not in name:
+            meant = sorted(item for item in recordings if PurePosixPath(item).name == name)
+        if len(meant) > 1:
+            listed = ", ".join(meant[:3]) + (" and more" if len(meant) > 3 else "")
+            raise ConfigurationError(f"{path}: '{name}' fits {listed}", "write the path below the benchmark file")
+        found[name] = meant[0] if meant else None
+    return found
+
+
+def _check_header(path: Path, header: Sequence[str], required: Sequence[str], known: Sequence[str]) -> None:
+    for name in header:
+        if name not in known:
+            raise ConfigurationError(f"{path} line 1: unknown column '{name}'", nearest(name, known))
+        if header.count(name) > 1:
+            raise ConfigurationError(f"{path} line 1: column '{name}' is there twice", "name each column once")
+    for name in required:
+        if name not in header:
+            raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"write {','.join(known)}")
+
+
+def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> NamedRow:
+    where = f"{path} line {line}"
+    if len(cells) != len(header):
+        raise ConfigurationError(
+            f"{where}: {len(cells)} cells under {len(header)} columns",
+            "one cell a column, empty where there is nothing; decimals with a point",
+        )
+    values = dict(zip(header, cells, strict=True))
+    name = values["recording"].strip().replace("\\", "/")
+    if not name:
+        raise ConfigurationError(f"{where}: no recording is named", "write its path in column recording")
+    return NamedRow(where, PurePosixPath(name).as_posix(), values)

@@ -1,0 +1,137 @@
+"""What became of each recording with each detector, and its part in broken limits.
+
+Conventions: a recording has a part in a broken limit where a contact or a false alarm of it is what the limit counts
+(missed, false alarms, forces failed), or is itself beyond what the limit allows (latencies, forces). A limit can be
+broken without any such recording: the upper end of an interval lies beyond every single latency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, LimitResult, Results
+
+# Figures of [limits] by what of a recording counts in them; in the others nothing of a single recording does.
+MEANS = frozenset(("mean_ms", "mean_ms_upper"))
+QUANTILES = frozenset(("median_ms", "median_ms_upper", "p95_ms", "p95_ms_upper", "max_ms"))
+MISSES = frozenset(("missed", "missed_share", "missed_share_at_most"))
+FALSE_ALARMS = frozenset(
+    (
+        "false_alarms",
+        "false_alarms_per_hour",
+        "false_alarms_per_hour_at_most",
+        "false_alarms_per_operation",
+        "false_alarms_per_operation_at_most",
+    )
+)
+FORCES_AT_ALARM = frozenset(("force_at_alarm_n", "force_at_alarm_max_n"))
+
+Key = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class RecordingOutcome:
+    """One recording and one detector: contacts, false alarms, and its part in broken limits in words.
+
+    `judged` is False where the detector gave nothing for it: its contacts have no row, or it did not run in the group.
+    """
+
+    recording: str
+    group: str
+    detector: str
+    contacts: tuple[ContactResult, ...]
+    false_alarms: tuple[FalseAlarmResult, ...]
+    breaks: tuple[str, ...]
+    judged: bool
+
+    @property
+    def blind(self) -> bool:
+        """Whether the detector could say nothing about it."""
+        unseen = bool(self.contacts) and all(item.outcome == "not_assessable" for item in self.contacts)
+        return not self.judged or (unseen and not self.false_alarms)
+
+
+def recording_outcomes(results: Results) -> list[RecordingOutcome]:
+    """Every recording that was scored with every detector, in the order of the benchmark file."""
+    contacts: dict[Key, list[ContactResult]] = {}
+    for contact in results.contacts:
+        contacts.setdefault((contact.group, contact.detector, contact.recording), []).append(contact)
+    true_contacts = {(item.group, item.recording): item.contacts for item in results.recordings}
+    logs: dict[str, dict[str, None]] = {group: {} for group in results.groups}
+    for group, name in (*true_contacts, *((group, name) for group, _, name in contacts)):
+        logs.setdefault(group, {})[name] = None
+    alarms: dict[Key, list[FalseAlarmResult]] = {}
+    for alarm in results.false_alarms:
+        name = _log_of(alarm.recording, logs.setdefault(alarm.group, {}))
+        logs[alarm.group][name] = None
+        alarms.setdefault((alarm.group, alarm.detector, name), []).append(alarm)
+    ran = {(item.group, item.detector) for item in results.exposure}
+    exceeded = _exceeded(results.limits)
+    failed = {(item.group, item.recording, item.contact) for item in results.forces if item.verdict == "fail"}
+    found = []
+    for group, names in logs.items():
+        for detector in results.detectors:
+            limits = exceeded.get((group, detector), [])
+            for name in names:
+                seen, false = contacts.get((group, detector, name), []), alarms.get((group, detector, name), [])
+                breaks = tuple(words for limit in limits for words in _part_in(limit, seen, false, failed))
+                silent = (group, detector) in ran and not true_contacts.get((group, name), 0)
+                judged = bool(seen or false or silent)
+                found.append(RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged))
+    return found
+
+
+def _log_of(operation: str, logs: Mapping[str, None]) -> str:
+    """The log of an operation, which is named log#n where the log was cut."""
+    log, _, number = operation.rpartition("#")
+    return log if operation not in logs and number.isdecimal() and log in logs else operation
+
+
+def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:
+    """The limits that a single recording can have broken, by group and detector."""
+    found: dict[tuple[str, str], list[LimitResult]] = {}
+    for limit in limits:
+        above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
+        if limit.outcome == "broken" and above != (limit.figure == "detected"):
+            found.setdefault((limit.group, limit.detector), []).append(limit)
+    return found
+
+
+def _part_in(
+    limit: LimitResult,
+    contacts: Sequence[ContactResult],
+    false_alarms: Sequence[FalseAlarmResult],
+    failed: set[tuple[str, str, int]],
+) -> Iterator[str]:
+    allows = f"at most {limit.largest:g}" if limit.figure != "detected" else f"at least {limit.least:g}"
+    if limit.figure in FALSE_ALARMS:
+        words = [f"false alarm at {item.time_s:.3f} s on {item.joint}" for item in false_alarms]
+    else:
+        fails = [(item.group, item.recording, item.contact) in failed for item in contacts]
+        parts = [(item.contact, _beyond(limit, item, fail)) for item, fail in zip(contacts, fails, strict=True)]
+        words = [f"contact {number} {part}" for number, part in parts if part]
+    yield from (f"{item} ({limit.limit}: {allows})" for item in words)
+
+
+def _beyond(limit: LimitResult, item: ContactResult, force_failed: bool) -> str:
+    """How a contact goes beyond what a limit allows; empty where it does not."""
+    figure = limit.figure
+    if item.outcome == "missed" and figure in MISSES | QUANTILES | {"detected"}:
+        return "is missed"
+    if item.outcome == "not_assessable" and figure in ("not_assessable", "detected"):
+        return "is not assessable"
+    if figure == "force_failed":
+        return "fails its force limits" if force_failed else ""
+    value, words, unit = _measured(figure, item)
+    above = value is not None and limit.largest is not None and value > limit.largest
+    return f"{words} {value:.4g} {unit}" if above else ""
+
+
+def _measured(figure: str, item: ContactResult) -> tuple[float | None, str, str]:
+    """What of a contact a figure is made from, in words and with its unit."""
+    if figure in MEANS | QUANTILES:
+        return item.latency_ms, "is detected after", "ms"
+    if figure in FORCES_AT_ALARM:
+        return item.force_at_alarm_n, "has at its alarm", "N"
+    return (item.peak_force_n if figure == "peak_force_n" else None), "has a peak of", "N"

@@ -1,0 +1,60 @@
+"""Share of contacts that are still undetected over time: a Kaplan-Meier curve for each detector and group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.kaplan_meier import Survival, survival
+from cdtool.evaluation.results import ContactResult, Results
+from cdtool.evaluation.statistics import latencies
+from cdtool.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class SurvivalCurve:
+    """One detector in one group: `curve` over the time since the onset [ms], up to `end` [ms].
+
+    `end` is the latest detection or the longest time watched. `missed` (k,): the times [ms] up to which the missed
+    contacts were watched, in ascending order.
+    """
+
+    detector: str
+    group: str
+    contacts: int
+    detected: int
+    not_assessable: int
+    curve: Survival
+    missed: FloatArray
+    end: float
+
+
+def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:
+    """A curve for each detector and group with contacts, in the order of the benchmark file.
+
+    Where no contact could be assessed it is the first time alone, its band from 0 to 1, and `end` is 0.
+    """
+    rows: dict[tuple[str, str], list[ContactResult]] = {}
+    for contact in results.contacts:
+        rows.setdefault((contact.group, contact.detector), []).append(contact)
+    return tuple(
+        _curve(detector, group, rows[group, detector])
+        for group in results.groups
+        for detector in results.detectors
+        if (group, detector) in rows
+    )
+
+
+def _curve(detector: str, group: str, contacts: list[ContactResult]) -> SurvivalCurve:
+    latency, censored = latencies(contacts)
+    return SurvivalCurve(
+        detector=detector,
+        group=group,
+        contacts=len(contacts),
+        detected=int(np.count_nonzero(~censored)),
+        not_assessable=len(contacts) - len(latency),
+        curve=survival(latency, censored),
+        missed=np.sort(latency[censored]),
+        end=float(latency.max(initial=0.0)),
+    )

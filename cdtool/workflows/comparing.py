@@ -1,0 +1,24 @@
+"""Two builds against each other: what `cdtool compare` does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cdtool.evaluation.build_comparison import BuildComparison, compare_builds
+from cdtool.evaluation.comparison import SIGNIFICANT
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.results_file import read_results
+
+
+def compare(
+    old: str | Path | Results, new: str | Path | Results, *, significance: float = SIGNIFICANT
+) -> BuildComparison:
+    """Compare the results of two builds, given as results.json or as they are in memory.
+
+    Raises RecordingError where a file is no results file; else as `compare_builds`.
+    """
+    return compare_builds(_results(old), _results(new), significance)
+
+
+def _results(source: str | Path | Results) -> Results:
+    return source if isinstance(source, Results) else read_results(Path(source))
