@@ -15,7 +15,7 @@ from typing import Any
 
 from cdtool.channels import ChannelMap, read_channel_map
 from cdtool.dynamics import Gain
-from cdtool.errors import ConfigurationError, nearest
+from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
 from cdtool.tables import Table, read_toml
 
@@ -67,11 +67,12 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
     registry = _registry("cdtool.detectors", "DETECTORS")
     gains: dict[str, dict[str, Gain]] = {}
     for name in table.values:
-        known = {**{full: full for full in registry.names(plugins=True)}, **registry.short_names}
-        if name not in known:
-            raise table.fault(name, "unknown detector", nearest(name, known))
-        part = table.table(name)
-        allowed = [item.name for item in fields(registry.load(name))]
+        try:
+            full = registry.canonical(name)
+        except UsageError as fault:
+            raise table.fault(name, fault.message, fault.hint) from fault
+        part, detector = table.table(name), registry.load(full)
+        allowed = [item.name for item in fields(detector)]
         for key in part.values:
             if key not in allowed:
                 raise part.fault(key, "unknown gain", nearest(key, allowed))
@@ -80,12 +81,12 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
             for key, value in part.values.items()
         }
         try:
-            registry.load(name)(**given)
+            detector(**given)
         except ConfigurationError as fault:
             raise ConfigurationError(f"{table.key(name)}: {fault.message}", fault.hint) from fault
-        if known[name] in gains:
-            raise table.fault(name, f"is {known[name]} again", "give a detector's gains once, under one of its names")
-        gains[known[name]] = given
+        if full in gains:
+            raise table.fault(name, f"is {full} again", "give a detector's gains once, under one of its names")
+        gains[full] = given
     return gains
 
 

@@ -12,6 +12,7 @@ from cdtool.activation import Activation
 from cdtool.clock import previous_value
 from cdtool.detection import REASONS, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
+from cdtool.detectors.contract import checked_signal
 from cdtool.operations import Operation
 from cdtool.recording import FloatArray
 from cdtool.thresholds.base import FittedThreshold, exceedance
@@ -90,7 +91,7 @@ def run_detector(operation: Operation, machine: Any, detector: Detector, watched
 
     Ground truth is taken away before it looks. Raises RecordingError, or ConfigurationError for an unknown joint.
     """
-    signal = detector.signal(operation.recording.without_ground_truth(), machine)
+    signal = checked_signal(detector, operation.recording.without_ground_truth(), machine)
     return replace(signal, joints=signal.joints or operation.recording.joints).watching(watched)
 
 

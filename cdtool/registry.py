@@ -1,13 +1,13 @@
 """Names -> classes, loaded only when asked for.
 
 A folder of the method (formats, machines, detectors, thresholds) has one literal table `name -> "module:Class"`.
-Plug-ins come by entry points of the group `cdtool.<kind>`; they are looked at only when an unknown name is asked for or
-everything is listed.
+Plug-ins come by entry points of the group `cdtool.<kind>s`; they are looked at only when an unknown name is asked for
+or everything is listed, and held against the contract when they are loaded.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -17,11 +17,17 @@ from cdtool.errors import CdtoolError, UsageError, nearest
 
 @dataclass(frozen=True)
 class Registry:
-    """The table of one kind of class, with its short names."""
+    """The table of one kind of class, with its short names, and what a plug-in of that kind must have.
+
+    `contract`: attributes of the class. `settings`: the metadata that each field of a frozen dataclass carries beside
+    its default; None where the class need not be one.
+    """
 
     kind: str
     table: dict[str, str]
     short_names: dict[str, str] = field(default_factory=dict)
+    contract: tuple[str, ...] = ()
+    settings: tuple[str, ...] | None = None
 
     def names(self, plugins: bool = False) -> list[str]:
         """Names in the table's order; plug-ins behind them if asked for."""
@@ -30,43 +36,109 @@ class Registry:
             found += sorted(set(self._plugins()) - set(found))
         return found
 
+    def usable_names(self) -> list[str]:
+        """Names in the table's order, then the plug-ins that can be used."""
+        broken = self.broken_plugins()
+        return [name for name in self.names(plugins=True) if name in self.table or name not in broken]
+
     def canonical(self, name: str) -> str:
         """The full name behind a full or short name; raises UsageError with the nearest known ones."""
         full = self.short_names.get(name.lower(), name)
-        if full in self.table or full in self._plugins():
+        if full in self.table:
             return full
-        known = [*self.names(plugins=True), *self.short_names]
-        raise UsageError(f"unknown {self.kind} '{name}'", nearest(name, known))
+        plugins = self._plugins()
+        return full if full in plugins else self._by_short_name(name, sorted(plugins))
 
     def load(self, name: str) -> Any:
-        """The class of that name."""
+        """The class of that name; raises CdtoolError, naming its package, where a plug-in cannot be used."""
         full = self.canonical(name)
         if full in self.table:
             module, _, attribute = self.table[full].partition(":")
             return getattr(import_module(module), attribute)
-        return load_plugin(self._plugins()[full], self.kind)
+        return self._load_plugin(full)
 
-    def _plugins(self) -> dict[str, EntryPoint]:
-        return {point.name: point for point in entry_points(group=f"cdtool.{self.kind}s")}
+    def broken_plugins(self) -> dict[str, CdtoolError]:
+        """The installed plug-ins that cannot be used, and why."""
+        found = {}
+        for name in sorted(self._plugins()):
+            try:
+                self._load_plugin(name)
+            except CdtoolError as fault:
+                found[name] = fault
+        return found
+
+    def _plugins(self) -> dict[str, list[EntryPoint]]:
+        found: dict[str, list[EntryPoint]] = {}
+        for point in entry_points(group=f"cdtool.{self.kind}s"):
+            found.setdefault(point.name, []).append(point)
+        return found
+
+    def _load_plugin(self, name: str) -> Any:
+        points = self._plugins()[name]
+        point = points[0]
+        if len(points) > 1:
+            packages = " and ".join(sorted(_package(item) for item in points))
+            raise CdtoolError(f"the packages {packages} both bring a {self.kind} '{name}'", "uninstall one of them")
+        if name in self.table:
+            raise self._fault(point, f"bears the name of a {self.kind} of cdtool itself")
+        try:
+            loaded = point.load()
+        except Exception as fault:
+            raise self._fault(point, f"does not load: {fault!r}") from fault
+        if problem := self._breach(loaded, name):
+            raise self._fault(point, problem)
+        return loaded
+
+    def _breach(self, loaded: Any, name: str) -> str:
+        """What a plug-in's class lacks; empty where it keeps the contract."""
+        for attribute in self.contract:
+            if not hasattr(loaded, attribute):
+                return f"lacks the attribute '{attribute}'"
+        if "name" in self.contract and loaded.name != name:
+            return f"is named '{loaded.name}' in its class: both names must be the same"
+        short = getattr(loaded, "short_name", "")
+        if short in self.short_names or short in self.table:
+            return f"has the short name '{short}', which belongs to {self.short_names.get(short, short)}"
+        if self.settings is None:
+            return ""
+        if not (is_dataclass(loaded) and getattr(loaded, "__dataclass_params__").frozen):  # noqa: B009 - untyped
+            return "is no frozen dataclass"
+        for item in fields(loaded):
+            if item.default is MISSING:
+                return f"has no default for '{item.name}'"
+            if absent := [key for key in self.settings if key not in item.metadata]:
+                return f"gives no {' and no '.join(absent)} for '{item.name}': make it by cdtool.detectors.base.gain"
+        return ""
+
+    def _fault(self, point: EntryPoint, problem: str) -> CdtoolError:
+        package = _package(point)
+        return CdtoolError(
+            f"{self.kind} plug-in '{point.name}' of package '{package}' {problem}", f"repair or uninstall '{package}'"
+        )
+
+    def _by_short_name(self, name: str, plugins: list[str]) -> str:
+        broken = self.broken_plugins()
+        short = {full: getattr(self._load_plugin(full), "short_name", "") for full in plugins if full not in broken}
+        found = [full for full, known in short.items() if known.lower() == name.lower()]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise UsageError(f"the short name '{name}' belongs to {' and '.join(found)}", "write the full name")
+        hint = nearest(name, [*self.names(plugins=True), *self.short_names, *filter(None, short.values())])
+        told = "; ".join([hint, *(item.message for item in broken.values())])
+        raise UsageError(f"unknown {self.kind} '{name}'", told)
 
 
 def plugin_packages() -> dict[str, str]:
     """The installed packages that bring plug-ins, with their versions: what a report has to name."""
-    return {
+    found = {
         point.dist.name: point.dist.version
         for kind in ("detectors", "thresholds", "machines", "formats")
         for point in entry_points(group=f"cdtool.{kind}")
         if point.dist is not None
     }
+    return dict(sorted(found.items()))
 
 
-def load_plugin(point: EntryPoint, kind: str) -> Any:
-    """The class of an entry point; a failing one is an error that names its package."""
-    try:
-        return point.load()
-    except Exception as fault:
-        package = point.dist.name if point.dist is not None else point.value
-        raise CdtoolError(
-            f"{kind} plug-in '{point.name}' of package '{package}' does not load: {fault!r}",
-            f"repair or uninstall '{package}'",
-        ) from fault
+def _package(point: EntryPoint) -> str:
+    return point.dist.name if point.dist is not None else point.value

@@ -30,4 +30,6 @@ DETECTORS = Registry(
         "vo": "velocity",
         "kmo": "kalman_momentum",
     },
+    contract=("name", "short_name", "title", "needs", "signed", "unit", "signal"),
+    settings=("unit", "meaning"),
 )

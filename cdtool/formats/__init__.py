@@ -15,4 +15,5 @@ FORMATS = Registry(
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
     },
+    contract=("name", "suffixes", "sniff", "columns"),
 )

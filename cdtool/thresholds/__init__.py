@@ -10,4 +10,6 @@ THRESHOLDS = Registry(
         "signature": "cdtool.thresholds.signature:Signature",
         "limit": "cdtool.thresholds.limit:Limit",
     },
+    contract=("name", "needs", "safety_factor", "fit"),
+    settings=(),
 )

@@ -1,4 +1,4 @@
-"""What holds for every registered detector."""
+"""What holds for every registered detector, those of installed plug-ins included."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.motions import moving
 from tests.robots import JOINTS as ROBOT_JOINTS
 from tests.robots import six_joint_robot
 
-NAMES = DETECTORS.names()
+NAMES = DETECTORS.names(plugins=True)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def changed(recording: Recording, channel: str, values: np.ndarray) -> Recording
 
 def test_every_file_of_the_folder_with_a_detector_is_registered():
     folder = Path(cdtool.detectors.__file__).parent
-    helpers = {"__init__", "base", "filters"}
+    helpers = {"__init__", "base", "contract", "filters"}
     modules = {path.stem for path in folder.glob("*.py") if not path.stem.endswith("_kernel")} - helpers
     assert modules == set(DETECTORS.table)
     for name, target in DETECTORS.table.items():
@@ -88,7 +88,7 @@ def test_it_is_a_frozen_dataclass_whose_gains_have_default_unit_and_meaning(name
     for item in fields(detector):
         assert isinstance(item.default, float)
         assert item.metadata["unit"] and item.metadata["meaning"]
-    assert detector.short_name in DETECTORS.short_names
+    assert DETECTORS.canonical(detector.short_name) == name
     assert set(detector.needs) <= set(CHANNELS) - set(GROUND_TRUTH)
     assert detector.__doc__ and len(detector.__doc__) > 80
 
@@ -302,7 +302,7 @@ def test_at_rest_it_finds_nothing_or_says_that_it_cannot_judge(name, subject):
     if name in ("energy", "friction_ekf"):
         assert (signal.status[4000:] == Status.NOT_APPLICABLE).all()
         assert "not applicable" in signal.why_not()
-    else:
+    elif name in DETECTORS.table:
         expected = torque if name == "pure_torque" else 0.0
         assert signal.valid[4000:].all()
         np.testing.assert_allclose(signal.values[4000:], (still + expected)[4000:], atol=1e-9)

@@ -1,4 +1,4 @@
-"""What holds for every registered threshold."""
+"""What holds for every registered threshold, those of installed plug-ins included."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdtool.recording import CHANNELS, GROUND_TRUTH
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import exceedance
 
-NAMES = THRESHOLDS.names()
+NAMES = THRESHOLDS.names(plugins=True)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""A collision detector and a threshold for cdtool."""
