@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdtool.errors import UsageError
 from cdtool.plain_text import plain, shorten
+from cdtool.report.figure_text import number
 from cdtool.report.files import write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -79,6 +81,52 @@ def new_figure(width: float, height: float) -> Figure:
     return NewFigure(figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
+class Margins(NamedTuple):
+    """Room around the panels of a figure [inch]."""
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+
+def stacked_panels(
+    width: float, heights: Sequence[float], margins: Margins, gap: float = 0.16
+) -> tuple[Figure, list[Axes]]:
+    """A column of panels of those heights [inch] on one time axis, `gap` between them; only the last names its ticks.
+
+    Its places are given, not found by trial: it draws in half the time of a figure that arranges itself. To be used
+    within `drawing()`.
+    """
+    from matplotlib.figure import Figure as NewFigure
+
+    height = margins.top + sum(heights) + gap * (len(heights) - 1) + margins.bottom
+    figure = NewFigure(figsize=(width, height), dpi=_DPI)
+    panels: list[Axes] = []
+    top = height - margins.top
+    for panel in heights:
+        place = (margins.left, top - panel, width - margins.left - margins.right, panel)
+        sizes = (width, height, width, height)
+        left, bottom, wide, high = (round(at / size, 6) for at, size in zip(place, sizes, strict=True))
+        axes = figure.add_axes((left, bottom, wide, high), sharex=panels[0] if panels else None)
+        panels.append(axes)
+        top -= panel + gap
+    for axes in panels[:-1]:
+        axes.tick_params(axis="x", which="both", labelbottom=False)
+    return figure, panels
+
+
+def text_width(texts: Iterable[str], size: float) -> float:
+    """Width of the widest line [inch] of texts at a font size [points]; within `drawing()`."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(size=size)
+    lines = {line for text in texts for line in text.splitlines() if line}
+    widths = [text_to_path.get_text_width_height_descent(line, font, ismath=False)[0] for line in sorted(lines)]
+    return max(widths, default=0.0) / 72.0
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as its suffix says; raises UsageError for an unknown suffix, CdtoolError where it cannot."""
     from importlib import import_module
@@ -96,6 +144,12 @@ def save(figure: Figure, path: Path) -> None:
 def label(text: object, length: int = 40) -> str:
     """Text from a file as a figure shows it: plain and at most `length` characters."""
     return shorten(plain(text), length)
+
+
+def between(low: float, high: float, digits: int = 3) -> str:
+    """One figure, or the two that several lie between: 38.0 to 41.0."""
+    first, last = number(low, digits), number(high, digits)
+    return first if first == last else f"{first} to {last}"
 
 
 def unit_label(unit: str) -> str:

@@ -1,25 +1,78 @@
-"""Where a benchmark's results go: by the suffix of each target, or a folder with all of it."""
+"""Where a report goes: by the suffix of each target, or a folder with all of it."""
 
 from __future__ import annotations
 
 import os
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.errors import CdtoolError, UsageError
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results_file import to_json
+from cdtool.evaluation.traces import Trace
+from cdtool.evaluation.traces_file import encode_traces, traces_path
 from cdtool.plain_text import plain
-from cdtool.report.contacts_csv import contacts_csv
 from cdtool.report.figures import SUFFIXES
-from cdtool.report.files import write_text
-from cdtool.report.markdown import Image, to_markdown
-from cdtool.workflows.benchmark import Benchmark
-from cdtool.workflows.detection import Detected
-from cdtool.workflows.scoring import Trace
+from cdtool.report.files import write_text, write_whole
 
-_KNOWN = (".json", ".md", ".csv", *SUFFIXES)
 _LONGEST_NAME = 40
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a report shows: results with their statistics, and the traces that were kept."""
+
+    evaluated: Evaluated
+    traces: tuple[Trace, ...]
+
+
+def _write_json(report: Report, target: Path) -> None:
+    """results.json, and the traces beside it."""
+    write_text(target, to_json(report.evaluated.results))
+    write_whole(traces_path(target), lambda stream: stream.write(encode_traces(report.traces)))
+
+
+def _write_markdown(report: Report, target: Path) -> None:
+    from cdtool.report.markdown import to_markdown
+
+    write_text(target, to_markdown(report.evaluated))
+
+
+def _write_csv(report: Report, target: Path) -> None:
+    from cdtool.report.contacts_csv import contacts_csv
+
+    write_text(target, contacts_csv(report.evaluated.results))
+
+
+def _write_junit(report: Report, target: Path) -> None:
+    from cdtool.report.junit import to_junit
+
+    write_text(target, to_junit(report.evaluated))
+
+
+def _write_html(report: Report, target: Path) -> None:
+    from cdtool.report.html import to_html
+
+    write_text(target, to_html(report.evaluated, report.traces))
+
+
+def _write_latencies(report: Report, target: Path) -> None:
+    from cdtool.report.latency_plot import plot_latencies
+
+    plot_latencies(report.evaluated, target)
+
+
+_WRITERS: dict[str, Callable[[Report, Path], None]] = {
+    ".json": _write_json,
+    ".html": _write_html,
+    ".md": _write_markdown,
+    ".xml": _write_junit,
+    ".csv": _write_csv,
+    **dict.fromkeys(SUFFIXES, _write_latencies),
+}
 
 
 def check_outputs(targets: Sequence[Path]) -> None:
@@ -28,8 +81,9 @@ def check_outputs(targets: Sequence[Path]) -> None:
         if target.is_dir():
             _check_writable(target, target)
             continue
-        if target.suffix and target.suffix.lower() not in _KNOWN:
-            raise UsageError(f"--output is '{plain(target)}'", f"a folder, or a name that ends in {', '.join(_KNOWN)}")
+        if target.suffix and target.suffix.lower() not in _WRITERS:
+            known = ", ".join(_WRITERS)
+            raise UsageError(f"--output is '{plain(target)}'", f"a folder, or a name that ends in {known}")
         if not target.suffix and target.exists():
             raise UsageError(f"--output '{plain(target)}' exists and is no folder", "choose another name")
         if not target.parent.is_dir():
@@ -37,10 +91,17 @@ def check_outputs(targets: Sequence[Path]) -> None:
         _check_writable(target, target.parent)
 
 
-def write_outputs(done: Benchmark, targets: Sequence[Path]) -> list[Path]:
-    """Write every target; returns what to show: the files, and of a folder its report.md. Raises CdtoolError."""
+def write_outputs(report: Report, targets: Sequence[Path]) -> list[Path]:
+    """Write every target; returns what to show: the files, and of a folder its report. Raises CdtoolError."""
     check_outputs(targets)
-    return [_write_folder(done, target) if _is_folder(target) else _write_file(done, target) for target in targets]
+    written = []
+    for target in targets:
+        if _is_folder(target):
+            written.append(_write_folder(report, target))
+        else:
+            _WRITERS[target.suffix.lower()](report, target)
+            written.append(target)
+    return written
 
 
 def slug(name: str, taken: set[str]) -> str:
@@ -55,50 +116,23 @@ def slug(name: str, taken: set[str]) -> str:
     return found
 
 
-def _write_file(done: Benchmark, target: Path) -> Path:
-    suffix = target.suffix.lower()
-    if suffix == ".json":
-        write_text(target, done.results.to_json())
-    elif suffix == ".md":
-        write_text(target, to_markdown(done.results))
-    elif suffix == ".csv":
-        write_text(target, contacts_csv(done.results))
-    else:
-        from cdtool.report.latency_plot import plot_latencies
+def _write_folder(report: Report, folder: Path) -> Path:
+    """Everything: data, figures, and the report as HTML and as Markdown that links the figures."""
+    from cdtool.report.folder_figures import write_figures
+    from cdtool.report.forces_csv import forces_csv
+    from cdtool.report.markdown import to_markdown
 
-        plot_latencies(done.results, target)
-    return target
-
-
-def _write_folder(done: Benchmark, folder: Path) -> Path:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as fault:
         raise CdtoolError(f"{plain(folder)} cannot be made: {fault.strerror}", "choose another --output") from fault
-    images = [Image("latency.png", "latency of every detector in every group")]
-    for name in ("results.json", "contacts.csv", images[0].name):
-        _write_file(done, folder / name)
-    groups: set[str] = set()
-    for trace in done.traces:
-        images += _write_trace(trace, folder, slug(trace.group, groups))
-    report = folder / "report.md"
-    write_text(report, to_markdown(done.results, images))
-    return report
-
-
-def _write_trace(trace: Trace, folder: Path, group: str) -> list[Image]:
-    from cdtool.report.detection_plot import plot_detected
-    from cdtool.report.trigger_plot import plot_triggers
-
-    recording = trace.operation.recording
-    images = [Image(f"triggers_{group}.png", f"{trace.operation.name}: all detectors", trace.group)]
-    plot_triggers(trace, folder / images[0].name)
-    detectors: set[str] = set()
-    for detection, matching in zip(trace.detections, trace.matchings, strict=True):
-        name = f"detection_{group}_{slug(detection.detector, detectors)}.png"
-        plot_detected(Detected(recording, (detection,), trace.contacts, (matching,)), folder / name)
-        images.append(Image(name, f"{trace.operation.name}: {detection.detector}", trace.group))
-    return images
+    for name in ("results.json", "contacts.csv", "junit.xml", "report.html"):
+        _WRITERS[Path(name).suffix](report, folder / name)
+    if report.evaluated.results.forces:
+        write_text(folder / "forces.csv", forces_csv(report.evaluated.results))
+    images = write_figures(report, folder)
+    write_text(folder / "report.md", to_markdown(report.evaluated, images))
+    return folder / "report.html"
 
 
 def _is_folder(target: Path) -> bool:

@@ -134,7 +134,8 @@ def _blind(trace: Trace, row: Panel) -> bool:
 def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
     seen = _seen(trace, row)
     if _blind(trace, row):
-        return "not assessable", fill(label((seen.reason if seen else "") or row.reason, 66), 24)
+        reason = (seen.reason if seen else "") or row.reason
+        return "not assessable", fill(label(reason, 66), 24, break_on_hyphens=False)
     count = len(row.false_alarms)
     false = f"{count} false {'alarm' if count == 1 else 'alarms'}" if count else ""
     if seen is None:

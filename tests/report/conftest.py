@@ -10,16 +10,24 @@ import pytest
 
 from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
+from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.matching import match
 from cdtool.evaluation.onset import OnsetRule, find_contacts
-from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results, Skipped
+from cdtool.evaluation.results import (
+    ContactResult,
+    ExposureResult,
+    FalseAlarmResult,
+    RecordingResult,
+    Results,
+    Skipped,
+)
+from cdtool.evaluation.traces import Trace, make_trace
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, detect_operation, run_detector
 from cdtool.recording import Recording
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.detection import Detected
-from cdtool.workflows.scoring import Trace
 
 NAMES = ("pure_inertia", "friction_ekf", "momentum", "pure_torque")
 RULE = OnsetRule(above=20.0, back_to=8.0)
@@ -40,7 +48,7 @@ class Bench:
         detections = tuple(self.detect(recording, name) for name in names)
         contacts = tuple(find_contacts(recording, RULE))
         matchings = tuple(match(item.verdict, contacts, item.statistic) for item in detections)
-        return Trace(group, operations_of(recording)[0], contacts, detections, matchings)
+        return make_trace(group, operations_of(recording)[0], contacts, detections, matchings)
 
 
 @pytest.fixture(scope="session")
@@ -64,17 +72,32 @@ def contact(
     detector: str, group: str, latency: float | None, outcome: str = "detected", name: str = "01"
 ) -> ContactResult:
     alarm = None if latency is None else 5.0 + 1e-3 * latency
-    return ContactResult(name, group, detector, "gate", 5.0, 5e-4, alarm, latency, outcome, None, 3600.0)
+    return ContactResult(
+        name, group, detector, "gate", 5.0, 5e-4, alarm, latency, outcome, None, 3600.0, watched_ms=1000.0
+    )
+
+
+def contacts_of(detector: str, group: str, latencies: Sequence[float | str | None]) -> list[ContactResult]:
+    """One recording a contact; None is missed, text says why it is not assessable."""
+    made = []
+    for i, late in enumerate(latencies, 1):
+        name = f"{group}/{i:02}.csv"
+        if isinstance(late, str):
+            made.append(replace(contact(detector, group, None, "not_assessable", name), reason=late))
+        else:
+            made.append(contact(detector, group, late, "detected" if late is not None else "missed", name))
+    return made
 
 
 @pytest.fixture
 def results() -> Results:
     """Two detectors; slow latencies of `momentum`, one miss, one not assessable, one false alarm."""
     rng = np.random.default_rng(3)
-    contacts = [contact("friction_ekf", "stiff", x) for x in (30.0, 34.0, 38.0)]
-    contacts += [contact("momentum", "stiff", x) for x in (60.0, 70.0)]
-    contacts += [contact("momentum", "stiff", None, "missed"), contact("friction_ekf", "stiff", None, "not_assessable")]
-    contacts += [contact("momentum", "soft", float(x)) for x in rng.uniform(300.0, 400.0, 30)]
+    soft = [float(late) for late in rng.uniform(300.0, 400.0, 30)]
+    contacts = contacts_of("friction_ekf", "stiff", [30.0, 34.0, 38.0, "standing still"])
+    contacts += contacts_of("momentum", "stiff", [60.0, 70.0, None])
+    contacts += contacts_of("momentum", "soft", soft)
+    logs = {"stiff": 4, "soft": 30, "holdout": 40}
     return Results(
         provenance={
             "tool_version": "9.8.7",
@@ -83,12 +106,29 @@ def results() -> Results:
             "short_names": {"friction_ekf": "feekf"},
             "gains": {"momentum": {"bandwidth": 30.0}},
             "signature_sha256": {"momentum": "5eed" * 16},
-            "logs_sha256": {"stiff/01.csv": "ab12" * 16},
+            "learned_sha256": {"free/01.csv": "ab12" * 16},
+            "units": {"momentum": "N"},
         },
         detectors=("friction_ekf", "momentum"),
         groups=("stiff", "soft", "holdout"),
         contacts=tuple(contacts),
-        false_alarms=(FalseAlarmResult("h1", "holdout", "momentum", "gate", 1.0),),
-        exposure=(ExposureResult("holdout", "momentum", 40, 40, 0.1), ExposureResult("stiff", "momentum", 3, 3, 0.01)),
+        false_alarms=(FalseAlarmResult("holdout/01.csv#2", "holdout", "momentum", "gate", 1.0, "above", 25.0, 20.0),),
+        exposure=(
+            ExposureResult("stiff", "friction_ekf", 4, 4, 0.01, 1, {"standing still": 0.25}),
+            ExposureResult("stiff", "momentum", 3, 3, 0.01),
+            ExposureResult("soft", "momentum", 30, 30, 0.06),
+            ExposureResult("holdout", "momentum", 40, 40, 0.1),
+        ),
+        recordings=tuple(
+            RecordingResult(f"{group}/{i:02}.csv", group, "cd34" * 16, 7.0, 1, int(group != "holdout"))
+            for group, count in logs.items()
+            for i in range(1, count + 1)
+        ),
         skipped=(Skipped("broken.csv", "broken.csv: empty file"),),
     )
+
+
+@pytest.fixture
+def evaluated(results: Results) -> Evaluated:
+    """The same with its statistics."""
+    return evaluate(results)

@@ -1,156 +1,71 @@
-"""Tables and folders: right figures, nothing active from names, nothing outside the folder."""
+"""Targets and folders: each suffix gets its content, a folder holds everything, nothing leaves it."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import pytest
-from markdown_it import MarkdownIt
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.evaluated import evaluate
+from cdtool.evaluation.results import ForceResult, ForceStepResult
+from cdtool.evaluation.traces_file import encode_traces, read_traces
 from cdtool.report.contacts_csv import contacts_csv
-from cdtool.report.markdown import Image, to_markdown
-from cdtool.report.outputs import check_outputs, slug, write_outputs
-from cdtool.workflows.benchmark import Benchmark
-from tests.report.conftest import Bench, contact
+from cdtool.report.junit import to_junit
+from cdtool.report.markdown import to_markdown
+from cdtool.report.outputs import Report, check_outputs, slug, write_outputs
+from tests.report.conftest import Bench
 from tests.report.hostile import HOSTILE
 
 ALL = "".join(HOSTILE.values())
-
-
-def rows(text: str) -> list[list[str]]:
-    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in text.splitlines() if line[:1] == "|"]
-
-
-def test_the_table_holds_the_figures_of_each_group(results):
-    text = to_markdown(results)
-    found = rows(text)
-    assert ["friction_ekf (feekf)", "34.0", "4.00", "34.0", "3", "0", "1", "0", "0"] in found
-    assert ["momentum", "65.0", "7.07", "65.0", "2", "1", "0", "0", "3"] in found
-    assert ["momentum", "–", "–", "–", "–", "–", "–", "1", "40"] in found
-    assert [line for line in text.splitlines() if line.startswith("## ")][:3] == ["## stiff", "## soft", "## holdout"]
-
-
-def test_onset_rule_skipped_recordings_and_provenance_are_stated(results):
-    text = to_markdown(results)
-    assert "above 20 N, back to 8 N" in text
-    assert ["broken.csv", "empty file"] in rows(text)
-    for expected in ("9.8.7", "c0ffee" * 10, "5eed" * 16, "ab12" * 16, "bandwidth = 30.0"):
-        assert expected in text
-
-
-def test_images_are_linked_by_relative_name_below_their_group(results):
-    text = to_markdown(results, [Image("latency.png", "all"), Image("triggers_soft.png", "soft [x]", "soft")])
-    assert text.index("![all](latency.png)") < text.index("## stiff") < text.index("## soft")
-    assert text.index("## soft") < text.index("](triggers_soft.png)") < text.index("## holdout")
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_markdown_shows_hostile_names_as_text(results, kind):
-    name = HOSTILE[kind]
-    changed = replace(
-        results,
-        groups=(name,),
-        detectors=(name,),
-        contacts=(contact(name, name, 30.0),),
-        skipped=(Skipped(name, name),),
-        findings=(Skipped(name, name),),
-        provenance={"onset": name, "machine": name, "gains": {name: {name: name}}, "logs_sha256": {name: name}},
-    )
-    tokens = (
-        MarkdownIt("commonmark")
-        .enable(["table", "strikethrough"])
-        .parse(to_markdown(changed, [Image("a.png", name, name)]))
-    )
-    inline = [child for token in tokens for child in token.children or ()]
-    images = [child for child in inline if child.type == "image"]
-    assert [image.attrs["src"] for image in images] == ["a.png"]
-    active = {child.type for child in inline} - {"text", "text_special", "softbreak", "image"}
-    assert not active
-    assert not any(token.type.startswith("html") for token in tokens)
-    assert sum(token.type == "table_open" for token in tokens) == 6
-    widths = [len(row) for row in _table_rows(tokens)]
-    assert set(widths) == {9, 2, 3}
-    assert widths.count(9) == 2
-
-
-def _table_rows(tokens):
-    found, current = [], []
-    for token in tokens:
-        if token.type == "tr_open":
-            current = []
-        elif token.type in ("td_open", "th_open"):
-            current.append(token)
-        elif token.type == "tr_close":
-            found.append(current)
-    return found
-
-
-def test_the_csv_holds_every_contact_with_untouched_numbers(results):
-    low = replace(contact("momentum", "stiff", -0.5), onset_s=-1.25)
-    read = list(csv.DictReader(io.StringIO(contacts_csv(replace(results, contacts=(*results.contacts, low))))))
-    assert len(read) == len(results.contacts) + 1
-    assert read[0]["latency_ms"] == "30.0"
-    assert read[0]["clipped"] == "false"
-    assert read[0]["force_at_alarm_n"] == ""
-    assert read[-1]["onset_s"] == "-1.25"
-    assert read[-1]["latency_ms"] == "-0.5"
-
-
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
-def test_a_spreadsheet_runs_no_cell(results, start):
-    text = f'{start}cmd|"/c calc"!A1,\nrest'
-    read = list(
-        csv.DictReader(
-            io.StringIO(contacts_csv(replace(results, contacts=(contact(text, text, 1.0, name=text),))), newline="")
-        )
-    )
-    assert len(read) == 1
-    assert [read[0][key] for key in ("recording", "group", "detector")] == [f"'{text}"] * 3
-    assert read[0]["outcome"] == "detected"
+WHOLE = {"report.html", "report.md", "results.json", "results.traces.json.gz", "contacts.csv", "junit.xml"}
 
 
 @pytest.fixture
-def done(bench: Bench, simulated, results) -> Benchmark:
+def done(bench: Bench, simulated, results) -> Report:
     """Traces of groups whose names are hostile, or alike once they are file names."""
     recording = simulated("stiff", 1)
     groups = (*HOSTILE.values(), "Stiff", "stiff", "stiff_momentum")
     traces = tuple(bench.trace(replace(recording, name=ALL), group, ("momentum",)) for group in groups)
-    return Benchmark(replace(results, groups=groups), traces, {})
+    return Report(evaluate(replace(results, groups=groups)), traces)
 
 
 def test_a_folder_holds_every_file_and_nothing_leaves_it(done, tmp_path):
     folder = tmp_path / "deep" / "report"
     folder.parent.mkdir()
-    assert write_outputs(done, [folder]) == [folder / "report.md"]
+    assert write_outputs(done, [folder]) == [folder / "report.html"]
     assert [path.name for path in tmp_path.iterdir()] == ["deep"]
     assert [path.name for path in folder.parent.iterdir()] == ["report"]
     names = {path.name for path in folder.iterdir()}
     assert all(path.is_file() for path in folder.iterdir())
-    assert {"report.md", "results.json", "contacts.csv", "latency.png"} <= names
-    assert len(names) == 4 + 2 * len(done.traces)
-    assert {"triggers_stiff.png", "triggers_stiff-2.png", "detection_stiff-momentum_momentum.png"} <= names
+    assert names >= WHOLE
+    images = names - WHOLE
+    assert {"latency.png", "triggers_stiff.png", "triggers_stiff-2.png", "triggers_stiff-momentum.png"} <= images
+    assert sum(name.startswith("triggers_") for name in images) == len(done.traces)
     assert all(name.isascii() and len(name) < 120 for name in names)
     report = (folder / "report.md").read_text(encoding="utf-8")
-    assert all(f"]({name})" in report for name in names if name.endswith(".png"))
+    assert all(name.endswith(".png") and f"]({name})" in report for name in images)
 
 
 def test_each_suffix_gets_its_content(done, tmp_path):
-    targets = [tmp_path / name for name in ("a.json", "a.md", "a.csv", "a.png", "a.SVG", "a.pdf")]
+    names = ("a.json", "a.md", "a.csv", "a.xml", "a.html", "a.png", "a.SVG", "a.pdf")
+    targets = [tmp_path / name for name in names]
     assert write_outputs(done, targets) == targets
-    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 1
-    assert targets[1].read_text(encoding="utf-8") == to_markdown(done.results)
-    assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.results)
-    assert [target.read_bytes()[:4] for target in targets[3:]] == [b"\x89PNG", b"<?xm", b"%PDF"]
+    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 2
+    assert encode_traces(read_traces(tmp_path / "a.traces.json.gz")) == encode_traces(done.traces)
+    assert targets[1].read_text(encoding="utf-8") == to_markdown(done.evaluated)
+    assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.evaluated.results)
+    assert targets[3].read_text(encoding="utf-8") == to_junit(done.evaluated)
+    assert ElementTree.parse(targets[3]).getroot().tag == "testsuites"
+    assert targets[4].read_text(encoding="utf-8").lower().startswith("<!doctype html>")
+    assert [target.read_bytes()[:4] for target in targets[5:]] == [b"\x89PNG", b"<?xm", b"%PDF"]
 
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("a.html", "a.html"), ("no/a.json", "no folder"), ("no/report", "no folder"), ("file", "no folder")],
+    [("a.txt", "a.txt"), ("no/a.json", "no folder"), ("no/report", "no folder"), ("file", "no folder")],
 )
 def test_a_wrong_target_is_refused_before_any_work(tmp_path, name, words):
     (tmp_path / "file").write_text("x", encoding="utf-8")
@@ -178,3 +93,12 @@ def test_slugs_are_safe_and_unique():
     assert len(set(found)) == len(found)
     assert found[-4:] == ["a-b", "a-b-2", "grun", "unnamed-2"]
     assert all(set(name) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for name in found)
+
+
+def test_a_folder_has_the_forces_where_there_are_any(done, results, tmp_path):
+    step = ForceStepResult("dynamic", 0.0, 400.0, 500.0, 12.0, "fail", "too much")
+    force = ForceResult("stiff/01.csv", "stiff", 1, "gap", "fail", 500.0, (step,))
+    assert not (write_outputs(done, [tmp_path / "without"])[0].parent / "forces.csv").exists()
+    judged = Report(evaluate(replace(results, forces=(force,))), ())
+    written = write_outputs(judged, [tmp_path / "with"])[0].parent / "forces.csv"
+    assert "stiff/01.csv,stiff,1,,gap,fail,500.0,dynamic" in written.read_text(encoding="utf-8")

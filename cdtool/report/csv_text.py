@@ -1,0 +1,34 @@
+"""Rows as CSV that a spreadsheet may open and a terminal may show: text from files stays text."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Sequence
+from io import StringIO
+
+from cdtool.plain_text import plain
+
+# A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). Where its list
+# separator is a semicolon, what follows one begins a cell too, in quotation marks or not.
+_RUN_BY_SPREADSHEETS = re.compile(r"(^|;)(\s*)(?=[=+\-@＝＋－＠])")
+
+
+def csv_text(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """One line of names and one a row; empty = no figure."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _RUN_BY_SPREADSHEETS.sub(r"\1\2'", plain(value))
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

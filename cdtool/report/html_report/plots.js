@@ -1,0 +1,292 @@
+// Latencies, the share still undetected, and latency against false alarms: one chart a group of contacts.
+
+const FLOOR_MS = 1;
+const GOLDEN = 0.6180339887;
+const NEAR = 14;
+const MOST_BANDS = 3;
+
+/** The rows whose detectors are not hidden. */
+function visible(panel, hidden) {
+  return panel.rows.filter((row) => !hidden.has(row.detector));
+}
+
+function recordingName(data, number) {
+  return number < 0 ? "a recording that is not listed" : data.recordings[number];
+}
+
+/** Each contact a mark in its detector's lane, with the median and its interval. */
+function latencyPlan(data, panel, openRecording) {
+  const detected = panel.rows.flatMap((row) => row.latency);
+  const all = detected.concat(panel.rows.flatMap((row) => row.watched));
+  const highest = mostOf(all, FLOOR_MS) * 1.1;
+  const lowest = Math.max(leastOf(all, highest), FLOOR_MS);
+  const log = highest > 10 * lowest;
+  const floored = log && detected.some((value) => value < FLOOR_MS);
+  const whole = [log ? lowest / 1.2 : 0, highest];
+  const margin = { left: 10, right: 14, top: 0, bottom: 44 };
+  const lane = (panel.height - margin.bottom) / panel.rows.length;
+  const clamp = (value) => (log ? Math.max(value, lowest) : value);
+  const spread = (i) => 18 * ((i * GOLDEN) % 1) - 9;
+  const heightOf = (row, i) => lane * row + 46 + spread(i);
+
+  function drawLane(chart, row, place) {
+    const detector = data.detectors[row.detector];
+    const top = lane * place;
+    if (place) draw(chart.front, "path", { class: "axis", d: `M10 ${top}H${chart.right}` });
+    const letters = Math.floor((chart.width - 24) / 7);
+    draw(
+      chart.front,
+      "text",
+      { class: "strong", x: 10, y: top + 15 },
+      shorten(detector.name, Math.min(28, letters - 10)),
+    );
+    draw(chart.front, "text", { class: "small", x: chart.right, y: top + 15, "text-anchor": "end" }, row.words);
+    draw(chart.front, "text", { class: "small", x: 10, y: top + 29 }, row.counts);
+    const group = tint(draw(chart.layer, "g"), detector);
+    // Where there are thousands, smaller marks still show where they are.
+    const size = Math.min(3.2, Math.max(1.1, 60 / Math.sqrt(row.latency.length + 1)));
+    const marks = row.latency.map((value, i) =>
+      outline(detector.marker, chart.x(clamp(value)), heightOf(place, i), size),
+    );
+    draw(group, "path", { class: "mark", d: marks.join("") });
+    const open = row.watched.map((value, i) => outline(detector.marker, chart.x(value), heightOf(place, i), 3.6));
+    draw(group, "path", { class: "open", d: open.join("") });
+    drawMedian(chart, row.median, top + 46);
+  }
+
+  function drawMedian(chart, [middle, low, high], y) {
+    if (middle === null) return;
+    const x = chart.x(clamp(middle));
+    const from = low === null ? x : chart.x(clamp(low));
+    const to = high === null ? x : chart.x(clamp(high));
+    draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}M${from} ${y}H${to}` });
+    if (high !== null) return;
+    const end = chart.right - 6;
+    draw(chart.layer, "path", {
+      class: "cross",
+      d: `M${x} ${y}H${end}M${end - 5} ${y - 4}L${end} ${y}L${end - 5} ${y + 4}`,
+    });
+  }
+
+  function nearest(chart, values, place, x, y) {
+    let best = -1,
+      distance = NEAR;
+    values.forEach((value, i) => {
+      const off = Math.hypot(chart.x(clamp(value)) - x, heightOf(place, i) - y);
+      if (off < distance) [best, distance] = [i, off];
+    });
+    return { best, distance };
+  }
+
+  return {
+    whole,
+    home: whole,
+    log,
+    margin,
+    label: `latency from contact onset to alarm [ms]${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
+    draw: (chart) => panel.rows.forEach((row, place) => drawLane(chart, row, place)),
+    probe(chart, x, y) {
+      const place = Math.floor(y / lane);
+      const row = panel.rows[place];
+      if (!row) return null;
+      const hit = nearest(chart, row.latency, place, x, y);
+      const miss = nearest(chart, row.watched, place, x, y);
+      if (hit.best < 0 && miss.best < 0) return null;
+      const missed = miss.distance < hit.distance;
+      const i = missed ? miss.best : hit.best;
+      const recording = (missed ? row.missed_recording : row.recording)[i];
+      const contact = (missed ? row.missed_contact : row.contact)[i];
+      const value = (missed ? row.watched : row.latency)[i];
+      const open = openRecording(recording);
+      const words = [
+        data.detectors[row.detector].name,
+        `${recordingName(data, recording)}, contact ${contact}`,
+        missed ? `missed: no alarm within ${figure(value)} ms` : `${figure(value)} ms`,
+      ];
+      if (open) words.push("click: trigger plot");
+      return { x: chart.x(clamp(value)), y: heightOf(place, i), mark: true, words: words.join("\n"), open };
+    },
+  };
+}
+
+/** Share of the contacts still undetected over the time since the onset: a step curve a detector. */
+function survivalPlan(data, panel, hidden) {
+  const until = Math.max(...panel.rows.map((row) => row.until), FLOOR_MS);
+  const last = Math.max(...panel.rows.map((row) => row.times[row.times.length - 1]), FLOOR_MS);
+  const margin = { left: 52, right: 14, top: 10, bottom: 44 };
+  const y = (share) => margin.top + (1 - share) * (panel.height - margin.top - margin.bottom);
+  const stepAt = (row, time) => Math.max(placeOf(row.times, time + 1e-9) - 1, 0);
+
+  function stepPath(chart, row, values) {
+    let path = `M${chart.x(row.times[0]).toFixed(1)} ${y(values[0]).toFixed(1)}`;
+    for (let i = 1; i < row.times.length; i += 1)
+      path += `H${chart.x(row.times[i]).toFixed(1)}V${y(values[i]).toFixed(1)}`;
+    return `${path}H${chart.x(row.until).toFixed(1)}`;
+  }
+
+  function bandPath(chart, row) {
+    const back = [];
+    for (let i = row.times.length - 1; i >= 0; i -= 1) {
+      const to = i ? chart.x(row.times[i]).toFixed(1) : chart.x(row.times[0]).toFixed(1);
+      back.push(`V${y(row.low[i]).toFixed(1)}H${to}`);
+    }
+    return `${stepPath(chart, row, row.high)}${back.join("")}Z`;
+  }
+
+  return {
+    whole: [0, until * 1.02],
+    home: [0, Math.min(until * 1.02, last * 1.15)],
+    log: false,
+    margin,
+    label: "time since contact onset [ms]",
+    draw(chart) {
+      chart.drawLevels(y, 0, 1, 4, margin.top, (share) => `${Math.round(100 * share)} %`);
+      const rows = visible(panel, hidden);
+      for (const row of rows) {
+        const group = tint(draw(chart.layer, "g"), data.detectors[row.detector]);
+        if (rows.length <= MOST_BANDS) draw(group, "path", { class: "shade", d: bandPath(chart, row) });
+        draw(group, "path", { class: "line", d: stepPath(chart, row, row.share) });
+      }
+    },
+    probe(chart, x, pointerY) {
+      if (x < margin.left || x > chart.right || pointerY > chart.bottom) return null;
+      const time = chart.valueAtPixel(x);
+      const words = visible(panel, hidden).map((row) => {
+        const i = stepAt(row, time);
+        if (time > row.until) return `${data.detectors[row.detector].name}: not watched any more`;
+        const [share, low, high] = [row.share, row.low, row.high].map((values) => figure(100 * values[i], 2));
+        return `${data.detectors[row.detector].name}: ${share} % (${low} to ${high}) of ${row.n}`;
+      });
+      return { x, y: pointerY, words: [`${figure(time)} ms after the onset, undetected:`, ...words].join("\n") };
+    },
+  };
+}
+
+/** Median latency against the rate of false alarms: a point a safety factor. */
+function amocPlan(data, panel, hidden, unit) {
+  const zone = 92;
+  const margin = { left: 48 + zone, right: 16, top: 34, bottom: 56 };
+  const exposure = (row) => (unit === "hour" ? row.hours : row.operations);
+  const rates = panel.rows.flatMap((row) => row.alarms.filter(Boolean).map((count) => count / exposure(row)));
+  const least = Math.min(...rates, ...panel.rows.map((row) => 1 / exposure(row)));
+  const range = [least / 1.4, Math.max(...rates, least * 4) * 1.4];
+  const highest =
+    1.08 * Math.max(...panel.rows.flatMap((row) => row.median.filter((value) => value !== null)), FLOOR_MS);
+  const y = (value) => margin.top + (1 - value / highest) * (panel.height - margin.top - margin.bottom);
+  const columnOf = (row) => margin.left - zone + (zone * (panel.rows.indexOf(row) + 0.5)) / panel.rows.length;
+  const xOf = (chart, row, i) => (row.alarms[i] ? chart.x(row.alarms[i] / exposure(row)) : columnOf(row));
+  const yOf = (row, i) => (row.median[i] === null ? margin.top - 8 : y(row.median[i]));
+  const seen = (chart, row, i) => {
+    const x = xOf(chart, row, i);
+    return row.alarms[i] === 0 || (x >= margin.left && x <= chart.right);
+  };
+
+  function drawCurve(chart, row) {
+    const detector = data.detectors[row.detector];
+    const group = tint(draw(chart.front, "g"), detector);
+    let path = "",
+      solid = "",
+      open = "",
+      outside = "";
+    let down = false;
+    row.factor.forEach((_, i) => {
+      const shown = seen(chart, row, i);
+      const [x, at] = [xOf(chart, row, i), yOf(row, i)];
+      if (shown && row.median[i] !== null) {
+        path += `${down ? "L" : "M"}${x.toFixed(1)} ${at.toFixed(1)}`;
+        const mark = outline(detector.marker, x, at, i === row.chosen ? 5 : 2.4);
+        if (row.missed[i]) open += mark;
+        else solid += mark;
+      } else if (shown) {
+        outside += outline("^", x, at, 3.2);
+      }
+      down = shown && row.median[i] !== null;
+    });
+    draw(group, "path", { class: "line", d: path });
+    draw(group, "path", { class: "mark", d: solid });
+    draw(group, "path", { class: "open", d: open });
+    draw(group, "path", { class: "open", d: outside });
+    if (row.chosen >= 0 && seen(chart, row, row.chosen)) {
+      draw(chart.front, "circle", { class: "ring", cx: xOf(chart, row, row.chosen), cy: yOf(row, row.chosen), r: 9 });
+    }
+  }
+
+  function wordsOf(row, i) {
+    const per = unit === "hour" ? "hour" : "operation";
+    const alarms = row.alarms[i];
+    const rate = alarms ? `${figure(alarms / exposure(row))} per ${per}` : `at most ${row.none[unit]} per ${per}`;
+    const median = row.median[i] === null ? "median not reached" : `median ${figure(row.median[i])} ms`;
+    const inUse = i === row.chosen ? " (in use)" : "";
+    return [
+      `${data.detectors[row.detector].name}, safety factor ${figure(row.factor[i])}${inUse}`,
+      `${median}: ${row.detected[i]} detected, ${row.missed[i]} missed, ${row.not_assessable} not assessable`,
+      `${counted(alarms, "false alarm")} in ${row.operations} operations, ${figure(row.hours)} h: ${rate}`,
+    ].join("\n");
+  }
+
+  return {
+    whole: range,
+    home: range,
+    log: true,
+    margin,
+    label: `false alarms per ${unit}`,
+    draw(chart) {
+      const left = margin.left - zone;
+      for (const tick of ticksOf(0, highest, 5).values) {
+        const at = y(tick).toFixed(1);
+        draw(chart.front, "path", { class: "axis", d: `M${left} ${at}H${chart.right}` });
+        draw(
+          chart.front,
+          "text",
+          { class: "small", x: left - 6, y: Number(at) + 4, "text-anchor": "end" },
+          tickWords(tick, 0),
+        );
+      }
+      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, "median latency [ms]");
+      draw(chart.front, "path", { class: "axis", d: `M${left} ${chart.bottom}H${margin.left}V${margin.top}` });
+      const fewest = panel.rows.reduce((a, b) => (exposure(b) < exposure(a) ? b : a));
+      const middle = margin.left - zone / 2;
+      const watched = unit === "hour" ? `${figure(fewest.hours)} h` : `${fewest.operations} operations`;
+      draw(
+        chart.front,
+        "text",
+        { class: "small", x: middle, y: chart.bottom + 16, "text-anchor": "middle" },
+        "none in",
+      );
+      draw(chart.front, "text", { class: "small", x: middle, y: chart.bottom + 30, "text-anchor": "middle" }, watched);
+      draw(
+        chart.front,
+        "text",
+        { class: "small", x: middle, y: chart.bottom + 44, "text-anchor": "middle" },
+        `(at most ${fewest.none[unit]})`,
+      );
+      for (const row of visible(panel, hidden)) drawCurve(chart, row);
+    },
+    probe(chart, x, pointerY) {
+      let best = null,
+        distance = NEAR;
+      for (const row of visible(panel, hidden)) {
+        row.factor.forEach((_, i) => {
+          const off = Math.hypot(xOf(chart, row, i) - x, yOf(row, i) - pointerY);
+          if (off < distance && seen(chart, row, i)) {
+            distance = off;
+            best = { x: xOf(chart, row, i), y: yOf(row, i), mark: true, words: wordsOf(row, i) };
+          }
+        });
+      }
+      return best;
+    },
+  };
+}
+
+/** Two choices beside each other; calls back with the one chosen. */
+function makeChoice(host, words, options, changed) {
+  make(host, "span", {}, words);
+  options.forEach(([value, text], i) => {
+    const label = make(host, "label");
+    const input = make(label, "input", { type: "radio", name: words, value });
+    input.checked = i === 0;
+    label.append(` ${text}`);
+    input.addEventListener("change", () => changed(value));
+  });
+}

@@ -1,0 +1,89 @@
+// What the page does once it is there: sort tables, page through long ones, draw plots, show traces.
+
+function elements(kind) {
+  return [...document.querySelectorAll(`svg[data-plot="${kind}"]`)];
+}
+
+/** The charts of one kind; where the page has a place for a legend, its names hide curves. */
+function makeCharts(kind, data, panels, plan) {
+  const host = document.querySelector(`.legend[data-for="${kind}"]`);
+  let charts = [];
+  const redraw = () => charts.forEach((chart) => chart.redraw());
+  const hidden = host ? makeLegend(host, data.detectors, detectorsIn(panels), redraw) : new Set();
+  charts = elements(kind).map((svg) => new Chart(svg, plan(panels[Number(svg.dataset.number)], hidden)));
+  return charts;
+}
+
+function makeAmoc(data) {
+  const controls = document.querySelector('.controls[data-for="amoc"]');
+  if (!controls) return;
+  let unit = "operation";
+  let hiddenNow = new Set();
+  const charts = makeCharts("amoc", data, data.amoc, (panel, hidden) => {
+    hiddenNow = hidden;
+    return amocPlan(data, panel, hidden, unit);
+  });
+  makeChoice(
+    controls,
+    "False alarms",
+    [
+      ["operation", "per operation"],
+      ["hour", "per hour"],
+    ],
+    (chosen) => {
+      unit = chosen;
+      charts.forEach((chart, i) => chart.replace(amocPlan(data, data.amoc[i], hiddenNow, unit)));
+    },
+  );
+}
+
+function makeForces(data, viewer) {
+  const host = document.querySelector('.legend[data-for="force"]');
+  if (!host || !viewer) return;
+  const plans = data.force.map((panel) => forcePlan(data, panel, viewer.traceAt, viewer.open));
+  elements("force").forEach((svg) => new Chart(svg, plans[Number(svg.dataset.number)]));
+  const told = data.force.flatMap((panel) =>
+    panel.curves.flatMap((item) => viewer.traceAt(item.trace).panels.map((row) => row.detector)),
+  );
+  makeForceLegend(host, data, told);
+}
+
+/** Folded parts are printed too. */
+function unfoldForPrint() {
+  let folded = [];
+  addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("details:not([open])")];
+    for (const part of folded) part.open = true;
+  });
+  addEventListener("afterprint", () => {
+    for (const part of folded) part.open = false;
+  });
+}
+
+function start() {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const sources = [...document.querySelectorAll("script.trace")];
+  for (const table of document.querySelectorAll("table")) sortInPlace(table);
+  const paged = [];
+  const viewer =
+    sources.length && document.getElementById("viewer")
+      ? makeViewer(data, sources, (trace) => paged.forEach((table) => table.mark(trace)))
+      : null;
+  for (const host of document.querySelectorAll(".paged")) {
+    const table = data.tables.find((item) => item.name === host.dataset.table);
+    paged.push(new PagedTable(host, table, table.caption, viewer ? viewer.open : () => {}));
+  }
+  const byRecording = data.tables.find((table) => table.name === "recordings-table");
+  const openRecording = (recording) => {
+    const traces = viewer && byRecording ? byRecording.opens[recording] : null;
+    return traces ? () => viewer.open(traces[0]) : null;
+  };
+  makeCharts("latency", data, data.latency, (panel) => latencyPlan(data, panel, openRecording));
+  makeCharts("survival", data, data.survival, (panel, hidden) => survivalPlan(data, panel, hidden));
+  makeAmoc(data);
+  makeForces(data, viewer);
+  if (viewer) viewer.open(0, false);
+  unfoldForPrint();
+}
+
+start();

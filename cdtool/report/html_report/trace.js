@@ -1,0 +1,386 @@
+// One recording: the load cell on top, below it a row a detector with signal, band, limits and alarm.
+
+const HEAD = 18,
+  GAP = 10;
+const HEADROOM = 1.5;
+const REASONS = { 1: "start-up", 2: "not applicable", 3: "missing samples", 4: "no limit known here" };
+const HATCHES = {
+  1: "M0 8L8 0",
+  2: "M0 8L8 0M0 0L8 8",
+  3: "M1 2h2M5 6h2",
+  4: "M0 0L8 8",
+};
+const LONGEST_LABEL = 40;
+
+/** A trace with its curves as numbers. */
+function readTrace(text) {
+  const trace = JSON.parse(text);
+  trace.times = unpack(trace.force_time);
+  trace.values = unpack(trace.force);
+  for (const panel of trace.panels) {
+    for (const name of ["time", "value", "lower", "upper"]) panel[name] = unpack(panel[name]);
+    panel.status = Uint8Array.from(panel.status.flatMap(([code, count]) => Array(count).fill(code)));
+  }
+  return trace;
+}
+
+function shownContact(trace) {
+  return trace.contact >= 0 ? trace.contacts[trace.contact] : null;
+}
+
+/** What a row says at its right: the latency, or why there is none. */
+function verdictOf(trace, panel) {
+  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
+  const extra = panel.false_alarms.length ? counted(panel.false_alarms.length, "false alarm") : "";
+  const outcome = seen ? seen.outcome : panel.verdict === "not assessable" ? "not_assessable" : "";
+  if (outcome === "not_assessable") return { words: "not assessable", reason: (seen && seen.reason) || panel.reason };
+  if (!seen) return { words: extra || "no alarm", reason: "" };
+  const words = outcome === "detected" ? `${figure(1e3 * seen.late)} ms` : "missed";
+  return { words, reason: extra };
+}
+
+/** When a row's trigger rises: with the contact's alarm, or the first one of a run without contacts. */
+function triggerOf(trace, panel) {
+  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
+  if (seen) return seen.outcome === "detected" ? seen.alarm : null;
+  return panel.alarms.length ? panel.alarms[0] : null;
+}
+
+/** Stretches of samples that could not be judged: first and last time, and the reason's number. */
+function unjudged(panel) {
+  const found = [];
+  for (let i = 0; i < panel.status.length; i += 1) {
+    const code = panel.status[i];
+    if (!code) continue;
+    let end = i;
+    while (end + 1 < panel.status.length && panel.status[end + 1] === code) end += 1;
+    found.push({ code, from: panel.time[i], to: panel.time[Math.min(end + 1, panel.time.length - 1)] });
+    i = end;
+  }
+  return found;
+}
+
+/** The vertical range: all limits and judged values in view, excursions up to some bands beyond. */
+function frame(panel, first, last) {
+  const values = [],
+    bounds = [];
+  for (let i = first; i < last; i += 1) {
+    const value = panel.value[i],
+      judged = panel.status[i] === 0;
+    const limits = [panel.lower[i], panel.upper[i]].filter(Number.isFinite);
+    for (const limit of limits) bounds.push(limit);
+    if (!Number.isFinite(value) || !judged) continue;
+    values.push(value);
+    if (value >= panel.lower[i] && value <= panel.upper[i]) bounds.push(value);
+  }
+  if (!values.length)
+    for (let i = first; i < last; i += 1) if (Number.isFinite(panel.value[i])) values.push(panel.value[i]);
+  const all = values.concat(bounds);
+  if (!all.length) return [-1, 1];
+  let [low, high] = [leastOf(all), mostOf(all)];
+  if (bounds.length) {
+    const [near, far] = [leastOf(bounds), mostOf(bounds)];
+    const room = HEADROOM * Math.max(far - near, 1e-12);
+    low = Math.max(low, near - room);
+    high = Math.min(high, far + room);
+  }
+  const margin = 0.08 * (high - low) || 0.5 * Math.abs(high) || 1;
+  return [low - margin, high + margin];
+}
+
+function tracePlan(data, trace) {
+  const { heights } = data;
+  const contact = shownContact(trace);
+  const forced = trace.times.length > 0;
+  const margin = { left: 50, right: 10, top: 0, bottom: heights.axis };
+  const rows = [...trace.panels].sort((a, b) => lateness(trace, a) - lateness(trace, b));
+  const first = forced ? heights.force : 0;
+
+  /** A curve with a break where a sample is missing. */
+  function line(chart, times, values, y, from, to, keep = () => true) {
+    let path = "",
+      down = false;
+    for (let i = from; i < to; i += 1) {
+      const drawn = Number.isFinite(values[i]) && keep(i);
+      if (drawn) path += `${down ? "L" : "M"}${chart.x(times[i]).toFixed(1)} ${y(values[i]).toFixed(1)}`;
+      down = drawn;
+    }
+    return path;
+  }
+
+  function part(chart, times) {
+    const [low, high] = chart.view;
+    return [Math.max(placeOf(times, low) - 1, 0), Math.min(placeOf(times, high) + 1, times.length)];
+  }
+
+  function area(top, height, low, high) {
+    const from = top + HEAD,
+      to = top + height - GAP;
+    // Beyond some screens a browser would no longer draw it.
+    return { from, to, y: (value) => Math.min(Math.max(to - ((value - low) / (high - low)) * (to - from), -1e5), 1e5) };
+  }
+
+  function levels(chart, place, low, high) {
+    const ticks = ticksOf(low, high, 3);
+    for (const tick of ticks.values) {
+      const y = place.y(tick);
+      if (y < place.from || y > place.to) continue;
+      draw(
+        chart.front,
+        "text",
+        { class: "small", x: margin.left - 6, y: y + 4, "text-anchor": "end" },
+        tickWords(tick, ticks.step),
+      );
+      draw(chart.layer, "path", { class: "axis", d: `M${margin.left} ${y.toFixed(1)}H${chart.right}` });
+    }
+  }
+
+  function drawForce(chart) {
+    const [from, to] = part(chart, trace.times);
+    const seen = trace.values.subarray(from, to).filter(Number.isFinite);
+    const most = mostOf(seen, 1),
+      least = leastOf(seen, 0);
+    const place = area(0, heights.force, least - 0.06 * (most - least), most + 0.06 * (most - least));
+    draw(chart.front, "text", { class: "strong", x: 0, y: 13 }, "load cell [N]");
+    levels(chart, place, least, most);
+    draw(chart.layer, "path", { class: "force", d: line(chart, trace.times, trace.values, place.y, from, to) });
+  }
+
+  function drawRow(chart, panel, place) {
+    const detector = data.detectors[panel.detector];
+    const top = first + heights.row * place;
+    const [from, to] = part(chart, panel.time);
+    const [low, high] = frame(panel, from, to);
+    const box = area(top, heights.row, low, high);
+    const { words, reason } = verdictOf(trace, panel);
+    const joint = trace.joints > 1 ? ` · ${panel.joint}` : "";
+    const letters = Math.floor(chart.width / 8) - words.length;
+    draw(
+      chart.front,
+      "text",
+      { class: "strong", x: 0, y: top + 13 },
+      shorten(`${detector.name} [${panel.unit}]${joint}`, Math.max(Math.min(letters, LONGEST_LABEL), 12)),
+    );
+    const verdict = draw(chart.front, "text", { x: chart.right, y: top + 13, "text-anchor": "end" });
+    const room = Math.floor(chart.width / 7) - 46;
+    if (reason && room > 12) draw(verdict, "tspan", { class: "small" }, `${shorten(reason, Math.min(room, 90))}  `);
+    draw(verdict, "tspan", { class: "strong" }, words);
+    const layer = chart.clipped(chart.layer, box.from, box.to);
+    drawBand(layer, chart, panel, box, from, to);
+    levels(chart, box, low, high);
+    drawTrigger(chart, panel, detector, box);
+    drawUnjudged(chart, panel, box);
+    const group = tint(draw(layer, "g"), detector);
+    draw(layer, "path", {
+      class: "unjudged",
+      d: line(chart, panel.time, panel.value, box.y, from, to, (i) => panel.status[i] !== 0),
+    });
+    draw(group, "path", {
+      class: "line",
+      d: line(chart, panel.time, panel.value, box.y, from, to, (i) => panel.status[i] === 0),
+    });
+    for (const limit of [panel.lower, panel.upper]) {
+      draw(layer, "path", { class: "limit", d: line(chart, panel.time, limit, box.y, from, to) });
+    }
+  }
+
+  function drawBand(layer, chart, panel, box, from, to) {
+    let path = "",
+      i = from;
+    const held = (at) =>
+      panel.status[at] === 0 &&
+      !Number.isNaN(panel.lower[at]) &&
+      !Number.isNaN(panel.upper[at]) &&
+      (Number.isFinite(panel.lower[at]) || Number.isFinite(panel.upper[at]));
+    const edge = (value) => (value === Infinity ? box.from : value === -Infinity ? box.to : box.y(value));
+    while (i < to) {
+      const begin = i;
+      while (i < to && held(i)) i += 1;
+      const points = [];
+      for (let k = begin; k < i; k += 1)
+        points.push(`${chart.x(panel.time[k]).toFixed(1)} ${edge(panel.upper[k]).toFixed(1)}`);
+      for (let k = i - 1; k >= begin; k -= 1)
+        points.push(`${chart.x(panel.time[k]).toFixed(1)} ${edge(panel.lower[k]).toFixed(1)}`);
+      if (points.length) path += `M${points.join("L")}Z`;
+      i += 1;
+    }
+    draw(layer, "path", { class: "band", d: path });
+  }
+
+  function drawUnjudged(chart, panel, box) {
+    for (const { code, from, to } of unjudged(panel)) {
+      const left = Math.max(chart.x(from), margin.left),
+        width = Math.min(chart.x(to), chart.right) - left;
+      if (width < 1) continue;
+      draw(chart.layer, "rect", {
+        x: left,
+        y: box.from,
+        width,
+        height: box.to - box.from,
+        fill: `url(#hatch-${code})`,
+      });
+      const words = [`not assessable: ${REASONS[code]}`, REASONS[code]].find((text) => text.length * 6.2 + 8 < width);
+      if (words) draw(chart.front, "text", { class: "small halo", x: left + 4, y: box.to - 4 }, words);
+    }
+  }
+
+  function drawTrigger(chart, panel, detector, box) {
+    const rises = triggerOf(trace, panel);
+    const group = tint(draw(chart.layer, "g"), detector);
+    const height = box.to - box.from;
+    for (const time of panel.alarms) {
+      draw(group, "path", {
+        class: panel.false_alarms.includes(time) ? "alarm false" : "alarm",
+        d: `M${chart.x(time).toFixed(1)} ${box.from}v${height}`,
+      });
+    }
+    if (rises === null) return;
+    const left = Math.max(chart.x(rises), margin.left);
+    draw(group, "rect", { class: "trigger", x: left, y: box.from, width: Math.max(chart.right - left, 0), height });
+  }
+
+  function drawOnsets(chart) {
+    for (const { start } of trace.contacts) {
+      draw(chart.layer, "path", {
+        class: "onset",
+        d: `M${chart.x(start).toFixed(1)} ${forced ? HEAD : 0}V${chart.bottom}`,
+      });
+    }
+  }
+
+  return {
+    whole: [trace.start, trace.end],
+    home: trace.view,
+    log: false,
+    margin,
+    offset: contact ? contact.start : 0,
+    scale: contact ? 1e3 : 1,
+    label: contact ? "time from contact onset [ms]" : "time [s]",
+    draw(chart) {
+      const defs = draw(chart.svg, "defs");
+      for (const [code, d] of Object.entries(HATCHES)) {
+        const pattern = draw(defs, "pattern", {
+          id: `hatch-${code}`,
+          class: "hatch",
+          width: 8,
+          height: 8,
+          patternUnits: "userSpaceOnUse",
+        });
+        draw(pattern, "path", { d });
+      }
+      if (forced) drawForce(chart);
+      rows.forEach((panel, place) => drawRow(chart, panel, place));
+      drawOnsets(chart);
+    },
+    probe(chart, x, y) {
+      if (x < margin.left || x > chart.right || y > chart.bottom) return null;
+      const time = chart.valueAtPixel(x);
+      const when = contact ? `${figure(1e3 * (time - contact.start), 4)} ms from onset` : `${time.toFixed(3)} s`;
+      if (y < first) return { x, y, words: `${when}\nload cell ${figure(valueAt(trace.times, trace.values, time))} N` };
+      const panel = rows[Math.floor((y - first) / heights.row)];
+      if (!panel) return null;
+      const i = Math.max(placeOf(panel.time, time) - 1, 0);
+      const status = panel.status[i] ? `not assessable: ${REASONS[panel.status[i]]}` : "";
+      const limits = [panel.lower[i], panel.upper[i]].map((limit) => (Number.isFinite(limit) ? figure(limit) : "none"));
+      const words = [
+        when,
+        `${data.detectors[panel.detector].name}: ${figure(panel.value[i])} ${panel.unit}`,
+        `limits: ${limits[0]} to ${limits[1]}`,
+        status,
+      ];
+      return { x, y, words: words.filter(Boolean).join("\n") };
+    },
+  };
+}
+
+function lateness(trace, panel) {
+  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
+  if (!seen) return 0;
+  return { detected: seen.late, missed: 1e6 }[seen.outcome] ?? 1e7;
+}
+
+/** The panel above the table of recordings; returns open(number) to show a trace. */
+function makeViewer(data, sources, opened) {
+  const viewer = document.getElementById("viewer");
+  const svg = document.getElementById("viewer-plot");
+  const read = new Map();
+  let chart = null,
+    current = -1;
+  const traceAt = (number) => {
+    if (!read.has(number)) read.set(number, readTrace(sources[number].textContent));
+    return read.get(number);
+  };
+
+  function open(number, travel = true) {
+    const trace = traceAt(number);
+    current = number;
+    viewer.hidden = false;
+    svg.setAttribute("height", trace.height);
+    if (chart) chart.replace(tracePlan(data, trace));
+    else chart = new Chart(svg, tracePlan(data, trace));
+    tell(trace, number);
+    opened(number);
+    if (!travel) return;
+    viewer.scrollIntoView({ block: "start" });
+    document.getElementById("viewer-title").focus({ preventScroll: true });
+  }
+
+  function tell(trace, number) {
+    const contact = shownContact(trace);
+    const words = [trace.group];
+    if (!contact) words.push("no contact");
+    else if (trace.contacts.length > 1) words.push(`contact ${trace.contact + 1} of ${trace.contacts.length}`);
+    if (contact && contact.peak_force !== null) words.push(`peak ${figure(contact.peak_force)} N`);
+    if (contact)
+      words.push(
+        `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${figure(1e3 * contact.uncertainty, 2)} ms)`,
+      );
+    words.push(`plot ${number + 1} of ${sources.length}${trace.chosen ? `: ${trace.chosen}` : ""}`);
+    document.getElementById("viewer-title").textContent = trace.recording || "(no name)";
+    document.getElementById("viewer-words").textContent = words.join(" · ");
+    const list = document.getElementById("viewer-why");
+    list.replaceChildren();
+    for (const panel of trace.panels) {
+      for (const line of panel.why) make(list, "li", {}, `${data.detectors[panel.detector].name}: ${line}`);
+    }
+    viewer.querySelector('[data-do="before"]').disabled = number === 0;
+    viewer.querySelector('[data-do="after"]').disabled = number === sources.length - 1;
+  }
+
+  const actions = {
+    in: () => chart.zoom(1 / ZOOM_STEP),
+    out: () => chart.zoom(ZOOM_STEP),
+    left: () => chart.pan(-0.25),
+    right: () => chart.pan(0.25),
+    home: () => chart.home(),
+    whole: () => chart.all(),
+    before: () => open(current - 1, false),
+    after: () => open(current + 1, false),
+  };
+  for (const button of viewer.querySelectorAll("[data-do]")) {
+    button.addEventListener("click", actions[button.dataset.do]);
+  }
+  makeTraceLegend(document.getElementById("viewer-legend"));
+  return { open, traceAt };
+}
+
+function makeTraceLegend(host) {
+  const marks = [
+    ["onset", "M0 6H26", "contact onset"],
+    ["limit", "M0 6H26", "limit"],
+    ["band", "M0 0H26V12H0Z", "normal band"],
+    ["unjudged", "M0 12L12 0M8 12L20 0M16 12L26 2", "not assessable"],
+  ];
+  for (const [kind, d, words] of marks) {
+    const entry = make(host, "span");
+    const svg = draw(entry, "svg", { class: "plot swatch", width: 26, height: 12, "aria-hidden": "true" });
+    draw(svg, "path", { class: kind, d });
+    make(entry, "span", {}, words);
+  }
+  make(
+    host,
+    "span",
+    {},
+    "coloured line: signal; upright line: alarm, dashed where it is false; shaded from there on: trigger on",
+  );
+}

@@ -1,0 +1,57 @@
+"""What a benchmark found, in one line, and what a limit says: the same words in every report."""
+
+from __future__ import annotations
+
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.limits import broken
+from cdtool.evaluation.results import LimitResult
+from cdtool.report.figure_text import NOT_REACHED, NOTHING, counted
+
+NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
+
+
+def verdict_words(evaluated: Evaluated) -> str:
+    """Whether the limits are kept."""
+    limits = evaluated.results.limits
+    if not limits:
+        return "no limits are set"
+    failing = broken(limits)
+    if not failing:
+        return f"all {len(limits)} limits are kept" if len(limits) > 1 else "the limit is kept"
+    unknown = sum(item.outcome == "not assessable" for item in failing)
+    kinds = [f"{len(failing) - unknown} broken"] if len(failing) > unknown else []
+    kinds += [f"{unknown} not assessable"] if unknown else []
+    return f"{len(failing)} of {counted(len(limits), 'limit')} not kept ({', '.join(kinds)})"
+
+
+def counts_words(evaluated: Evaluated) -> str:
+    """What became of the contacts, over all detectors and groups."""
+    summaries, results = evaluated.summaries, evaluated.results
+    if not any(item.contacts or item.operations for item in summaries):
+        return "nothing was scored"
+    contacts = len({(item.group, item.recording, item.contact) for item in results.contacts})
+    counts = (
+        ("detected", sum(item.detected for item in summaries)),
+        ("missed", sum(item.missed for item in summaries)),
+        ("not assessable", sum(item.not_assessable for item in summaries)),
+    )
+    became = ", ".join(f"{count} {what}" for what, count in counts)
+    alarms = counted(sum(item.false_alarms for item in summaries), "false alarm")
+    return f"{counted(contacts, 'contact')} with {counted(len(results.detectors), 'detector')}: {became}; {alarms}"
+
+
+def value_of(limit: LimitResult) -> str:
+    """A limit's figure; one that was checked and has no number is infinite, in as many digits as its reason."""
+    if limit.value is None:
+        return NOTHING if limit.outcome == "not assessable" else NOT_REACHED
+    return f"{limit.value:.6g}"
+
+
+def allowed(limit: LimitResult) -> str:
+    """What a limit allows, as it was written."""
+    least, largest = limit.least, limit.largest
+    if least is not None and largest is not None:
+        return f"{least:.6g} to {largest:.6g}"
+    if largest is not None:
+        return f"at most {largest:.6g}"
+    return NOTHING if least is None else f"at least {least:.6g}"

@@ -1,0 +1,96 @@
+"""Contacts and forces as CSV: untouched numbers, and nothing that a spreadsheet or a terminal would run."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import fields, replace
+
+import pytest
+
+from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
+from cdtool.report.contacts_csv import contacts_csv
+from cdtool.report.forces_csv import forces_csv
+from tests.report.conftest import contact
+from tests.report.hostile import HOSTILE
+
+RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+
+
+def read(text: str, delimiter: str = ",") -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
+
+
+def test_the_csv_holds_every_contact_with_untouched_numbers(results):
+    low = replace(contact("momentum", "stiff", -0.5), onset_s=-1.25, clipped=True, peak_force_n=math.nan)
+    found = read(contacts_csv(replace(results, contacts=(*results.contacts, low))))
+    assert len(found) == len(results.contacts) + 1
+    assert found[0]["latency_ms"] == "30.0"
+    assert found[0]["clipped"] == "false"
+    assert found[0]["force_at_alarm_n"] == ""
+    assert (found[-1]["onset_s"], found[-1]["latency_ms"], found[-1]["clipped"]) == ("-1.25", "-0.5", "true")
+    assert found[-1]["peak_force_n"] == ""
+
+
+def test_the_csv_has_every_field_of_a_contact(results):
+    found = read(contacts_csv(results))
+    assert list(found[0]) == [item.name for item in fields(ContactResult)]
+    missed = next(row for row in found if row["outcome"] == "missed")
+    assert (missed["watched_ms"], missed["contact"], missed["found_by"]) == ("1000.0", "1", "load cell")
+    blind = next(row for row in found if row["outcome"] == "not_assessable")
+    assert blind["reason"] == "standing still"
+
+
+@pytest.mark.parametrize("start", [*RUN, " =", "\t=", "\r=", "\n="])
+def test_a_spreadsheet_runs_no_cell(results, start):
+    text = f'{start}cmd|"/c calc"!A1'
+    (found,) = read(contacts_csv(replace(results, contacts=(contact(text, text, 1.0, name=text),))))
+    shown = text.replace("\t", "?").replace("\r", "?").replace("\n", "?")
+    expected = shown if shown.startswith("?") else shown.replace(start.strip(), f"'{start.strip()}", 1)
+    assert [found[key] for key in ("recording", "group", "detector")] == [expected] * 3
+    assert found["outcome"] == "detected"
+
+
+@pytest.mark.parametrize("start", RUN)
+def test_a_spreadsheet_that_splits_at_semicolons_runs_no_cell_either(results, start):
+    text = f"a; {start}cmd|' /c calc'!A1;{start}1"
+    body = contacts_csv(replace(results, contacts=(contact(text, text, 1.0, name=text),)))
+    cells = [cell for row in csv.reader(io.StringIO(body), delimiter=";") for cell in row]
+    assert len(cells) > 6
+    assert not any(cell.lstrip().startswith(RUN) for cell in cells)
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_stay_in_their_cell_and_control_nothing(results, kind):
+    name = HOSTILE[kind]
+    text = contacts_csv(replace(results, contacts=(contact(name, name, 1.0, name=name),)))
+    assert len(text.splitlines()) == 2
+    assert not any(ord(letter) < 32 and letter != "\n" for letter in text)
+    assert not set("\u202e\u2067\x7f\x9b") & set(text)
+    (found,) = read(text)
+    assert found["recording"] == found["group"] == found["detector"]
+    assert found["latency_ms"] == "1.0"
+
+
+def with_forces(results: Results, name: str) -> Results:
+    steps = (
+        ForceStepResult(name, 0.0, 400.0, 500.0, 12.0, "fail", name),
+        ForceStepResult("static", 0.75, 150.0, None, None, "not assessable", "the record ends"),
+    )
+    return replace(results, forces=(ForceResult(name, name, 1, name, "fail", 500.0, steps, name, 12.0, name),))
+
+
+def test_forces_have_a_row_for_each_contact_and_step(results):
+    first, second = read(forces_csv(with_forces(results, "gap")))
+    assert (first["recording"], first["verdict"], first["peak_n"], first["point"]) == ("gap", "fail", "500.0", "gap")
+    assert (first["step"], first["step_at_most_n"], first["step_time_budget_ms"]) == ("gap", "400.0", "12.0")
+    assert (second["step"], second["step_peak_n"], second["step_time_budget_ms"]) == ("static", "", "")
+    assert (second["step_verdict"], second["step_reason"]) == ("not assessable", "the record ends")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_forces_of_hostile_names_stay_in_their_cells(results, kind):
+    text = forces_csv(with_forces(results, HOSTILE[kind]))
+    assert len(text.splitlines()) == 3
+    assert [row["step_at_most_n"] for row in read(text)] == ["400.0", "150.0"]

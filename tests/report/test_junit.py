@@ -1,0 +1,178 @@
+"""JUnit XML: a failure exactly where a limit is not kept, readable by every XML 1.0 parser whatever names there are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.limits import LimitRule, broken
+from cdtool.evaluation.results import LimitResult, Results, Skipped
+from cdtool.report.junit import to_junit
+from tests.report.conftest import contact, contacts_of
+from tests.report.hostile import HOSTILE
+from tests.report.test_markdown import named
+
+# What Jenkins' schema allows; it refuses a file with another attribute.
+ALLOWED = {
+    "testsuites": {"name", "time", "tests", "failures", "errors"},
+    "testsuite": {"name", "time", "tests", "failures", "errors", "skipped"},
+    "testcase": {"name", "classname", "time"},
+    "failure": {"type", "message"},
+    "error": {"type", "message"},
+    "skipped": {"type", "message"},
+    "system-out": set(),
+}
+# The characters of XML 1.0.
+VALID = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
+
+
+def read(evaluated: Evaluated) -> ElementTree.Element:
+    """The root, after checking that it is what Jenkins takes and that its counts are right."""
+    text = to_junit(evaluated)
+    assert VALID.fullmatch(text)
+    root = ElementTree.fromstring(text.encode("utf-8"))
+    for element in root.iter():
+        assert set(element.attrib) <= ALLOWED[element.tag]
+        assert element.get("time", "0") == "0"
+    for suite in (root, *root):
+        assert int(suite.attrib["tests"]) == len(list(suite.iter("testcase")))
+        for key, kind in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            assert suite.tag == "testsuites" or int(suite.attrib[key]) == len(list(suite.iter(kind)))
+    assert int(root.attrib["failures"]) == len(list(root.iter("failure")))
+    assert int(root.attrib["errors"]) == len(list(root.iter("error")))
+    return root
+
+
+def case(root: ElementTree.Element, suite: str, name: str) -> ElementTree.Element:
+    (found,) = [item for item in root.iter("testcase") if (item.get("classname"), item.get("name")) == (suite, name)]
+    return found
+
+
+def rule(figure: str, largest: float, detector: str = "momentum", group: str = "stiff") -> LimitRule:
+    return LimitRule(f"{detector}.{group}.{figure}", detector, group, figure, largest=largest)
+
+
+def test_every_recording_is_a_case_of_every_detector(evaluated):
+    root = read(evaluated)
+    assert [suite.get("name") for suite in root] == [
+        "left out",
+        "friction_ekf.stiff",
+        "momentum.stiff",
+        "friction_ekf.soft",
+        "momentum.soft",
+        "friction_ekf.holdout",
+        "momentum.holdout",
+    ]
+    assert [len(suite) for suite in root] == [1, 4, 4, 30, 30, 40, 40]
+
+
+def test_an_outcome_is_told_in_words(results):
+    felt = replace(results.contacts[0], force_at_alarm_n=123.4)
+    root = read(evaluate(replace(results, contacts=(felt, *results.contacts[1:]))))
+    words = case(root, "friction_ekf.stiff", "stiff/01.csv").findtext("system-out")
+    assert words == "contact 1 at 5.000 s: detected after 30.0 ms at 123 N, peak 3600 N"
+    missed = case(root, "momentum.stiff", "stiff/03.csv")
+    assert missed.findtext("system-out") == "contact 1 at 5.000 s: missed, peak 3600 N"
+    alarm = case(root, "momentum.holdout", "holdout/01.csv")
+    assert alarm.findtext("system-out") == "false alarm at 1.000 s on gate"
+    assert case(root, "momentum.holdout", "holdout/02.csv").findtext("system-out") == "no contact and no alarm"
+    assert not list(root.iter("failure"))
+
+
+def test_what_could_not_be_assessed_is_skipped_with_the_reason(evaluated):
+    root = read(evaluated)
+    skipped = case(root, "friction_ekf.stiff", "stiff/04.csv").find("skipped")
+    assert skipped is not None and skipped.get("message") == "not assessable: standing still"
+    silent = case(root, "friction_ekf.holdout", "holdout/01.csv").find("skipped")
+    assert silent is not None and silent.get("message") == "not assessable: the detector gave no result"
+
+
+def test_a_recording_that_was_left_out_is_an_error(evaluated):
+    error = case(read(evaluated), "left out", "broken.csv").find("error")
+    assert error is not None and error.get("message") == "broken.csv: empty file"
+
+
+def test_a_limit_is_a_case_and_what_breaks_it_fails_with_it(results):
+    root = read(evaluate(results, [rule("missed", 0), rule("mean_ms", 80), rule("false_alarms", 0, group="holdout")]))
+    suite = root[0]
+    assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("limits", "3", "2")
+    broken_limit = case(root, "limits", "momentum.stiff.missed (momentum, stiff)").find("failure")
+    assert broken_limit is not None
+    assert broken_limit.get("message") == "broken: missed is 1, at most 0 allowed; 1 is more than 0"
+    assert broken_limit.text == broken_limit.get("message")
+    kept = case(root, "limits", "momentum.stiff.mean_ms (momentum, stiff)")
+    assert kept.find("failure") is None and kept.findtext("system-out") == "mean_ms is 65, at most 80 allowed"
+    failing = {
+        (item.get("classname"), item.get("name")): failure.get("message")
+        for item in root.iter("testcase")
+        if item.get("classname") != "limits" and (failure := item.find("failure")) is not None
+    }
+    assert failing == {
+        ("momentum.stiff", "stiff/03.csv"): "contact 1 is missed (momentum.stiff.missed: at most 0)",
+        (
+            "momentum.holdout",
+            "holdout/01.csv",
+        ): "false alarm at 1.000 s on gate (momentum.holdout.false_alarms: at most 0)",
+    }
+
+
+def test_a_limit_that_cannot_be_assessed_fails(results):
+    unknown = LimitResult("a", "momentum", "stiff", "force_at_alarm_n", None, None, 9, "not assessable", "no load cell")
+    root = read(evaluate(replace(results, limits=(unknown,))))
+    failure = case(root, "limits", "a (momentum, stiff)").find("failure")
+    assert failure is not None
+    assert failure.get("message") == "not assessable: force_at_alarm_n is –, at most 9 allowed; no load cell"
+
+
+@pytest.mark.parametrize("largest", [0.0, 0.5, 1.0, 50.0, 1e9])
+@pytest.mark.parametrize(
+    "figure", ["missed", "p95_ms", "std_ms", "mean_ms_upper", "peak_force_n", "hours", "not_assessable"]
+)
+def test_there_are_failures_exactly_where_a_limit_is_not_kept(results, figure, largest):
+    evaluated = evaluate(results, [rule(figure, largest, "*")])
+    assert bool(list(read(evaluated).iter("failure"))) == bool(broken(evaluated.results.limits))
+
+
+def test_nothing_scored_is_one_error_and_never_an_empty_file():
+    root = read(evaluate(Results({}, (), (), (), (), ())))
+    assert (root.get("tests"), root.get("errors")) == ("1", "1")
+    left_out = read(evaluate(Results({}, ("gm",), ("stiff",), (), (), (), skipped=(Skipped("a.csv", "empty"),))))
+    assert (left_out.get("tests"), left_out.get("errors")) == ("2", "2")
+
+
+def test_several_contacts_of_a_recording_are_one_case(results):
+    second = replace(contact("momentum", "stiff", None, "not_assessable", "stiff/01.csv"), contact=2, reason="a gap")
+    contacts = (*contacts_of("momentum", "stiff", [30.0]), second)
+    words = case(read(evaluate(replace(results, contacts=contacts))), "momentum.stiff", "stiff/01.csv")
+    assert words.find("skipped") is None
+    assert (words.findtext("system-out") or "").splitlines() == [
+        "contact 1 at 5.000 s: detected after 30.0 ms, peak 3600 N",
+        "contact 2 at 5.000 s: not assessable, peak 3600 N (a gap)",
+    ]
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_text_in_a_file_that_parses(results, kind):
+    name = HOSTILE[kind]
+    root = read(named(results, name))
+    suites = {suite.get("name") for suite in root}
+    assert "limits" in suites and "left out" in suites and len(suites) == 3
+    assert not any(
+        re.search("[\x00-\x1f\u202e\u2067]", value) for item in root.iter() for value in item.attrib.values()
+    )
+
+
+def test_no_name_is_an_attachment(results):
+    name = "[[[ATTACHMENT|/etc/passwd]]"
+    text = to_junit(named(results, name))
+    shown = [item.text or "" for item in ElementTree.fromstring(text).iter() if item.tag != "testsuites"]
+    assert any("ATTACHMENT" in item for item in shown)
+    assert not any("[[" in item for item in shown)
+
+
+def test_the_same_results_give_the_same_text(results):
+    assert to_junit(evaluate(results)) == to_junit(evaluate(replace(results)))
