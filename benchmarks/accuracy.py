@@ -108,7 +108,7 @@ def _score(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]], 
             contacts = [] if group == HOLDOUT else find_contacts(operation.recording, setup.onset)
             if len(contacts) != (group != HOLDOUT):
                 sys.exit(f"error: {operation.name}: {len(contacts)} contacts found")
-            matching = match(detection.verdict, contacts, detection.statistic, setup.window)
+            matching = match(detection.verdict, contacts, detection.statistic)
             score.false_alarms += len(matching.false_alarms)
             for item in matching.matches:
                 if item.outcome == "detected":

@@ -5,7 +5,10 @@ What a command does, a notebook does in one line:
     cdtool.read("run.csv", "machine.toml")                              -> Recording
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
+    cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
+    cdtool.compare("old.json", "new.json")                              -> BuildComparison
+    cdtool.plan(missed_at_most="5%")                                    -> Plan
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
     cdtool.simulate_arm(folder, {"free": 14, "stiff": 30}, seed=1, trial=2)  -> the same
@@ -21,9 +24,12 @@ if TYPE_CHECKING:
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.version import __version__
     from cdtool.workflows.benchmark import benchmark
+    from cdtool.workflows.comparing import compare
     from cdtool.workflows.detection import detect
+    from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
     from cdtool.workflows.learning import learn_signature
+    from cdtool.workflows.planning import plan
     from cdtool.workflows.runs import read_log as read
 
 _API = {
@@ -31,13 +37,28 @@ _API = {
     "read": "cdtool.workflows.runs:read_log",
     "learn_signature": "cdtool.workflows.learning:learn_signature",
     "detect": "cdtool.workflows.detection:detect",
+    "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
+    "compare": "cdtool.workflows.comparing:compare",
+    "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }
 
-__all__ = ["__version__", "benchmark", "detect", "info", "learn_signature", "read", "simulate_arm", "simulate_gate"]
+__all__ = [
+    "__version__",
+    "benchmark",
+    "compare",
+    "detect",
+    "explain",
+    "info",
+    "learn_signature",
+    "plan",
+    "read",
+    "simulate_arm",
+    "simulate_gate",
+]
 
 
 def __getattr__(name: str) -> Any:

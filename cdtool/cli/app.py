@@ -5,16 +5,22 @@ from __future__ import annotations
 import gc
 import logging
 import sys
+import traceback
 import warnings
 from typing import Annotated
 
 import typer
 
 from cdtool.cli.benchmark import benchmark
+from cdtool.cli.compare import compare
 from cdtool.cli.detect import detect
+from cdtool.cli.explain import explain
 from cdtool.cli.info import info
 from cdtool.cli.learn_signature import learn_signature
 from cdtool.cli.list_known import list_known
+from cdtool.cli.plan import plan
+from cdtool.cli.report import report
+from cdtool.cli.score import score
 from cdtool.cli.simulate import simulate
 from cdtool.errors import CdtoolError, ExitStatus
 
@@ -28,7 +34,12 @@ app = typer.Typer(
 app.command("info")(info)
 app.command("learn-signature")(learn_signature)
 app.command("detect")(detect)
+app.command("explain")(explain)
 app.command("benchmark")(benchmark)
+app.command("report")(report)
+app.command("score")(score)
+app.command("compare")(compare)
+app.command("plan")(plan)
 app.add_typer(simulate, name="simulate")
 app.command("list")(list_known)
 
@@ -81,3 +92,7 @@ def main() -> None:
         sys.exit(ExitStatus.UNUSABLE)
     except KeyboardInterrupt:
         sys.exit(130)
+    except Exception:
+        # Python would end with 1, which means a broken limit to a pipeline.
+        traceback.print_exc()
+        sys.exit(ExitStatus.UNUSABLE)

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from cdtool.cli.console import number, print_json, table
+from cdtool.cli.console import leave, number, print_json, print_skipped, table
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.results import Skipped
 
 _KINDS = ("detectors", "thresholds", "machines", "formats")
 
@@ -24,14 +25,17 @@ def list_known(
     """
     if kind not in _KINDS:
         raise UsageError(f"unknown kind '{kind}'", nearest(kind, _KINDS))
-    entries = [_entry(kind, name) for name in _registry(kind).names(plugins=True)]
+    registry = _registry(kind)
+    broken = [Skipped(name, str(fault)) for name, fault in registry.broken_plugins().items()]
+    entries = [_entry(kind, name) for name in registry.usable_names()]
+    print_skipped(broken)
     if as_json:
         print_json(entries)
-        return
-    if kind == "detectors":
+    elif kind == "detectors":
         _show_detectors(entries)
-        return
-    table([("name", "left"), ("what it is", "left")], [(entry["name"], entry["summary"]) for entry in entries])
+    else:
+        table([("name", "left"), ("what it is", "left")], [(entry["name"], entry["summary"]) for entry in entries])
+    leave(broken)
 
 
 def _registry(kind: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -24,7 +25,7 @@ def show_table(evaluated: Evaluated) -> None:
     names = (
         "mean ms\n(95 %)",
         "std\nms",
-        "median ms\n(95 %)",
+        "median\nms",
         "P95\nms",
         "n",
         "missed",
@@ -77,7 +78,7 @@ def _row(item: Summary) -> tuple[Any, ...]:
         item.detector,
         interval(item.mean),
         number(item.std.value, 2),
-        interval(item.median),
+        quantile(item.median.value),
         quantile(item.p95.value),
         item.detected,
         item.missed,
@@ -109,13 +110,16 @@ def _show_bounds(evaluated: Evaluated) -> None:
         clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
         if clean:
             least = max(item.missed_at_most for item in clean)
-            names = ", ".join(item.detector for item in clean)
-            typer.echo(f"{plain(group)}: 0 missed ({plain(names)}) means at most {100.0 * least:.2g} % (95 %)")
+            typer.echo(f"{plain(group)}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
         quiet = [item for item in items if not item.contacts and not item.false_alarms and item.operations]
         if quiet:
             rate = max(item.at_most_per_operation for item in quiet)
-            names = ", ".join(item.detector for item in quiet)
-            typer.echo(f"{plain(group)}: 0 false alarms ({plain(names)}) means at most {rate:.2g} an operation (95 %)")
+            who = _named(quiet, items)
+            typer.echo(f"{plain(group)}: 0 false alarms ({who}) means at most {rate:.2g} an operation (95 %)")
+
+
+def _named(some: Sequence[Summary], of: Sequence[Summary]) -> str:
+    return "all detectors" if len(some) == len(of) else plain(", ".join(item.detector for item in some))
 
 
 def _show_forces(results: Any) -> None:

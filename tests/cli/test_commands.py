@@ -172,16 +172,55 @@ def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path)
     assert done.status == 0, done.err
     assert "friction_ekf" in done.out and "n.a.: not assessable" in done.out
     values = json.loads(results.read_text())
-    assert values["schema_version"] == 1
+    assert values["schema_version"] == 2
     assert len(values["contacts"]) == 20 and len(values["exposure"]) == 15
     stiff = {c["detector"]: c["latency_ms"] for c in values["contacts"] if c["recording"] == "stiff/01.csv"}
     assert stiff["pure_inertia"] < stiff["friction_ekf"] < stiff["momentum"] < stiff["pure_torque"]
     wanted = {"recording", "group", "detector", "joint", "onset_s", "onset_uncertainty_s", "alarm_s", "latency_ms"}
     assert wanted | {"outcome", "force_at_alarm_n", "peak_force_n"} <= set(values["contacts"][0])
     provenance = values["provenance"]
-    assert provenance["tool_version"] and len(provenance["logs_sha256"]) == 17
+    assert provenance["tool_version"] and len(provenance["learned_sha256"]) == 11
+    assert len(values["recordings"]) == 6 and len(values["recordings"][0]["sha256"]) == 64
     assert provenance["gains"]["momentum"] == {"bandwidth": 10.0}
-    assert (report / "report.md").exists() and list(report.glob("*.png"))
+    names = {path.name for path in report.iterdir()}
+    assert {"report.html", "report.md", "junit.xml", "contacts.csv", "results.json", "latency.png", "amoc.png"} <= names
+
+
+def test_reports_are_made_again_from_the_results_alone(gate_folder, tmp_path):
+    folder = tmp_path / "first"
+    assert cdtool("benchmark", gate_folder / "benchmark.toml", "-o", folder).status == 0
+    done = cdtool("report", folder / "results.json", "-o", tmp_path / "again.html", "-o", tmp_path / "again.json")
+    assert done.status == 0 and "friction_ekf" in done.out, done.err
+    assert (tmp_path / "again.html").read_bytes() == (folder / "report.html").read_bytes()
+    assert (tmp_path / "again.json").read_bytes() == (folder / "results.json").read_bytes()
+    traces = "results.traces.json.gz"
+    assert (tmp_path / "again.traces.json.gz").read_bytes() == (folder / traces).read_bytes()
+
+
+def test_a_report_without_traces_says_so_and_a_damaged_file_is_one_line(gate_folder, tmp_path):
+    assert cdtool("benchmark", gate_folder / "benchmark.toml", "-o", tmp_path / "r.json").status == 0
+    (tmp_path / "r.traces.json.gz").unlink()
+    done = cdtool("report", tmp_path / "r.json", "-o", tmp_path / "r.html")
+    assert done.status == 0 and "r.traces.json.gz is missing" in done.err
+    (tmp_path / "r.json").write_text("{}")
+    broken = cdtool("report", tmp_path / "r.json")
+    assert broken.status == 2 and broken.err.count("\n") == 1 and "not a results file" in broken.err
+
+
+def test_a_broken_limit_ends_with_1_before_what_was_left_out(gate_folder, tmp_path):
+    (gate_folder / "stiff" / "broken.csv").write_text("nothing\n")
+    try:
+        text = (gate_folder / "benchmark.toml").read_text()
+        limits = '[limits]\n"pt.stiff.mean_ms" = { max = 20 }\n"feekf.stiff.mean_ms" = { max = 900 }\n'
+        (gate_folder / "limits.toml").write_text(text + limits)
+        done = cdtool("benchmark", gate_folder / "limits.toml")
+        assert done.status == 1
+        assert "limit broken: pure_torque.stiff.mean_ms:" in done.out and "limits: 1 of 2 kept" in done.out
+        assert "broken.csv" in done.err
+        (gate_folder / "limits.toml").write_text(text + limits.replace("20", "900"))
+        assert cdtool("benchmark", gate_folder / "limits.toml").status == 3
+    finally:
+        (gate_folder / "stiff" / "broken.csv").unlink()
 
 
 def test_the_benchmark_is_the_same_bytes_whatever_the_number_of_jobs(gate_folder, tmp_path):

@@ -1,0 +1,97 @@
+"""`cdtool compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.cli.console import plain, table
+from cdtool.cli.options import JsonOption
+from cdtool.errors import ExitStatus
+from cdtool.plain_text import shorten
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.build_comparison import BuildComparison
+    from cdtool.evaluation.build_questions import Figure
+
+_WIDTH = 100
+_LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
+_SHOWN = 10
+
+
+def compare(
+    old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
+    new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
+    level: Annotated[
+        float, typer.Option("--level", help="Chance of a wrong worse or better anywhere in the comparison.")
+    ] = 0.05,
+    output: Annotated[
+        list[Path] | None, typer.Option("--output", "-o", help="Where to, repeatable: .md (a pull request), .json.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell a real change between two builds from noise: latency, misses, false alarms, force at the alarm.
+
+    Contacts that both files hold are compared one by one. Ends with 1 where anything is shown to be worse, with 0 where
+    nothing is, with 2 where the two cannot be compared.
+
+    Example: cdtool compare old.json new.json -o compare.md
+    """
+    from cdtool.report.build_report import check_outputs, to_json, write_outputs
+    from cdtool.workflows.comparing import compare as run
+
+    targets = output or []
+    check_outputs(targets)
+    found = run(old, new, significance=level)
+    write_outputs(found, targets)
+    if as_json:
+        typer.echo(to_json(found), nl=False)
+    else:
+        _show(found)
+        for path in targets:
+            typer.echo(f"written: {plain(path)}")
+    if found.verdict in ("worse", "mixed"):
+        raise typer.Exit(ExitStatus.LIMIT_BROKEN)
+
+
+def _show(found: BuildComparison) -> None:
+    """The figures, then every row in words, what differs, and the verdict last."""
+    from cdtool.report.build_report import both, contacts_of
+    from cdtool.report.figure_text import NOTHING
+
+    heads = ("contacts", "latency\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
+    columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
+    figures: tuple[Figure, ...] = ("latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n")
+    rows = [
+        (
+            shorten(row.group, _LONGEST_GROUP),
+            shorten(row.detector, _LONGEST_DETECTOR),
+            contacts_of(row),
+            *(both(row, figure) for figure in figures),
+        )
+        for row in found.rows
+    ]
+    table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
+    _say("old / new; contacts: the same in both, unless two numbers stand there; n.a.: not assessable")
+    typer.echo()
+    for row in found.rows:
+        _say(f"{shorten(row.group, 2 * _LONGEST_GROUP)}, {shorten(row.detector, 2 * _LONGEST_DETECTOR)}: {row.words}")
+    typer.echo()
+    for item in found.changed[:_SHOWN]:
+        _say(f"differs: {item.key}: {item.old}, now {item.new}")
+    if len(found.changed) > _SHOWN:
+        _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
+    for which, names in (("old", found.only_old), ("new", found.only_new)):
+        for name in names:
+            _say(f"only in {which}: {name}")
+    for note in found.notes:
+        _say(note)
+    _say(found.words)
+
+
+def _say(text: str) -> None:
+    for line in wrap(plain(text), _WIDTH, subsequent_indent="  "):
+        typer.echo(line)

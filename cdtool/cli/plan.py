@@ -1,0 +1,89 @@
+"""`cdtool plan`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.console import plain, print_json
+from cdtool.cli.options import JsonOption, listed
+from cdtool.errors import UsageError
+
+
+def plan(
+    difference_ms: Annotated[
+        float | None, typer.Option("--difference-ms", help="A difference of mean latencies that is to be seen [ms].")
+    ] = None,
+    std_ms: Annotated[
+        float | None, typer.Option("--std-ms", help="Standard deviation of the paired differences [ms], as a guess.")
+    ] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Instead: measured in results.json of an earlier test.")
+    ] = None,
+    detectors: Annotated[
+        str, typer.Option("--detectors", help="With --from: the two to compare, as feekf,gm; unpaired, one or two.")
+    ] = "",
+    group: Annotated[str, typer.Option("--group", help="With --from: the group of impacts.")] = "",
+    unpaired: Annotated[
+        bool, typer.Option("--unpaired", help="Two sets of impacts: the deviation is that within a set.")
+    ] = False,
+    power: Annotated[float, typer.Option("--power", help="Chance that a difference of that size is seen.")] = 0.8,
+    missed_at_most: Annotated[
+        str, typer.Option("--missed-at-most", help="A share of missed contacts that is to be shown, as 5%.")
+    ] = "",
+    false_alarms_at_most: Annotated[
+        str, typer.Option("--false-alarms-at-most", help="A rate to be shown, as 1/1000op or 0.1/h.")
+    ] = "",
+    allowed: Annotated[
+        int | None, typer.Option("--allowed", min=0, help="Misses or false alarms to allow in the test. Default: one.")
+    ] = None,
+    level: Annotated[float, typer.Option("--level", help="Chance of a wrong conclusion.")] = 0.05,
+    as_json: JsonOption = False,
+) -> None:
+    """How many impacts and impact-free operations a test needs, before it is made.
+
+    Example: cdtool plan --difference-ms 5 --std-ms 8 --missed-at-most 5% --false-alarms-at-most 1/1000op
+    """
+    from cdtool.workflows.planning import measured_std
+    from cdtool.workflows.planning import plan as run
+
+    if source is not None and std_ms is not None:
+        raise UsageError("--std-ms and --from are given", "give one of them")
+    without = difference_ms is None
+    idle = {
+        "--std-ms": std_ms is not None and without,
+        "--from": source is not None and without,
+        "--unpaired": unpaired and without,
+        "--detectors": bool(detectors) and source is None,
+        "--group": bool(group) and source is None,
+        "--allowed": allowed is not None and not missed_at_most and not false_alarms_at_most,
+    }
+    for option, useless in idle.items():
+        if useless:
+            raise UsageError(f"{option} has nothing to act on", _GOES_WITH[option])
+    std = measured_std(source, listed(detectors), group, unpaired=unpaired) if source else std_ms
+    found = run(
+        difference_ms=difference_ms,
+        std_ms=std,
+        unpaired=unpaired,
+        power=power,
+        missed_at_most=missed_at_most,
+        false_alarms_at_most=false_alarms_at_most,
+        allowed=allowed,
+        significance=level,
+    )
+    if as_json:
+        print_json(asdict(found))
+        return
+    for answer in found.answers:
+        typer.echo(plain(answer.words))
+
+
+_GOES_WITH = {
+    **dict.fromkeys(("--std-ms", "--from", "--unpaired"), "it goes with --difference-ms"),
+    **dict.fromkeys(("--detectors", "--group"), "it goes with --from"),
+    "--allowed": "it goes with --missed-at-most or --false-alarms-at-most",
+}

@@ -1,0 +1,156 @@
+"""`cdtool compare` as a pipeline meets it: exit status, table, JSON, Markdown."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool as api
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.results_file import to_json
+from tests.builds import BLIND, MISSED, build
+from tests.command import cdtool
+from tests.report.hostile import HOSTILE
+
+LATENCIES = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
+OLD = {("momentum", "stiff"): LATENCIES, ("pure_torque", "stiff"): LATENCIES}
+SLOWER = {**OLD, ("momentum", "stiff"): [x + 5.0 for x in LATENCIES]}
+FASTER = {**OLD, ("momentum", "stiff"): [x - 5.0 for x in LATENCIES]}
+MIXED = {**SLOWER, ("pure_torque", "stiff"): [x - 5.0 for x in LATENCIES]}
+
+Written = Callable[[str, Results], Path]
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Written:
+    def write(name: str, results: Results) -> Path:
+        path = tmp_path / name
+        path.write_text(to_json(results), encoding="utf-8", errors="replace")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("new", "status", "last"),
+    [
+        (OLD, 0, "no change shown (of 4 questions at a level of 0.05 for all together)"),
+        (SLOWER, 1, "worse: 2 worse of 4 questions at a level of 0.05 for all together"),
+        (FASTER, 0, "better: 2 better of 4 questions at a level of 0.05 for all together"),
+        (MIXED, 1, "mixed: 2 worse and 2 better of 4 questions at a level of 0.05 for all together"),
+    ],
+    ids=["same", "slower", "faster", "mixed"],
+)
+def test_the_exit_status_is_1_where_anything_is_worse_and_the_last_line_says_it(written, new, status, last):
+    done = cdtool("compare", written("old.json", build(OLD)), written("new.json", build(new)))
+    assert (done.status, done.err) == (status, "")
+    assert done.out.splitlines()[-1] == last
+
+
+def test_the_table_stands_before_the_words_and_shows_misses_beside_latencies(written):
+    new = {("momentum", "stiff"): [MISSED, BLIND, *[x + 5.0 for x in LATENCIES[2:]]]}
+    old = written("old.json", build(OLD, false_alarms={("momentum", "stiff"): 3}, debounce_samples=5))
+    done = cdtool("compare", old, written("new.json", build(new)))
+    assert done.status == 1
+    assert re.search(
+        r"^stiff +momentum +30 +\d\d\.\d / \d\d\.\d +0 / 1 +0 / 1 +3 / 0 +\d+ / \d+ *$", done.out, re.MULTILINE
+    )
+    assert "stiff, momentum: slower by 5.0 ms (5.0 to 5.0)" in done.out
+    assert "1 of 30 contacts apart: one build could not assess them" in " ".join(done.out.split())
+    assert "differs: debounce_samples: 5, now 9" in done.out
+    assert "only in old: detector pure_torque" in done.out
+
+
+def test_the_table_fits_100_columns_with_long_names_and_many_contacts(written):
+    many = np.random.default_rng(2).normal(400.0, 60.0, 1200).tolist()
+    groups = ("inertial_momentum", "a group with a long name"), ("n" * 300, "g" * 300)
+    outcomes = dict.fromkeys(groups, many)
+    watched = {"window_s": {}, "holdout": ["inertial_momentum"]}
+    old = build(outcomes, false_alarms=dict.fromkeys(groups, 1100), **watched)
+    new = build({key: [MISSED] * 1000 + many[1000:] for key in groups}, gains={"n" * 300: {"g": "v" * 400}}, **watched)
+    done = cdtool("compare", written("old.json", old), written("new.json", new))
+    assert done.status == 1
+    assert max(map(len, done.out.splitlines())) <= 100
+
+
+def test_json_holds_every_question_and_is_strict(written, tmp_path):
+    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER))
+    done = cdtool("compare", old, new, "--json", "-o", tmp_path / "compare.json")
+
+    def refuse(name: str) -> None:
+        raise AssertionError(name)
+
+    values = json.loads(done.out, parse_constant=refuse)
+    assert done.status == 1 and (tmp_path / "compare.json").read_text(encoding="utf-8") == done.out
+    assert values["verdict"] == "worse" and values["asked"] == 4
+    (row,) = [item for item in values["rows"] if item["detector"] == "momentum"]
+    by_figure = {item["figure"]: item for item in row["questions"]}
+    assert by_figure["latency_ms"]["change"] == {"value": 5.0, "low": 5.0, "high": 5.0, "level": 0.95}
+    assert by_figure["missed"]["p"] is None and by_figure["missed"]["outcome"] == "not asked"
+    assert set(by_figure) == {"latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n"}
+
+
+def test_markdown_has_a_row_a_detector_and_group_with_its_words(written, tmp_path):
+    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER, debounce_samples=14))
+    done = cdtool("compare", old, new, "-o", tmp_path / "compare.md")
+    assert done.status == 1 and f"written: {tmp_path / 'compare.md'}" in done.out
+    text = (tmp_path / "compare.md").read_text(encoding="utf-8")
+    assert text.startswith("**cdtool compare: worse")
+    rows = [line for line in text.splitlines() if line.startswith("| stiff | ")]
+    assert len(rows) == 2 and {line.count(" | ") for line in rows} == {8}
+    assert rows[0].endswith("more force at the alarm by 50.0 N (50.0 to 50.0) |") and "slower by 5.0 ms" in rows[0]
+    assert "| debounce\\_samples | 9 | 14 |" in text or "| debounce_samples | 9 | 14 |" in text
+    assert "not a certificate" in text and "*No change shown* is not *no change*" in text
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
+def test_names_from_files_stay_text_in_the_terminal_and_in_markdown(written, tmp_path, name):
+    names = {"onset": name, "machine": name, "gains": {name: {name: name}}, "window_s": {}, "force_profiles": {}}
+    old = build({(name, name): LATENCIES}, **names)
+    new = build({(name, name): LATENCIES, (f"{name}2", f"{name}3"): LATENCIES}, **{**names, "machine": f"{name}!"})
+    done = cdtool("compare", written("old.json", old), written("new.json", new), "-o", tmp_path / "c.md")
+    assert done.status == 0, done.err
+    text = (tmp_path / "c.md").read_text(encoding="utf-8")
+    for shown in (done.out, text):
+        assert not re.search("[\x00-\x09\x0b-\x1f\u202a-\u202e\u2066-\u2069]", shown)
+    assert "<script" not in re.sub(r"\\<", "", text) and not re.search(r"(?<!\\)\]\(", text)
+    rows = [line for line in text.splitlines() if line.endswith("(every latency is the same) |")]
+    assert len(rows) == 1 and len(re.findall(r"(?<!\\)\|", rows[0])) == 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("old.json", "absent.json"), "absent.json: not a results file"),
+        (("old.json", "other.json"), "onset differs: load cell above 20 N"),
+        (("old.json", "old.json", "--level", "1"), "significance level is 1"),
+        (("old.json", "old.json", "-o", "compare.html"), "a name that ends in .md or .json"),
+        (("old.json", "old.json", "-o", "absent/compare.md"), "no folder absent"),
+        (("old.json",), "NEW"),
+    ],
+)
+def test_what_cannot_be_compared_ends_with_2_and_one_line(written, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    written("old.json", build(OLD))
+    written("other.json", build(OLD, onset="above 30 N"))
+    done = cdtool("compare", *arguments)
+    assert done.status == 2 and message in done.err and done.out == ""
+
+
+def test_a_stricter_level_is_obeyed(written):
+    noisy = np.random.default_rng(3).normal(1.5, 3.0, 30)
+    slower = {key: [a + b for a, b in zip(values, noisy, strict=True)] for key, values in OLD.items()}
+    old, new = written("old.json", build(OLD)), written("new.json", build(slower))
+    assert [cdtool("compare", old, new, "--level", level).status for level in (0.2, 0.0005)] == [1, 0]
+
+
+def test_python_gives_what_the_command_gives(written):
+    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER))
+    found = api.compare(old, new)
+    assert found.words == cdtool("compare", old, new).out.splitlines()[-1]
+    assert [row.words for row in found.rows] == [row.words for row in api.compare(build(OLD), str(new)).rows]
