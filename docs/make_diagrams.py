@@ -339,8 +339,8 @@ def desired_dynamics(d: Diagram) -> None:
     """Desired dynamics.
 
     The model torque is computed from the reference, M(q_r) qdd_r + n(q_r, qd_r), passes the same low-pass F(s) as the
-    torque and is taken from it. Beside it the tracking error q_r - q is checked, sample by sample: above its limit the model
-    torque is not that of the motion made, and the residual is not applicable.
+    torque and is taken from it. Beside it the tracking error q_r - q is checked, sample by sample: above its limit the
+    model torque is not that of the motion made, and the residual is not applicable.
     """
     derive, model = d.block(24, 34, "derivatives\n(causal)", 13), d.block(48, 34, "model\ntorque", 10, fill=MODEL)
     error, total = d.sum(24, 16, left="-", top="+"), d.sum(74, 34, left="-", top="+")

@@ -15,12 +15,13 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.evaluation.statistics import Summary, summarise
+from cdtool.evaluation.decimation import decimate
+from cdtool.evaluation.statistics import Summary
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
-from cdtool.report.decimation import decimate
 from cdtool.report.detection_plot import plot_detected
 from cdtool.report.figures import drawing, new_figure, save
+from cdtool.report.folder_figures import most_telling
 from cdtool.report.trigger_plot import plot_triggers
 from cdtool.signature_store import write_signature
 from cdtool.simulation.arm_recordings import write_arm_recordings
@@ -190,7 +191,7 @@ def triggers(done: dict[str, Benchmark]) -> None:
         ("arm2", "soft"): "6_10b",
     }
     for (machine, group), number in names.items():
-        trace = next(trace for trace in done[machine].traces if trace.group == group)
+        trace = most_telling([trace for trace in done[machine].traces if trace.group == group])
         plot_triggers(trace, IMAGES / f"reproduction_{number}.png")
 
 
@@ -212,7 +213,7 @@ def main(say: Callable[[str], None] = print) -> None:
         say("simulating")
         simulate(work)
         done = {name: cdtool.benchmark(work / name / "benchmark.toml") for name in MACHINES}
-        rows = {name: summarise(item.results) for name, item in done.items()}
+        rows = {name: item.evaluated.summaries for name, item in done.items()}
         parts = {name: latencies(name, rows[SOURCES[name][0]]) for name in THESIS}
         say("the thesis's rule")
         parts["thesis rule"] = thesis_rule(work, tuple(MACHINES))

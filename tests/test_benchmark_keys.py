@@ -55,6 +55,20 @@ def test_a_label_file_replaces_the_load_cell(gate):
         assert ours.latency_ms == pytest.approx(theirs.latency_ms + 10.0, abs=1e-6)
 
 
+def test_a_label_that_fits_recordings_of_two_groups_is_refused(gate):
+    (gate / "both.csv").write_text("recording,start_s,end_s\n01.csv,6.0,6.2\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"both\.csv: '01\.csv' fits holdout/01\.csv, stiff/01\.csv"):
+        run(gate, HEAD, LEARN, ONSET, 'labels = "both.csv"\n', STIFF, HOLDOUT)
+
+
+def test_limits_on_detectors_that_are_not_run_are_told_and_not_checked(gate):
+    limits = '[limits]\n"feekf.stiff.max_ms" = { max = 1 }\n"*.missed" = { max = 0 }\n'
+    assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("broken") == 1
+    done = run(gate, HEAD, LEARN, ONSET, STIFF, limits, detectors=["gm"])
+    assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "kept")]
+    assert any("1 of 2 limits are on detectors that were not run" in item.reason for item in done.results.findings)
+
+
 def test_force_profile_points_and_campaigns_become_rows(gate):
     force = '[force]\nprofile = "en_12453_reducing_gap"\n'
     points = '[points.middle]\nlogs = ["stiff/*.csv"]\n[campaigns.monday]\nlogs = ["stiff/01.csv"]\n'
@@ -99,7 +113,7 @@ def test_the_sweep_counts_false_alarms_in_the_hold_out_and_its_middle_is_the_ben
         if not summary.contacts:
             assert not rows
             continue
-        middle = rows[len(rows) // 2]
+        (middle,) = [item for item in rows if item.in_use]
         assert middle.safety_factor == pytest.approx(5.5)
         assert middle.mean_ms == pytest.approx(summary.mean_ms) and middle.detected == summary.detected
         assert rows[0].false_alarms > 0 and rows[0].mean_ms < middle.mean_ms < rows[-1].mean_ms

@@ -47,6 +47,8 @@ def test_the_sample_logs_are_what_their_command_gives(folder: str, tmp_path: Pat
     whole = ("benchmark.toml",) if FOLDERS[folder] == GROUPS else ()
     for name in ("machine.toml", *whole):
         assert (made / name).read_text(encoding="utf-8") == (kept / name).read_text(encoding="utf-8")
+    lines = (made / "benchmark.toml").read_text(encoding="utf-8").splitlines()
+    assert set(lines) <= set((kept / "benchmark.toml").read_text(encoding="utf-8").splitlines())
     new, old = contacts_of(made), contacts_of(kept)
     assert list(new) == [name for name in old if name.split("/")[0] in FOLDERS[folder]]
     for name, instant in new.items():
@@ -66,6 +68,15 @@ def assert_same_recording(made: Path, kept: Path, machine: Path) -> None:
         np.testing.assert_allclose(series.time, other[channel].time, atol=1e-9)
         limit = rounding[channel.removeprefix("reference_")]
         np.testing.assert_allclose(series.values, other[channel].values, atol=limit, err_msg=f"{kept}: {channel}")
+
+
+def test_the_limits_added_by_hand_hold_with_room() -> None:
+    limits = cdtool.benchmark(SAMPLES / "gate" / "benchmark.toml", jobs=2).results.limits
+    assert len(limits) > 40 and {item.outcome for item in limits} == {"kept"}
+    for item in limits:
+        if item.figure in ("p95_ms", "force_at_alarm_max_n"):
+            assert item.value is not None and item.largest is not None
+            assert 1.2 * item.value < item.largest
 
 
 def test_the_sample_logs_stay_small() -> None:
