@@ -340,7 +340,7 @@ def test_other_contacts_in_the_same_bytes_are_refused():
 
 OTHER_RULES = {
     "onset": ("above 30 N", "onset differs: load cell above 20 N"),
-    "label_file": ("labels.csv", "label_file differs: False in old, True in new"),
+    "label_file": ("labels.csv", "label_file differs: false in old, true in new"),
     "synchronisation_s": (0.002, "synchronisation_s differs: 0.0 in old, 0.002 in new"),
     "window_s": ({"stiff": 0.5}, r"window_s.stiff differs: 1.0 in old, 0.5 in new"),
     "operations": ("motion", "operations differs: whole in old, motion in new"),
