@@ -15,8 +15,8 @@ from statistics import mean, stdev
 
 from cdtool.activation import Activation
 from cdtool.errors import NothingValidError
-from cdtool.evaluation.matching import match
-from cdtool.evaluation.onset import find_contacts
+from cdtool.evaluation.truth.matching import match
+from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording

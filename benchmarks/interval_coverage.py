@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 from timing import environment, table
 
-from cdtool.evaluation.bootstrap import bca
-from cdtool.evaluation.interval import Interval
-from cdtool.evaluation.kaplan_meier import latency_quantile
-from cdtool.evaluation.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
+from cdtool.evaluation.statistics.bootstrap import bca
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
+from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 
 REPETITIONS = 1000
 # Enough for coverage; the intervals that cdtool prints use 9999.

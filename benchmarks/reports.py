@@ -20,7 +20,7 @@ from timing import environment, table
 
 from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
-from cdtool.evaluation.trace_choice import MOST_KEPT
+from cdtool.evaluation.traces.choice import MOST_KEPT
 from cdtool.report.outputs import Report, write_outputs
 from cdtool.workflows.benchmark import Benchmark, benchmark
 

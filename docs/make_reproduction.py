@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.evaluation.decimation import decimate
-from cdtool.evaluation.statistics import Summary
+from cdtool.evaluation.summary import Summary
+from cdtool.evaluation.traces.decimation import decimate
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
-from cdtool.report.detection_plot import plot_detected
-from cdtool.report.figures import drawing, new_figure, save
-from cdtool.report.folder_figures import most_telling
-from cdtool.report.trigger_plot import plot_triggers
+from cdtool.report.plots.detection_plot import plot_detected
+from cdtool.report.plots.figures import drawing, new_figure, save
+from cdtool.report.plots.folder_figures import most_telling
+from cdtool.report.plots.trigger_plot import plot_triggers
 from cdtool.signature_store import write_signature
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.evaluation.statistics import Summary, summarise
+from cdtool.evaluation.summary import Summary, summarise
 from cdtool.simulation.arm_recordings import write_arm_recordings
 
 COUNTS = {"free": 14, "holdout": 10, "stiff": 15, "soft": 15}

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 from cdtool.evaluation.limits import read_limits
-from cdtool.evaluation.statistics import FIGURES
+from cdtool.evaluation.summary import FIGURES
 from cdtool.tables import Table
 
 yaml = pytest.importorskip("yaml")

@@ -11,8 +11,8 @@ import pytest
 
 from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
-from cdtool.evaluation.matching import match
-from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.evaluation.truth.matching import match
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature

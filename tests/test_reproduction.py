@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import cdtool
-from cdtool.evaluation.statistics import summarise
+from cdtool.evaluation.summary import summarise
 from cdtool.simulation.arm_recordings import write_arm_recordings
 
 DOCS = Path(__file__).parents[1] / "docs"

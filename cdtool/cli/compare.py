@@ -14,8 +14,8 @@ from cdtool.errors import ExitStatus
 from cdtool.plain_text import shorten
 
 if TYPE_CHECKING:
-    from cdtool.evaluation.build_comparison import BuildComparison
-    from cdtool.evaluation.build_questions import Figure
+    from cdtool.evaluation.builds.comparison import BuildComparison
+    from cdtool.evaluation.builds.questions import Figure
 
 _WIDTH = 100
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17

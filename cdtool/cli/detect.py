@@ -29,7 +29,7 @@ from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
 if TYPE_CHECKING:
-    from cdtool.evaluation.matching import Matching
+    from cdtool.evaluation.truth.matching import Matching
     from cdtool.pipeline import Detection
     from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
@@ -61,7 +61,7 @@ def detect(
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
-    from cdtool.evaluation.onset import OnsetRule
+    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
@@ -94,7 +94,7 @@ def detect(
                 done.append((log, found))
                 skipped += lost(found.recording)
                 if plot_names:
-                    from cdtool.report.detection_plot import plot_detected
+                    from cdtool.report.plots.detection_plot import plot_detected
 
                     plot_detected(found, plot_names[log])
             except CdtoolError as fault:

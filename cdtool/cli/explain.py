@@ -27,8 +27,8 @@ from cdtool.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from cdtool.evaluation.explanation import AlarmExplanation, Explanation, MissExplanation
-    from cdtool.evaluation.margin import Moment
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
+    from cdtool.evaluation.explanation.margin import Moment
     from cdtool.workflows.explaining import Explained
 
 _WIDTH = 100
@@ -57,7 +57,7 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.evaluation.onset import OnsetRule
+    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.workflows.explaining import explain as run
     from cdtool.workflows.runs import lost
 
@@ -102,8 +102,8 @@ def _show(explained: Explained) -> None:
 
 def _show_event(item: Explanation) -> None:
     """Headline, sentences, and the margin over time."""
-    from cdtool.evaluation.explanation import AlarmExplanation
-    from cdtool.evaluation.explanation_words import words
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation
+    from cdtool.evaluation.explanation.words import words
 
     headline, *sentences = words(item)
     _print(f"{item.operation}, {item.detector}: {headline}")
@@ -137,7 +137,7 @@ def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:
     """One figure of the first event, or one an event in a folder; the files that were written."""
     if plot is None:
         return []
-    from cdtool.report.margin_plot import plot_explanation
+    from cdtool.report.plots.margin_plot import plot_explanation
 
     events = explained.events[: _SHOWN if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
@@ -147,7 +147,7 @@ def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:
 
 
 def _as_json(log: Path, explained: Explained) -> dict[str, Any]:
-    from cdtool.evaluation.explanation import AlarmExplanation
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation
 
     items = [item for _, item in explained.events]
     return {
@@ -198,7 +198,7 @@ def _miss_as_json(item: MissExplanation) -> dict[str, Any]:
 
 
 def _common(item: Explanation) -> dict[str, Any]:
-    from cdtool.evaluation.explanation_words import words
+    from cdtool.evaluation.explanation.words import words
 
     return {
         "operation": item.operation,

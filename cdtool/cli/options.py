@@ -63,7 +63,7 @@ def limits_of(text: str) -> tuple[float, ...]:
 
 def figure_name(plot: Path) -> Path:
     """The file of --plot; raises UsageError where its name is none of a figure."""
-    from cdtool.report.figures import SUFFIXES
+    from cdtool.report.plots.figures import SUFFIXES
 
     if plot.suffix.lower() not in SUFFIXES:
         raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")

@@ -13,8 +13,8 @@ from cdtool.errors import ExitStatus
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
-    from cdtool.evaluation.interval import Interval
-    from cdtool.evaluation.statistics import Summary
+    from cdtool.evaluation.statistics.interval import Interval
+    from cdtool.evaluation.summary import Summary
 
 _SHOWN = 10
 

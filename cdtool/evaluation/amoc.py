@@ -13,8 +13,8 @@ from typing import Literal
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.rates import poisson_at_most
 from cdtool.evaluation.results import Results, SweepResult
+from cdtool.evaluation.statistics.rates import poisson_at_most
 
 Per = Literal["hour", "operation"]
 

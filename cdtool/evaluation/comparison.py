@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from cdtool.evaluation.paired import Difference, holm, mcnemar_p, paired_difference
 from cdtool.evaluation.results import ContactResult, Results
-from cdtool.evaluation.statistics import campaigns
+from cdtool.evaluation.statistics.paired import Difference, holm, mcnemar_p, paired_difference
+from cdtool.evaluation.summary import campaigns
 
 # A difference counts as shown below this, after correction.
 SIGNIFICANT = 0.05

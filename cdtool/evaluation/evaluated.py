@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from cdtool.evaluation.comparison import Comparison, compare_detectors
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
-from cdtool.evaluation.statistics import Summary, summarise
+from cdtool.evaluation.summary import Summary, summarise
 
 
 @dataclass(frozen=True)

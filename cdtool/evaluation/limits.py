@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.results import LimitResult
-from cdtool.evaluation.statistics import COUNTED_ALWAYS, FIGURES, Summary
+from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary
 from cdtool.tables import Table
 
 ALL = "*"

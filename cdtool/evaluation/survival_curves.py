@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.evaluation.kaplan_meier import Survival, survival
 from cdtool.evaluation.results import ContactResult, Results
-from cdtool.evaluation.statistics import latencies
+from cdtool.evaluation.statistics.kaplan_meier import Survival, survival
+from cdtool.evaluation.summary import latencies
 from cdtool.recording import FloatArray
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from cdtool.activation import Activation, crossings_of
 from cdtool.detection import Status
-from cdtool.evaluation.matching import belongs, windows
+from cdtool.evaluation.truth.matching import belongs, windows
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, FloatArray
 

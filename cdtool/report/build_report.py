@@ -8,13 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.build_comparison import BuildComparison
-from cdtool.evaluation.build_questions import Figure
-from cdtool.evaluation.build_rows import BuildRow
+from cdtool.evaluation.builds.comparison import BuildComparison
+from cdtool.evaluation.builds.questions import Figure
+from cdtool.evaluation.builds.rows import BuildRow
 from cdtool.plain_text import plain
 from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.files import write_text
-from cdtool.report.markdown_text import Table, escape
+from cdtool.report.markdown.text import Table, escape
 from cdtool.report.verdict_words import NO_CERTIFICATE
 from cdtool.strict_json import strict_json
 

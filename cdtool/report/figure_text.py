@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from cdtool.evaluation.interval import Interval
+from cdtool.evaluation.statistics.interval import Interval
 
 NOTHING = "–"
 NOT_REACHED = "not reached"

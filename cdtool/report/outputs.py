@@ -12,11 +12,11 @@ from pathlib import Path
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results_file import to_json
-from cdtool.evaluation.traces import Trace
-from cdtool.evaluation.traces_file import encode_traces, traces_path
+from cdtool.evaluation.traces.file import encode_traces, traces_path
+from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
-from cdtool.report.figures import SUFFIXES
 from cdtool.report.files import write_text, write_whole
+from cdtool.report.plots.figures import SUFFIXES
 
 _LONGEST_NAME = 40
 
@@ -36,7 +36,7 @@ def _write_json(report: Report, target: Path) -> None:
 
 
 def _write_markdown(report: Report, target: Path) -> None:
-    from cdtool.report.markdown import to_markdown
+    from cdtool.report.markdown.markdown import to_markdown
 
     write_text(target, to_markdown(report.evaluated))
 
@@ -54,13 +54,13 @@ def _write_junit(report: Report, target: Path) -> None:
 
 
 def _write_html(report: Report, target: Path) -> None:
-    from cdtool.report.html import to_html
+    from cdtool.report.html.page import to_html
 
     write_text(target, to_html(report.evaluated, report.traces))
 
 
 def _write_latencies(report: Report, target: Path) -> None:
-    from cdtool.report.latency_plot import plot_latencies
+    from cdtool.report.plots.latency_plot import plot_latencies
 
     plot_latencies(report.evaluated, target)
 
@@ -118,9 +118,9 @@ def slug(name: str, taken: set[str]) -> str:
 
 def _write_folder(report: Report, folder: Path) -> Path:
     """Everything: data, figures, and the report as HTML and as Markdown that links the figures."""
-    from cdtool.report.folder_figures import write_figures
     from cdtool.report.forces_csv import forces_csv
-    from cdtool.report.markdown import to_markdown
+    from cdtool.report.markdown.markdown import to_markdown
+    from cdtool.report.plots.folder_figures import write_figures
 
     try:
         folder.mkdir(exist_ok=True)

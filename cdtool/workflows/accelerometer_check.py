@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Finding, FloatArray, Recording
 
 # Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.

@@ -12,11 +12,11 @@ from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.force_limits import ForceProfile, profile_of, read_force_limits
-from cdtool.evaluation.labels import Labels, read_labels
+from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
-from cdtool.evaluation.named_rows import by_recording
-from cdtool.evaluation.onset import OnsetRule
+from cdtool.evaluation.truth.labels import Labels, read_labels
+from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml

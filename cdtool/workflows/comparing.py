@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cdtool.evaluation.build_comparison import BuildComparison, compare_builds
+from cdtool.evaluation.builds.comparison import BuildComparison, compare_builds
 from cdtool.evaluation.comparison import SIGNIFICANT
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import read_results

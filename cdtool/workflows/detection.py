@@ -8,8 +8,8 @@ from pathlib import Path
 
 from cdtool.activation import Activation
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.matching import Matching, match
-from cdtool.evaluation.onset import OnsetRule, find_contacts
+from cdtool.evaluation.truth.matching import Matching, match
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdtool.evaluation.explanation import Explanation, explain_operation
-from cdtool.evaluation.onset import OnsetRule
+from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
 from cdtool.workflows.detection import Detected, detect

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from cdtool.evaluation.force_course import ForceCourse
-from cdtool.evaluation.force_limits import ForceProfile
-from cdtool.evaluation.force_verdict import ForceVerdict, averaged
+from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.verdict import ForceVerdict, averaged
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult
 
 

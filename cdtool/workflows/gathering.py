@@ -8,13 +8,13 @@ from typing import Any
 
 from cdtool.activation import Activation
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.evaluation.explanation import explain_operation
-from cdtool.evaluation.explanation_words import words
-from cdtool.evaluation.force_verdict import ForceVerdict
-from cdtool.evaluation.matching import Matching
+from cdtool.evaluation.explanation.explanation import explain_operation
+from cdtool.evaluation.explanation.words import words
+from cdtool.evaluation.force.verdict import ForceVerdict
 from cdtool.evaluation.results import CalibrationResult, RecordingResult, Results, Skipped
-from cdtool.evaluation.trace_choice import TraceChoice
-from cdtool.evaluation.traces import Trace, make_trace
+from cdtool.evaluation.traces.choice import TraceChoice
+from cdtool.evaluation.traces.trace import Trace, make_trace
+from cdtool.evaluation.truth.matching import Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.evaluation.force_course import ForceCourse, force_at
-from cdtool.evaluation.matching import Match, Matching
+from cdtool.evaluation.force.course import ForceCourse, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
+from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording

@@ -13,14 +13,14 @@ from cdtool.evaluation.comparison import SIGNIFICANT
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import ContactResult, Results
 from cdtool.evaluation.results_file import read_results
-from cdtool.evaluation.sample_size import (
+from cdtool.evaluation.statistics.sample_size import (
     exposure_for_rate,
     impacts_for_difference,
     impacts_for_missed_share,
     impacts_for_unpaired,
 )
-from cdtool.evaluation.spread import Spread, spread_of
-from cdtool.evaluation.statistics import campaigns
+from cdtool.evaluation.statistics.spread import Spread, spread_of
+from cdtool.evaluation.summary import campaigns
 
 
 @dataclass(frozen=True)

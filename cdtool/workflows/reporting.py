@@ -6,8 +6,8 @@ from pathlib import Path
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.results_file import read_results
-from cdtool.evaluation.traces import Trace
-from cdtool.evaluation.traces_file import read_traces, traces_path
+from cdtool.evaluation.traces.file import read_traces, traces_path
+from cdtool.evaluation.traces.trace import Trace
 
 
 def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]:

@@ -14,8 +14,8 @@ from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import ALL
 from cdtool.evaluation.results import Skipped
-from cdtool.evaluation.traces import Trace
-from cdtool.evaluation.trigger_file import Triggered, TriggerFile, read_triggers
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.registry import plugin_packages

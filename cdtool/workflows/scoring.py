@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.evaluation.force_course import ForceCourse, force_course
-from cdtool.evaluation.force_verdict import ForceVerdict, judge
-from cdtool.evaluation.matching import match
-from cdtool.evaluation.onset import find_contacts
+from cdtool.evaluation.force.course import ForceCourse, force_course
+from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
+from cdtool.evaluation.truth.matching import match
+from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import Contact, FloatArray, Recording

@@ -23,7 +23,7 @@ import numpy as np
 import cdtool
 from cdtool.activation import Activation
 from cdtool.detection import Alarm
-from cdtool.evaluation.matching import Matching, match
+from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operation, run_detector

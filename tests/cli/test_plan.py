@@ -12,7 +12,7 @@ import pytest
 import cdtool as api
 from cdtool.errors import UsageError
 from cdtool.evaluation.results_file import to_json
-from cdtool.evaluation.sample_size import (
+from cdtool.evaluation.statistics.sample_size import (
     exposure_for_rate,
     impacts_for_difference,
     impacts_for_missed_share,

@@ -11,7 +11,7 @@ import pytest
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.limits import broken, check_limits, read_limits
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
-from cdtool.evaluation.statistics import FIGURES, summarise
+from cdtool.evaluation.summary import FIGURES, summarise
 from cdtool.tables import Table
 
 DETECTORS = [("momentum", "gm"), ("friction_ekf", "feekf")]

@@ -25,7 +25,7 @@ from cdtool.evaluation.results import (
     RecordingResult,
     Results,
 )
-from cdtool.evaluation.statistics import FIGURES
+from cdtool.evaluation.summary import FIGURES
 
 
 def contact(name: str, latency: float | None, outcome: str = "detected", force: float | None = None) -> ContactResult:

@@ -25,7 +25,7 @@ from cdtool.evaluation.results import (
     SweepResult,
 )
 from cdtool.evaluation.results_file import read_results, to_json
-from cdtool.evaluation.statistics import summarise
+from cdtool.evaluation.summary import summarise
 
 
 def contact(latency: float | None, outcome: str = "detected", detector: str = "momentum") -> ContactResult:

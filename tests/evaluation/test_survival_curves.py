@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.evaluation.kaplan_meier import latency_quantile
 from cdtool.evaluation.results import ContactResult, Results
+from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
 from cdtool.evaluation.survival_curves import survival_curves
 
 

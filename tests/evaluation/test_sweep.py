@@ -11,8 +11,8 @@ from cdtool.activation import Activation
 from cdtool.detection import Band, Signal, Status, Verdict
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget, set_factor
-from cdtool.evaluation.matching import match
 from cdtool.evaluation.sweep import MULTIPLES, critical_factor, sweep
+from cdtool.evaluation.truth.matching import match
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge

@@ -11,8 +11,6 @@ import pytest
 from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.matching import match
-from cdtool.evaluation.onset import OnsetRule, find_contacts
 from cdtool.evaluation.results import (
     ContactResult,
     ExposureResult,
@@ -21,7 +19,9 @@ from cdtool.evaluation.results import (
     Results,
     Skipped,
 )
-from cdtool.evaluation.traces import Trace, make_trace
+from cdtool.evaluation.traces.trace import Trace, make_trace
+from cdtool.evaluation.truth.matching import match
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, detect_operation, run_detector

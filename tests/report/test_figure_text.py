@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from cdtool.evaluation.interval import Interval
+from cdtool.evaluation.statistics.interval import Interval
 from cdtool.report.figure_text import missed, number, percent, rate, with_interval
 
 NAN, INF = math.nan, math.inf

@@ -14,7 +14,7 @@ from cdtool.evaluation.results import LimitResult, Results, Skipped
 from cdtool.report.junit import to_junit
 from tests.report.conftest import contact, contacts_of
 from tests.report.hostile import HOSTILE
-from tests.report.test_markdown import named
+from tests.report.markdown.test_markdown import named
 
 # What Jenkins' schema allows; it refuses a file with another attribute.
 ALLOWED = {

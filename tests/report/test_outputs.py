@@ -11,10 +11,10 @@ import pytest
 from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ForceResult, ForceStepResult
-from cdtool.evaluation.traces_file import encode_traces, read_traces
+from cdtool.evaluation.traces.file import encode_traces, read_traces
 from cdtool.report.contacts_csv import contacts_csv
 from cdtool.report.junit import to_junit
-from cdtool.report.markdown import to_markdown
+from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.outputs import Report, check_outputs, slug, write_outputs
 from tests.report.conftest import Bench
 from tests.report.hostile import HOSTILE

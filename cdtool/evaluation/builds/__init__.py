@@ -1,0 +1,1 @@
+"""Two results of one bench: what a new build changed."""

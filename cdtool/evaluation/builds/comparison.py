@@ -1,0 +1,94 @@
+"""Is a new build better or worse than the old one? Two results files, detector by detector and group by group.
+
+Conventions: a change is new less old. Contacts that both files hold are compared one by one. All questions are
+corrected together (Holm): that anything is wrongly called worse or better has the chance `significance` at most. "No
+change shown" is not "no change": every question says which change would have been shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.builds.configuration import Changed, changed_settings, refuse_other_rules
+from cdtool.evaluation.builds.pairs import pair_recordings
+from cdtool.evaluation.builds.rows import NOTHING_SHOWN, Build, BuildRow, answer, ask
+from cdtool.evaluation.builds.words import overall_words, pairing_words, row_words
+from cdtool.evaluation.comparison import SIGNIFICANT
+from cdtool.evaluation.results import Results
+
+Verdict = Literal["worse", "better", "mixed", "no change shown"]
+
+
+@dataclass(frozen=True)
+class BuildComparison:
+    """All questions asked of two builds, the verdict over them, and what else differs.
+
+    `asked` questions were corrected together. `only_old`, `only_new`: detectors, groups, or a detector in a group that
+    one file alone holds. `changed`: settings under test that differ. `notes`: recordings without a partner.
+    """
+
+    verdict: Verdict
+    words: str
+    significance: float
+    asked: int
+    rows: tuple[BuildRow, ...]
+    changed: tuple[Changed, ...]
+    only_old: tuple[str, ...]
+    only_new: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT) -> BuildComparison:
+    """Compare every detector and group that both results hold.
+
+    Latency and force: `paired_difference` by recording or campaign, else `unpaired_difference`; misses and contacts not
+    assessable: McNemar, else Fisher; false alarms: `poisson_difference_p` on counts and hours.
+    Raises ConfigurationError, naming the key, where something differs that decides how figures come about; UsageError
+    where nothing is common.
+    """
+    if not 0.0 < significance < 0.5:
+        raise UsageError(f"significance level is {significance:g}", "a share above 0 and below 0.5, such as 0.05")
+    groups = [group for group in old.groups if group in new.groups]
+    detectors = [name for name in old.detectors if name in new.detectors]
+    builds = (Build(old), Build(new))
+    both = builds[0].held & builds[1].held
+    held = [(name, group) for group in groups for name in detectors if (name, group) in both]
+    if not held:
+        raise UsageError("the two results have no detector and group in common", "compare results of one benchmark")
+    refuse_other_rules(old.provenance, new.provenance, groups)
+    pairings = pair_recordings(old, new)
+    asked = [ask(name, group, builds, pairings[group], 1.0 - significance) for name, group in held]
+    answered, count = answer(asked, significance)
+    rows = tuple(replace(row, words=row_words(row, count)) for row in answered)
+    verdict = _verdict(rows)
+    return BuildComparison(
+        verdict=verdict,
+        words=overall_words(verdict, rows, count, significance),
+        significance=significance,
+        asked=count,
+        rows=rows,
+        changed=tuple(changed_settings(old.provenance, new.provenance, detectors)),
+        only_old=tuple(_alone(old, new, builds)),
+        only_new=tuple(_alone(new, old, builds[::-1])),
+        notes=tuple(pairing_words(pairings)),
+    )
+
+
+def _verdict(rows: Sequence[BuildRow]) -> Verdict:
+    outcomes = {item.outcome for row in rows for item in row.questions}
+    if {"worse", "better"} <= outcomes:
+        return "mixed"
+    return "worse" if "worse" in outcomes else "better" if "better" in outcomes else NOTHING_SHOWN
+
+
+def _alone(one: Results, other: Results, builds: Sequence[Build]) -> list[str]:
+    """What only the first holds: whole detectors, whole groups, then a detector in a group."""
+    words = [f"detector {name}" for name in one.detectors if name not in other.detectors]
+    words += [f"group {name}" for name in one.groups if name not in other.groups]
+    known = ((group, name) for group in one.groups for name in one.detectors)
+    shared = [(group, name) for group, name in known if group in other.groups and name in other.detectors]
+    held = builds[0].held - builds[1].held
+    return words + [f"{name} in {group}" for group, name in shared if (name, group) in held]

@@ -1,0 +1,214 @@
+"""What is asked of one detector in one group of two builds: latency, force, misses, not assessable, false alarms.
+
+Conventions: a change is new less old, and more is worse in every figure. A question that no outcome could have decided,
+such as misses where nothing was missed, has no p (NaN) and does not count as asked. All p are two-sided.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.evaluation.results import ContactResult
+from cdtool.evaluation.statistics.bootstrap import RESAMPLES
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p, paired_difference, unpaired_difference
+from cdtool.evaluation.statistics.rates import poisson_difference_p
+from cdtool.evaluation.statistics.sample_size import detectable_difference
+from cdtool.evaluation.statistics.spread import Spread, spread_of
+
+Figure = Literal["latency_ms", "force_at_alarm_n", "missed", "not_assessable", "false_alarms"]
+Pairs = Sequence[tuple[ContactResult, ContactResult]]
+Labels = Mapping[str, str]
+"""What each recording of a build is resampled with."""
+
+POWER = 0.8
+# Counts looked at for the least one that a test would show.
+_MOST = 10_000
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One figure of both builds and the p of no change.
+
+    `old` and `new` are means over `old_of` and `new_of` contacts, or counts in so many contacts, operations or hours.
+    `detectable(alpha)` is the least change that would have been shown at that p: with 80 % power where a mean is
+    asked; else the count of the new build from which on the test shows it. Infinite: none could have been.
+    """
+
+    figure: Figure
+    old: float
+    old_of: float
+    new: float
+    new_of: float
+    change: Interval
+    p: float
+    detectable: Callable[[float], float]
+    reason: str = ""
+
+
+def ask_mean(
+    figure: Literal["latency_ms", "force_at_alarm_n"],
+    old: Sequence[ContactResult],
+    new: Sequence[ContactResult],
+    labels: tuple[Labels, Labels],
+    paired: bool,
+    level: float,
+) -> Asked:
+    """Mean of `figure` over the contacts that have it: in both where `old` and `new` are `paired` one by one."""
+    if paired:
+        both = [pair for pair in zip(old, new, strict=True) if all(getattr(item, figure) is not None for item in pair)]
+        old, new = [pair[0] for pair in both], [pair[1] for pair in both]
+    before, after = _valued(figure, old, labels[0]), _valued(figure, new, labels[1])
+    if not before[0] or not after[0]:
+        reason = f"no contact has {'it in both' if paired else 'it in one of them'}"
+        return _without(figure, (math.nan, len(before[0])), (math.nan, len(after[0])), reason)
+    means = (spread_of(*before), spread_of(*after))
+    if paired:
+        # Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change.
+        differences = [round(b - a, 3) for a, b in zip(before[0], after[0], strict=True)]
+        found = paired_difference(differences, before[1], level)
+        detectable = _paired_detectable(spread_of(differences, before[1]))
+    else:
+        found = unpaired_difference(after[0], before[0], after[1], before[1], level)
+        detectable = _unpaired_detectable(*means)
+    reason = "" if not math.isnan(found.p) else "fewer than two recordings or campaigns"
+    return Asked(figure, means[0].mean, means[0].n, means[1].mean, means[1].n, found.mean, found.p, detectable, reason)
+
+
+def ask_missed(old: Sequence[ContactResult], new: Sequence[ContactResult], paired: bool) -> Asked:
+    """Missed contacts among the assessable ones: exact McNemar where paired, else Fisher."""
+    if paired:
+        both = [pair for pair in zip(old, new, strict=True) if all(_assessable(item) for item in pair)]
+        flags = ([a.outcome == "missed" for a, _ in both], [b.outcome == "missed" for _, b in both])
+    else:
+        flags = (
+            [item.outcome == "missed" for item in old if _assessable(item)],
+            [item.outcome == "missed" for item in new if _assessable(item)],
+        )
+    return _ask_flags("missed", *flags, paired)
+
+
+def ask_not_assessable(old: Sequence[ContactResult], new: Sequence[ContactResult], paired: bool) -> Asked:
+    """Contacts that could not be assessed, of all: exact McNemar where paired, else Fisher."""
+    flags = ([not _assessable(item) for item in old], [not _assessable(item) for item in new])
+    return _ask_flags("not_assessable", *flags, paired)
+
+
+def ask_blind_operations(old: tuple[int, int], new: tuple[int, int]) -> Asked:
+    """Operations that could be judged nowhere, of all, where a group has no contacts: (count, of) each; Fisher."""
+    return _ask_counts("not_assessable", old, new)
+
+
+def ask_false_alarms(old: tuple[int, float], new: tuple[int, float]) -> Asked:
+    """False alarms in the hours watched, (count, hours) each: the exact test of two rates, in paired data too.
+
+    The same recordings in both make it err on the side of no change.
+    """
+    (count, hours), (count_new, hours_new) = old, new
+    if not (hours > 0.0 and hours_new > 0.0):
+        return _without("false_alarms", old, new, "nothing was watched in one of them")
+
+    def p_of(number: int) -> float:
+        return poisson_difference_p(number, hours_new, count, hours)
+
+    p = p_of(count_new) if count + count_new else math.nan
+    change = Interval(count_new / hours_new - count / hours, math.nan, math.nan)
+    least = _least_count(p_of, math.floor(count * hours_new / hours), _MOST)
+    return Asked("false_alarms", count, hours, count_new, hours_new, change, p, least)
+
+
+def _ask_flags(
+    figure: Literal["missed", "not_assessable"], old: Sequence[bool], new: Sequence[bool], paired: bool
+) -> Asked:
+    before, after = sum(old), sum(new)
+    if not paired:
+        return _ask_counts(figure, (before, len(old)), (after, len(new)))
+    if not old:
+        return _without(figure, (0, 0), (0, 0), "no contact that both could assess")
+    only_old = sum(a and not b for a, b in zip(old, new, strict=True))
+    only_new = sum(b and not a for a, b in zip(old, new, strict=True))
+
+    def p_of(number: int) -> float:
+        return mcnemar_p(only_old, max(number - (before - only_old), 0))
+
+    p = mcnemar_p(only_old, only_new) if only_old + only_new else math.nan
+    change = Interval((after - before) / len(old), math.nan, math.nan)
+    least = _least_count(p_of, before, len(old) - only_old)
+    return Asked(figure, before, len(old), after, len(new), change, p, least)
+
+
+def _ask_counts(figure: Literal["missed", "not_assessable"], old: tuple[int, int], new: tuple[int, int]) -> Asked:
+    (before, of), (after, of_new) = old, new
+    if not of or not of_new:
+        return _without(figure, old, new, "nothing to assess in one of them")
+
+    def p_of(number: int) -> float:
+        return fisher_p(number, of_new, before, of)
+
+    p = p_of(after) if before + after else math.nan
+    change = Interval(after / of_new - before / of, math.nan, math.nan)
+    return Asked(figure, before, of, after, of_new, change, p, _least_count(p_of, before * of_new // of, of_new))
+
+
+def _without(figure: Figure, old: tuple[float, float], new: tuple[float, float], reason: str) -> Asked:
+    change = Interval(math.nan, math.nan, math.nan)
+    return Asked(figure, *old, *new, change, math.nan, lambda _: math.nan, reason)
+
+
+def _assessable(contact: ContactResult) -> bool:
+    return contact.outcome != "not_assessable"
+
+
+def _valued(figure: str, contacts: Sequence[ContactResult], labels: Labels) -> tuple[list[float], list[str]]:
+    known = [item for item in contacts if getattr(item, figure) is not None]
+    return [getattr(item, figure) for item in known], [labels.get(item.recording, item.recording) for item in known]
+
+
+def _paired_detectable(spread: Spread) -> Callable[[float], float]:
+    k = spread.clusters
+    patterns = 2**k if k <= 13 else math.inf
+
+    def least(alpha: float) -> float:
+        return _detectable(k, spread.std, alpha, patterns)
+
+    return least
+
+
+def _unpaired_detectable(old: Spread, new: Spread) -> Callable[[float], float]:
+    """A t-test with k_a + k_b - 2 degrees of freedom is one of k_a + k_b - 1 differences: only the error differs."""
+    k = old.clusters + new.clusters - 1
+    std = math.hypot(old.error, new.error) * math.sqrt(k)
+    divisions = math.comb(old.clusters + new.clusters, old.clusters)
+
+    def least(alpha: float) -> float:
+        return _detectable(k, std, alpha, divisions)
+
+    return least
+
+
+def _detectable(n: int, std: float, alpha: float, patterns: float) -> float:
+    """What a test with so many equally likely patterns shows at `alpha`; their number bounds its p from below."""
+    lowest_p = 2.0 / patterns if patterns <= RESAMPLES else 2.0 / (RESAMPLES + 1)
+    if lowest_p >= alpha or math.isnan(std):
+        return math.inf
+    return detectable_difference(n, std, POWER, 1.0 - alpha) if std > 0.0 else 0.0
+
+
+def _least_count(p_of: Callable[[int], float], start: int, most: int) -> Callable[[float], float]:
+    """The least count above `start`, where p is largest, whose p is below alpha; infinite above `most`."""
+
+    def least(alpha: float) -> float:
+        below, above = start, start + 1
+        while above <= most and p_of(above) >= alpha:
+            below, above = above, (min(2 * above, most) if above < most else most + 1)
+        if above > most:
+            return math.inf
+        while above - below > 1:
+            middle = (above + below) // 2
+            below, above = (middle, above) if p_of(middle) >= alpha else (below, middle)
+        return above
+
+    return least

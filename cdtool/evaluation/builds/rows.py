@@ -1,0 +1,180 @@
+"""One detector in one group of two builds: which contacts are compared, and the questions with their answers."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from cdtool.evaluation.builds.pairs import Pairing, pairs_of_contacts
+from cdtool.evaluation.builds.questions import (
+    Asked,
+    Figure,
+    Labels,
+    ask_blind_operations,
+    ask_false_alarms,
+    ask_mean,
+    ask_missed,
+    ask_not_assessable,
+)
+from cdtool.evaluation.results import ContactResult, ExposureResult, Results
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.paired import holm
+from cdtool.evaluation.summary import campaigns
+
+NOTHING_SHOWN: Final = "no change shown"
+
+
+@dataclass(frozen=True)
+class Question:
+    """One figure of one detector in one group in both builds, and whether a change is shown.
+
+    `old` and `new`: means over `old_of` and `new_of` contacts, or counts in so many contacts, operations or hours;
+    `change` is new less old, of counts a share or a rate without an interval. `p` of no change and `corrected_p` (Holm)
+    are NaN where there was nothing to ask; `reason` says why. `detectable`: the least change of a mean that would have
+    been shown with 80 % power, or the new count from which on it would have been; infinite where none could.
+    """
+
+    figure: Figure
+    outcome: Literal["worse", "better", "no change shown", "not asked"]
+    old: float
+    old_of: float
+    new: float
+    new_of: float
+    change: Interval
+    p: float
+    corrected_p: float
+    detectable: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class BuildRow:
+    """One detector in one group.
+
+    `old_contacts` and `new_contacts` are all that the files hold, `pairs` those compared one by one (0 where not
+    paired); in `one_not_assessable` of them one build could not assess the contact, which counts there alone.
+    """
+
+    detector: str
+    group: str
+    paired: bool
+    old_contacts: int
+    new_contacts: int
+    pairs: int
+    one_not_assessable: int
+    questions: tuple[Question, ...] = ()
+    words: str = ""
+
+    def question(self, figure: Figure) -> Question | None:
+        """The question about a figure; None where the group has none of it."""
+        return next((item for item in self.questions if item.figure == figure), None)
+
+
+class Build:
+    """One build's results by detector and group."""
+
+    def __init__(self, results: Results) -> None:
+        self.labels = campaigns(results)
+        self._contacts: dict[tuple[str, str], list[ContactResult]] = defaultdict(list)
+        self._false_alarms: dict[tuple[str, str], int] = defaultdict(int)
+        self._exposure = {(item.detector, item.group): item for item in results.exposure}
+        for contact in results.contacts:
+            self._contacts[contact.detector, contact.group].append(contact)
+        for alarm in results.false_alarms:
+            self._false_alarms[alarm.detector, alarm.group] += 1
+
+    @property
+    def held(self) -> set[tuple[str, str]]:
+        """The detectors and groups that it has figures of."""
+        return {*self._contacts, *self._exposure}
+
+    def contacts(self, detector: str, group: str) -> list[ContactResult]:
+        """The contacts, seen by a detector."""
+        return self._contacts.get((detector, group), [])
+
+    def false_alarms(self, detector: str, group: str) -> tuple[int, float]:
+        """How many, in how many hours."""
+        return self._false_alarms.get((detector, group), 0), self._watched(detector, group).hours
+
+    def blind_operations(self, detector: str, group: str) -> tuple[int, int]:
+        """How many could be judged nowhere, of how many."""
+        watched = self._watched(detector, group)
+        return watched.not_assessable, watched.operations
+
+    def _watched(self, detector: str, group: str) -> ExposureResult:
+        return self._exposure.get((detector, group), ExposureResult(group, detector, 0, 0, 0.0))
+
+
+def ask(
+    detector: str, group: str, builds: tuple[Build, Build], pairing: Pairing, level: float
+) -> tuple[BuildRow, list[Asked]]:
+    """A row without its questions, and what is asked; `level` of the intervals."""
+    old, new = (build.contacts(detector, group) for build in builds)
+    paired = bool(pairing.partners)
+    pairs = pairs_of_contacts(pairing, old, new)
+    before, after = ([a for a, _ in pairs], [b for _, b in pairs]) if paired else (old, new)
+    labels = (_shared_labels(builds, pairing) if paired else builds[0].labels, builds[1].labels)
+    if old or new:
+        asked = [
+            ask_mean("latency_ms", before, after, labels, paired, level),
+            ask_missed(before, after, paired),
+            ask_not_assessable(before, after, paired),
+            ask_false_alarms(*(build.false_alarms(detector, group) for build in builds)),
+            ask_mean("force_at_alarm_n", before, after, labels, paired, level),
+        ]
+    else:
+        asked = [
+            ask_blind_operations(*(build.blind_operations(detector, group) for build in builds)),
+            ask_false_alarms(*(build.false_alarms(detector, group) for build in builds)),
+        ]
+    apart = sum((a.outcome == "not_assessable") != (b.outcome == "not_assessable") for a, b in pairs)
+    return BuildRow(detector, group, paired, len(old), len(new), len(pairs), apart), asked
+
+
+def answer(asked: Sequence[tuple[BuildRow, Sequence[Asked]]], significance: float) -> tuple[list[BuildRow], int]:
+    """The rows with their questions, corrected together over all rows (Holm), and how many were asked."""
+    p = [item.p for _, items in asked for item in items]
+    count = sum(not math.isnan(value) for value in p)
+    corrected = iter(holm(p).tolist())
+    rows = [
+        replace(row, questions=tuple(_answered(item, next(corrected), significance, count) for item in items))
+        for row, items in asked
+    ]
+    return rows, count
+
+
+def _answered(asked: Asked, corrected: float, significance: float, count: int) -> Question:
+    outcome: Literal["worse", "better", "no change shown", "not asked"] = NOTHING_SHOWN
+    if math.isnan(corrected):
+        outcome = "not asked"
+    elif corrected < significance:
+        # Latency, force, misses, blind contacts, false alarms: less is better of each.
+        outcome = "worse" if asked.change.value > 0.0 else "better"
+    return Question(
+        figure=asked.figure,
+        outcome=outcome,
+        old=asked.old,
+        old_of=asked.old_of,
+        new=asked.new,
+        new_of=asked.new_of,
+        change=asked.change,
+        p=asked.p,
+        corrected_p=corrected,
+        # What is not asked here would have counted as one more question.
+        detectable=asked.detectable(significance / (count + math.isnan(asked.p))),
+        reason=asked.reason,
+    )
+
+
+def _shared_labels(builds: tuple[Build, Build], pairing: Pairing) -> Labels:
+    """The campaign of each paired recording, whichever of the files names one; else the recording itself."""
+    old, new = builds[0].labels, builds[1].labels
+    found = {}
+    for name, partner in pairing.partners.items():
+        campaign = new.get(partner, partner)
+        unnamed = old.get(name, name) == name
+        found[name] = campaign if unnamed and campaign != partner else old.get(name, name)
+    return found

@@ -1,0 +1,225 @@
+"""Why each alarm came and why each contact was missed: joint, limit, margin over time, what moved first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.detection import Alarm
+from cdtool.errors import UsageError
+from cdtool.evaluation.explanation.margin import Approach, JointMargin, Moment, joint_margins
+from cdtool.evaluation.explanation.movement import Movement, which_moved_first
+from cdtool.evaluation.truth.matching import Match, Matching
+from cdtool.pipeline import Detection
+from cdtool.recording import GROUND_TRUTH, Contact
+
+Role = Literal["detection", "further alarm", "false alarm", "alarm"]
+
+# When the margin is told [s]: to the alarm; from the onset of a missed contact.
+_TO_ALARM = (-0.1, -0.05, -0.02, -0.01, -0.005, 0.0)
+_FROM_ONSET = (-0.1, 0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+# A load cell feels a contact up to this late [s]; by how much an alarm is late is not known without a contact.
+_LEAD_OF_ONSET, _LEAD_OF_ALARM = 0.05, 0.3
+# For this long after an onset channels are watched [s].
+_AFTERMATH = 0.5
+
+
+@dataclass(frozen=True)
+class AlarmExplanation:
+    """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` samples in succession.
+
+    `skipped` samples were missing among them. `contact` is the one that the alarm belongs to. `moved` are the channels
+    of the joint in the order in which they moved; `inputs` names those that the detector needs.
+    """
+
+    operation: str
+    detector: str
+    unit: str
+    joint: str
+    role: Role
+    alarm: Alarm
+    contact: Contact | None
+    left: float
+    debounce: int
+    skipped: int
+    moments: tuple[Moment, ...]
+    moved: tuple[Movement, ...]
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def zero(self) -> float:
+        """What times are counted from [s]: the contact's onset, else the alarm."""
+        return self.contact.start if self.contact else self.alarm.time
+
+
+@dataclass(frozen=True)
+class MissExplanation:
+    """Why a contact was missed, or could not be assessed (`reason`): how near each joint came, the nearest first.
+
+    `watched` [s]: how long after the onset an alarm would have counted. `not_judged`: share of the samples there that
+    could not be judged, by reason. `joint` is the nearest one, of which `moments` and `moved` tell.
+    """
+
+    operation: str
+    detector: str
+    unit: str
+    joint: str
+    contact: Contact
+    outcome: Literal["missed", "not_assessable"]
+    reason: str
+    watched: float
+    debounce: int
+    not_judged: Mapping[str, float]
+    approaches: tuple[Approach, ...]
+    moments: tuple[Moment, ...]
+    moved: tuple[Movement, ...]
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def zero(self) -> float:
+        """What times are counted from [s]: the contact's onset."""
+        return self.contact.start
+
+
+Explanation = AlarmExplanation | MissExplanation
+
+
+def explain_operation(
+    detection: Detection, matching: Matching, activation: Activation, inputs: Sequence[str] = ()
+) -> tuple[Explanation, ...]:
+    """Every alarm of an operation and every contact without one, in order of time.
+
+    `inputs` names the channels that the detector needs.
+    """
+    margins = joint_margins(detection)
+    detecting = {item.alarm: item.contact for item in matching.matches if item.alarm}
+    found: list[Explanation] = [
+        explain_alarm(detection, alarm, activation, *_belonging(alarm, detection, matching), inputs, margins)
+        for alarm in {*detection.verdict.alarms, *detecting}
+    ]
+    found += [
+        explain_miss(detection, item, activation, inputs, margins) for item in matching.matches if item.alarm is None
+    ]
+    return tuple(sorted(found, key=_order))
+
+
+def explain_alarm(
+    detection: Detection,
+    alarm: Alarm,
+    activation: Activation,
+    contact: Contact | None = None,
+    role: Role | None = None,
+    inputs: Sequence[str] = (),
+    margins: Sequence[JointMargin] = (),
+) -> AlarmExplanation:
+    """What led to an alarm of a detection; with the contact that it belongs to, if any, times are told from its onset.
+
+    `activation` is the one that raised it. `margins` are the detection's `joint_margins`, where they are at hand.
+    Raises UsageError for an alarm of another detection.
+    """
+    margin = (margins or joint_margins(detection))[alarm.joint]
+    at = int(np.searchsorted(margin.time, alarm.time))
+    runs = margin.runs()
+    containing = runs[(runs[:, 0] <= at) & (runs[:, 1] >= at), 0]
+    if not len(containing):
+        raise UsageError(f"{detection.operation.name}: no alarm at {alarm.time:g} s", "give one of this detection")
+    first = int(containing[0])
+    debounce = activation.samples(detection.statistic.period)
+    times = [alarm.time + step for step in _TO_ALARM]
+    if contact:
+        times.append(contact.start)
+        moved = _moved_at_contact(detection, margin.name, contact, alarm.time)
+    else:
+        recording = detection.operation.recording
+        moved = which_moved_first(recording, margin.name, alarm.time, lead=_LEAD_OF_ALARM, after=0.0)
+    return AlarmExplanation(
+        operation=detection.operation.name,
+        detector=detection.detector,
+        unit=detection.statistic.unit,
+        joint=margin.name,
+        role=role or ("detection" if contact else "alarm"),
+        alarm=alarm,
+        contact=contact,
+        left=float(margin.time[first]),
+        debounce=debounce,
+        skipped=at - first + 1 - debounce,
+        moments=margin.moments(times),
+        moved=moved,
+        inputs=tuple(inputs),
+    )
+
+
+def explain_miss(
+    detection: Detection,
+    match: Match,
+    activation: Activation,
+    inputs: Sequence[str] = (),
+    margins: Sequence[JointMargin] = (),
+) -> MissExplanation:
+    """How near a contact without an alarm came to one, while an alarm would have counted (`match.watched`).
+
+    `activation` is the one that was used. `margins` are the detection's `joint_margins`, where they are at hand.
+    """
+    contact, statistic = match.contact, detection.statistic
+    closes = contact.start + match.watched
+    debounce = activation.samples(statistic.period)
+    tried = [(item, item.approach(contact.start, closes, debounce)) for item in margins or joint_margins(detection)]
+    near = sorted(((item, found) for item, found in tried if found), key=lambda pair: _distance(pair[1]))
+    joint = near[0][0].name if near else statistic.joints[detection.leading]
+    moments: tuple[Moment, ...] = ()
+    if near:
+        margin, approach = near[0]
+        times = [contact.start + step for step in _FROM_ONSET if step <= match.watched]
+        moments = margin.moments([*times, approach.nearest.time])
+    return MissExplanation(
+        operation=detection.operation.name,
+        detector=detection.detector,
+        unit=statistic.unit,
+        joint=joint,
+        contact=contact,
+        outcome="not_assessable" if match.outcome == "not_assessable" else "missed",
+        reason=match.reason,
+        watched=match.watched,
+        debounce=debounce,
+        not_judged=statistic.shares(contact.start, closes),
+        approaches=tuple(approach for _, approach in near),
+        moments=moments,
+        moved=_moved_at_contact(detection, joint, contact, contact.start),
+        inputs=tuple(inputs),
+    )
+
+
+def _moved_at_contact(detection: Detection, joint: str, contact: Contact, until: float) -> tuple[Movement, ...]:
+    return which_moved_first(
+        detection.operation.recording,
+        joint,
+        contact.start,
+        lead=_LEAD_OF_ONSET + contact.uncertainty,
+        after=max(_AFTERMATH, until - contact.start),
+    )
+
+
+def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[Contact | None, Role]:
+    """The contact that an alarm belongs to, and what the alarm is."""
+    for item in matching.matches:
+        if item.alarm == alarm:
+            return item.contact, "detection"
+    if alarm in matching.false_alarms:
+        recording = detection.operation.recording
+        known = bool(matching.matches) or any(channel in recording for channel in GROUND_TRUTH)
+        return None, "false alarm" if known else "alarm"
+    earlier = [item.contact for item in matching.matches if item.contact.start - item.contact.uncertainty <= alarm.time]
+    return max(earlier, key=lambda contact: contact.start), "further alarm"
+
+
+def _distance(approach: Approach) -> tuple[float, int]:
+    """The order of approaches: a long held share first, where there is none the longest run outside."""
+    return (-np.nan_to_num(approach.held, nan=-np.inf), -approach.longest)
+
+
+def _order(item: Explanation) -> tuple[float, str]:
+    return (item.alarm.time if isinstance(item, AlarmExplanation) else item.contact.start, item.joint)

@@ -1,0 +1,1 @@
+"""The force of a contact over time, and its limits."""

@@ -1,0 +1,184 @@
+"""The force of a contact over the time since it began: what a force limit is held against.
+
+Conventions: time counts from the contact's onset [s]. The force is positive in the direction in which the contact
+presses, whatever the load cell's sign. A sample is missing where two samples are further apart than the cell's rhythm
+and than 5 ms; up to that the force is taken to go on steadily.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.truth.onset import baseline
+from cdtool.motion import leading_joint
+from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+
+# A force meter for doors samples at 200 Hz at least (EN 12445): what lies closer together hides nothing from it.
+_CLOSE_ENOUGH = 5e-3
+# Samples further apart than this many of the cell's periods have one missing between them.
+_PERIODS = 1.5
+# This many equal readings in a row at the largest one: the cell stands at its stop.
+_STUCK = 5
+# The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
+# recording's top speed the axis stands still.
+_BEFORE = 0.1
+_STANDSTILL = 0.05
+
+
+@dataclass(frozen=True)
+class ForceCourse:
+    """Contact force (n,) [N] at the times (n,) [s after the onset] of the samples that are present.
+
+    `clipped` (n,): the load cell stood at its stop, the true force was larger. `end`: how long after the onset the
+    record goes on [s].
+    """
+
+    time: FloatArray
+    force: FloatArray
+    clipped: BoolArray
+    end: float
+
+    @property
+    def saturated(self) -> bool:
+        """The load cell stood at its stop somewhere."""
+        return bool(self.clipped.any())
+
+    @property
+    def peak(self) -> float:
+        """Largest force [N]."""
+        return float(self.force.max())
+
+    @property
+    def longest_step(self) -> float:
+        """How far apart samples may be without one missing between them [s]."""
+        return _longest_step(self.time)
+
+    @property
+    def missing_share(self) -> float:
+        """Share of the time from the onset to the record's end in which samples are missing."""
+        begins, ends = self.holes()
+        return float(np.sum(ends - begins)) / self.end if self.end > 0.0 else 0.0
+
+    def holes(self) -> tuple[FloatArray, FloatArray]:
+        """Where samples are missing: beginnings and ends [s after the onset]."""
+        marks = np.concatenate(([0.0], self.time, [max(self.end, float(self.time[-1]))]))
+        wide = np.flatnonzero(np.diff(marks) > self.longest_step)
+        return marks[wide], marks[wide + 1]
+
+
+def force_course(
+    recording: Recording, contact: Contact, mass_before_cell: float = 0.0, until: float = float("inf")
+) -> ForceCourse:
+    """F_contact = F_cell + m a: load cell less its reading at rest, and the inertia before it (thesis figure 4.11).
+
+    `recording`: the one that the contact was found in, whole, since the reading at rest is that of its beginning; on
+    the load side. `until`: when the next contact begins [s on its clock]; the course ends there. `mass_before_cell`
+    [kg]: what moves with the machine between load cell and contact; a [m/s2] is its acceleration in the direction of
+    the contact force on it, against the motion of the leading joint: F = F_cell - m sign(v) a_measured. The
+    acceleration is interpolated linearly to the cell's clock. A bias of the accelerometer comes out as m times it.
+
+    A sample is clipped where 5 readings in a row, or 5 times as many as the cell usually repeats, equal the largest: a
+    coarse cell under a steady push looks the same. Raises UsageError for a negative mass; RecordingError without a
+    force sample after the onset, or, with a mass, without acceleration in m/s2, without speed, or at standstill.
+    """
+    if mass_before_cell < 0.0 or not np.isfinite(mass_before_cell):
+        raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "0 or more")
+    time, reading = _present(recording["force"])
+    if not np.any((time >= contact.start) & (time < until)):
+        raise RecordingError(
+            f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
+            "take the force limits of contacts that the load cell saw",
+        )
+    over = reading - baseline(reading)[0]
+    part = (time >= contact.start) & (time < until)
+    time, over = time[part], over[part]
+    pressing = (time <= contact.end) | (contact.end <= contact.start)
+    largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
+    force = over if over[largest] >= 0.0 else -over
+    clipped = _clipped(force)
+    if mass_before_cell > 0.0:
+        force = force + mass_before_cell * _acceleration_with_contact(recording, contact.start, time)
+    known = np.isfinite(force)
+    if not known.any():
+        raise RecordingError(f"{recording.name}: no acceleration after the onset", "set mass_before_cell to 0")
+    end = min(float(recording["force"].time[-1]), until) - contact.start
+    return ForceCourse(time[known] - contact.start, force[known], clipped[known], end)
+
+
+def force_at(course: ForceCourse, time: float) -> float:
+    """Force [N] of the last sample at or before a time [s after the onset]; NaN before the first and in a hole."""
+    at = int(np.searchsorted(course.time, time, side="right")) - 1
+    if at < 0 or time - course.time[at] > course.longest_step:
+        return float("nan")
+    return float(course.force[at])
+
+
+def _present(series: Series) -> tuple[FloatArray, FloatArray]:
+    present = np.isfinite(series.values[:, 0])
+    return series.time[present], series.values[present, 0]
+
+
+def _longest_step(time: FloatArray) -> float:
+    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    return max(_PERIODS * period, _CLOSE_ENOUGH)
+
+
+def _clipped(force: FloatArray) -> BoolArray:
+    """Samples at the largest reading, where the cell is stuck there longer than it usually repeats a reading."""
+    edges = np.flatnonzero(np.diff(force)) + 1
+    lengths = np.diff(np.concatenate(([0], edges, [len(force)])))
+    first = np.concatenate(([0], edges))
+    highest = force[first] == force.max()
+    usual = 1.0 if highest.all() else float(np.median(lengths[~highest]))
+    if lengths[highest].max() < _STUCK * usual:
+        return np.zeros(len(force), dtype=bool)
+    return np.repeat(highest, lengths)
+
+
+def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatArray) -> FloatArray:
+    """Acceleration (m,) [m/s2] in the direction of the contact force on the machine, at the times of `clock`."""
+    for channel in ("acceleration", "speed"):
+        if channel not in recording:
+            raise RecordingError(
+                f"{recording.name}: mass_before_cell needs the channel '{channel}'",
+                "map it in [channels], or set mass_before_cell to 0",
+            )
+    measured = recording["acceleration"]
+    if measured.unit != "m/s2":
+        raise RecordingError(
+            f"{recording.name}: mass_before_cell needs the acceleration in m/s2, not in {measured.unit}",
+            "set mass_before_cell to 0",
+        )
+    joint = leading_joint(recording["speed"])
+    return -_direction(recording, joint, onset) * _interpolated(measured.time, measured.values[:, joint], clock)
+
+
+def _direction(recording: Recording, joint: int, onset: float) -> float:
+    """+1 or -1: where the joint was going when the contact began."""
+    series = recording["speed"]
+    speed = series.values[:, joint]
+    before = speed[(series.time >= onset - _BEFORE) & (series.time <= onset)]
+    before = before[np.isfinite(before)]
+    mean = float(np.mean(before)) if len(before) else 0.0
+    if abs(mean) <= _STANDSTILL * float(np.nanmax(np.abs(speed), initial=0.0)):
+        raise RecordingError(
+            f"{recording.name}: the axis stands still at {onset:.3f} s: where the contact pushes it is not known",
+            "set mass_before_cell to 0",
+        )
+    return 1.0 if mean > 0.0 else -1.0
+
+
+def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
+    """Linear interpolation between samples that are present; NaN outside and where samples are missing."""
+    present = np.isfinite(values)
+    time, values = time[present], values[present]
+    if len(time) < 2:
+        return np.full(len(clock), np.nan)
+    after = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
+    wide = time[after] - time[after - 1] > _longest_step(time)
+    missing = wide & (clock != time[after]) & (clock != time[after - 1])
+    found: FloatArray = np.where(missing, np.nan, np.interp(clock, time, values, left=np.nan, right=np.nan))
+    return found

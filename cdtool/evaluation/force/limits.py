@@ -1,0 +1,110 @@
+"""Force limits: how much force a contact may have, as a staircase over the time since it began. Data, not code.
+
+Conventions: time counts from the contact's onset [s]; a step holds from its `from_s` to the next step's, the last one
+to the end of the record. The shipped file is force_limits.toml beside this module; a user's file replaces it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.tables import Table, read_toml
+
+_SHIPPED = Path(__file__).with_name("limits.toml")
+
+
+@dataclass(frozen=True)
+class ForceStep:
+    """From `from_s` [s] after the onset on, the force may be at most `at_most_n` [N]."""
+
+    from_s: float
+    at_most_n: float
+    name: str
+
+
+@dataclass(frozen=True)
+class ForceProfile:
+    """A named staircase of limits with its source; its steps begin at 0 s and their times increase.
+
+    `checked`: someone has held the values against the standard's text. `average_of`: so many tests at one point are
+    averaged; 1: each test is judged by itself.
+    """
+
+    name: str
+    title: str
+    source: str
+    checked: bool
+    steps: tuple[ForceStep, ...]
+    average_of: int = 1
+    note: str = ""
+
+    @property
+    def warning(self) -> str:
+        """What a report has to say beside figures of this profile; empty where its values were checked."""
+        return "" if self.checked else "values to be checked against the standard"
+
+    def ends(self, step: int) -> float:
+        """Until when a step holds [s after the onset]; infinite for the last one."""
+        return self.steps[step + 1].from_s if step + 1 < len(self.steps) else float("inf")
+
+
+def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
+    """The profiles of a file by name, None: the shipped ones; raises ConfigurationError with file, key and reason."""
+    file = _SHIPPED if path is None else path
+    where = str(file) if path else "the shipped force_limits.toml"
+    root = Table(read_toml(file), where)
+    profiles = {name: _profile(name, root.table(name)) for name in root.values}
+    if not profiles:
+        raise ConfigurationError(f"{where}: holds no profile", "a table a profile, see docs/force-limits.md")
+    return profiles
+
+
+def profile_of(profiles: Mapping[str, ForceProfile], name: str) -> ForceProfile:
+    """The profile of that name; raises UsageError with the nearest known names."""
+    if name not in profiles:
+        raise UsageError(f"unknown force profile '{name}'", nearest(name, profiles))
+    return profiles[name]
+
+
+def _profile(name: str, table: Table) -> ForceProfile:
+    profile = ForceProfile(
+        name=name,
+        title=_words(table, "title"),
+        source=_words(table, "source"),
+        checked=table.flag("checked", False),
+        steps=_steps(table),
+        average_of=table.whole("average_of", 1, minimum=1),
+        note=table.text("note", ""),
+    )
+    table.finish()
+    return profile
+
+
+def _steps(table: Table) -> tuple[ForceStep, ...]:
+    listed = table.raw("steps")
+    if not isinstance(listed, list) or not listed or not all(isinstance(item, dict) for item in listed):
+        problem = "is missing" if listed is None else f"is {listed!r}"
+        raise table.fault("steps", problem, "a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]")
+    steps: list[ForceStep] = []
+    for i, item in enumerate(listed):
+        row = Table(item, table.where, f"{table.prefix}steps[{i}].")
+        step = ForceStep(row.number("from_s"), row.number("at_most_n", above=0.0), _words(row, "name"))
+        row.finish()
+        if not steps and step.from_s != 0.0:
+            raise row.fault("from_s", f"is {step.from_s:g}", "the first step begins with the contact, at 0")
+        if steps and step.from_s <= steps[-1].from_s:
+            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times have to increase")
+        if any(step.name == earlier.name for earlier in steps):
+            raise row.fault("name", f"'{step.name}' names two steps", "a name of its own for each step")
+        steps.append(step)
+    return tuple(steps)
+
+
+def _words(table: Table, name: str) -> str:
+    text = table.text(name)
+    if not text.strip():
+        raise table.fault(name, "is empty", "a text is needed")
+    return text

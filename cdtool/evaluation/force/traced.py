@@ -1,0 +1,110 @@
+"""Force over time of the contacts whose curves were kept, with their verdicts: what a figure of forces needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.force.limits import ForceProfile, ForceStep
+from cdtool.evaluation.force.verdict import ForceVerdict, Outcome, StepVerdict
+from cdtool.evaluation.results import ForceResult, Results
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.evaluation.truth.onset import baseline
+from cdtool.recording import FloatArray
+
+# Onsets of a trace and of its row are the same number; a file may have rounded one.
+_SAME_ONSET = 1e-6
+_OUTCOMES: tuple[Outcome, ...] = ("pass", "fail", "not assessable")
+
+
+@dataclass(frozen=True)
+class TracedForce:
+    """One contact: load-cell force (n,) [N] at times (n,) [s after the onset], decimated, and its verdict.
+
+    The force is the cell's reading less that at rest, positive where it presses; it holds no correction for a mass
+    before the cell, which the verdict does. `alarms`: seconds from the onset to each detector's alarm.
+    """
+
+    recording: str
+    group: str
+    contact: int
+    time: FloatArray
+    force: FloatArray
+    verdict: ForceVerdict
+    alarms: Mapping[str, float]
+
+
+def force_profiles(results: Results) -> dict[str, ForceProfile]:
+    """The profiles that the results were held against, by name."""
+    found = {}
+    for values in results.provenance.get("force_profiles", {}).values():
+        steps = tuple(ForceStep(**step) for step in values["steps"])
+        found[values["name"]] = ForceProfile(**{**values, "steps": steps})
+    return found
+
+
+def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForce, ...]:
+    """Every contact with a force verdict whose load-cell curve was kept, in the order of the traces."""
+    verdicts = {(row.group, row.recording, row.contact): row for row in results.forces}
+    onsets: dict[tuple[str, str], dict[int, float]] = {}
+    alarms: dict[tuple[str, str, int], dict[str, float]] = {}
+    for contact in results.contacts:
+        key = (contact.group, contact.recording)
+        onsets.setdefault(key, {})[contact.contact] = contact.onset_s
+        if contact.latency_ms is not None:
+            alarms.setdefault((*key, contact.contact), {})[contact.detector] = 1e-3 * contact.latency_ms
+    found = []
+    for trace in traces:
+        for log in (trace.recording, trace.recording.rpartition("#")[0]):
+            for number, onset, ends in _contacts(trace, onsets.get((trace.group, log), {})):
+                row = verdicts.get((trace.group, log, number))
+                curve = _curve(trace, onset, ends)
+                if row is not None and curve is not None:
+                    verdict = _verdict(row, *curve)
+                    late = alarms.get((trace.group, log, number), {})
+                    found.append(TracedForce(log, trace.group, number, *curve, verdict, late))
+    return tuple(found)
+
+
+def _contacts(trace: Trace, onsets: Mapping[int, float]) -> Iterator[tuple[int, float, float]]:
+    """Number, onset and end [s] of the trace's contacts; one ends where the next begins."""
+    ends = [*(contact.start for contact in trace.contacts[1:]), math.inf]
+    for contact, until in zip(trace.contacts, ends, strict=False):
+        for number, onset in onsets.items():
+            if abs(onset - contact.start) <= _SAME_ONSET:
+                yield number, contact.start, until
+
+
+def _curve(trace: Trace, onset: float, until: float) -> tuple[FloatArray, FloatArray] | None:
+    present = np.isfinite(trace.force)
+    time, reading = trace.force_time[present], trace.force[present]
+    part = (time >= onset) & (time < until)
+    if not part.any():
+        return None
+    force = (reading - baseline(reading)[0])[part]
+    if force[np.argmax(np.abs(force))] < 0.0:
+        force = -force
+    return time[part] - onset, force
+
+
+def _verdict(row: ForceResult, time: FloatArray, force: FloatArray) -> ForceVerdict:
+    """The row's verdict; where its peaks lie is read from the curve."""
+    ends = [*(step.from_s for step in row.steps[1:]), math.inf]
+    steps = []
+    for step, until in zip(row.steps, ends, strict=True):
+        inside = np.flatnonzero((time >= step.from_s) & (time < until))
+        known = step.peak_n is not None and len(inside) > 0
+        steps.append(
+            StepVerdict(
+                step=ForceStep(step.from_s, step.at_most_n, step.name),
+                outcome=next((outcome for outcome in _OUTCOMES if outcome == step.verdict), "not assessable"),
+                peak=step.peak_n if step.peak_n is not None and known else math.nan,
+                peak_at=float(time[inside[np.argmax(force[inside])]]) if known else math.nan,
+                time_budget=math.inf if step.time_budget_ms is None else 1e-3 * step.time_budget_ms,
+                reason=step.reason or "",
+            )
+        )
+    return ForceVerdict(row.profile, tuple(steps), float(time[-1]))

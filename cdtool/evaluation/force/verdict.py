@@ -1,0 +1,212 @@
+"""Force against its limits: pass, fail or not assessable, for a test and for the mean of several tests at one point.
+
+Conventions: a step that is exceeded fails, whatever else is missing. It passes only where every sample of it was seen
+and none was at the load cell's stop; otherwise it is not assessable, with the reason. A verdict is evidence about
+recordings, not a certificate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.limits import ForceProfile, ForceStep
+
+Outcome = Literal["pass", "fail", "not assessable"]
+
+
+@dataclass(frozen=True)
+class StepVerdict:
+    """One step of a profile and one test.
+
+    `peak` [N] at `peak_at` [s after the onset]: the largest force while the step holds; both NaN without a sample.
+    `time_budget` [s after the onset]: when the force first exceeded the limit while it held, between samples by linear
+    interpolation; infinite if never. An alarm that was to keep the limit had to come, and to act, before that.
+    """
+
+    step: ForceStep
+    outcome: Outcome
+    peak: float
+    peak_at: float
+    time_budget: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class ForceVerdict:
+    """One test against a profile; `end`: how long after the onset the record goes on [s]."""
+
+    profile: str
+    steps: tuple[StepVerdict, ...]
+    end: float
+
+    @property
+    def outcome(self) -> Outcome:
+        """Fail where a step fails, else not assessable where one is not, else pass."""
+        return _worst([item.outcome for item in self.steps])
+
+    @property
+    def reason(self) -> str:
+        """Why it is no pass: of the first step with that outcome."""
+        return _first_reason(self.steps, self.outcome)
+
+    @property
+    def time_budget(self) -> float:
+        """When the first limit was exceeded [s after the onset]; infinite if none was."""
+        return min(item.time_budget for item in self.steps)
+
+    @property
+    def utilisation(self) -> float:
+        """Largest share of a limit that the force reached; above 1 the test fails."""
+        return max((item.peak / item.step.at_most_n for item in self.steps if math.isfinite(item.peak)), default=0.0)
+
+
+@dataclass(frozen=True)
+class PointStep:
+    """One step of a profile over the tests at a point.
+
+    `force` [N] is the mean of the tests' peaks, NaN where a test has none; where the profile averages no tests, their
+    highest peak. `above`: how many tests exceed the limit by themselves.
+    """
+
+    step: ForceStep
+    outcome: Outcome
+    force: float
+    above: int
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class PointVerdict:
+    """The tests at one point against a profile; `note` says how many were averaged."""
+
+    profile: str
+    tests: int
+    steps: tuple[PointStep, ...]
+    note: str
+
+    @property
+    def outcome(self) -> Outcome:
+        """Fail where a step fails, else not assessable where one is not, else pass."""
+        return _worst([item.outcome for item in self.steps])
+
+    @property
+    def reason(self) -> str:
+        """Why it is no pass: of the first step with that outcome."""
+        return _first_reason(self.steps, self.outcome)
+
+
+def judge(course: ForceCourse, profile: ForceProfile) -> ForceVerdict:
+    """Hold a course against every step of a profile.
+
+    A step is not assessable where the record ends before or inside it, where samples in it are missing, or where the
+    load cell was at its stop below the limit. The last step is judged on as much as the record holds of it.
+    """
+    steps = tuple(_judge_step(course, step, profile.ends(i)) for i, step in enumerate(profile.steps))
+    return ForceVerdict(profile.name, steps, course.end)
+
+
+def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVerdict:
+    """Hold the mean of the tests' peaks against every step; where the profile averages none, the highest peak.
+
+    Not assessable: a step with fewer tests than the profile averages, or one that does not fail and that a test could
+    not assess. With more tests all are averaged. Raises UsageError for verdicts of another profile.
+    """
+    for verdict in verdicts:
+        if verdict.profile != profile.name:
+            raise UsageError(f"a verdict on '{verdict.profile}' is no test of '{profile.name}'", "judge all by one")
+    steps = tuple(
+        _judge_point(step, [verdict.steps[i] for verdict in verdicts], profile.average_of)
+        for i, step in enumerate(profile.steps)
+    )
+    return PointVerdict(profile.name, len(verdicts), steps, _counted(len(verdicts), profile.average_of))
+
+
+def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdict:
+    inside = np.flatnonzero((course.time >= step.from_s) & (course.time < ends))
+    if not len(inside):
+        nan = float("nan")
+        why = _unseen(course, step, ends) or "no load-cell sample while the limit holds"
+        return StepVerdict(step, "not assessable", nan, nan, float("inf"), why)
+    highest = inside[int(np.argmax(course.force[inside]))]
+    peak, peak_at = float(course.force[highest]), float(course.time[highest])
+    above = inside[course.force[inside] > step.at_most_n]
+    if len(above):
+        budget = _crossing(course, int(above[0]), step)
+        reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after the onset"
+        return StepVerdict(step, "fail", peak, peak_at, budget, reason)
+    reason = _unseen(course, step, ends)
+    if not reason and course.clipped[inside].any():
+        reason = f"the load cell was at its stop, {peak:.4g} N, below the limit of {step.at_most_n:g} N"
+    return StepVerdict(step, "not assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
+
+
+def _unseen(course: ForceCourse, step: ForceStep, ends: float) -> str:
+    """What of a step the record does not show; empty where it shows all."""
+    if course.end < step.from_s:
+        return f"the record ends {course.end:.3g} s after the onset, before {step.from_s:g} s"
+    if math.isfinite(ends) and ends - course.end > course.longest_step:
+        return f"the record ends {course.end:.3g} s after the onset, the limit holds until {ends:g} s"
+    begins, stops = course.holes()
+    missing = float(np.sum(np.maximum(np.minimum(stops, ends) - np.maximum(begins, step.from_s), 0.0)))
+    return f"load-cell samples are missing for {1e3 * missing:.0f} ms" if missing > 0.0 else ""
+
+
+def _crossing(course: ForceCourse, first: int, step: ForceStep) -> float:
+    """When the straight line to the first sample above the limit crosses it [s], not before the limit holds.
+
+    Where samples are missing before that sample, their beginning counts: the force may have risen at once.
+    """
+    time, force = float(course.time[first]), float(course.force[first])
+    if first == 0:
+        return time
+    before, below = float(course.time[first - 1]), float(course.force[first - 1])
+    if below > step.at_most_n or time - before > course.longest_step:
+        return max(before, step.from_s)
+    crossed = before + (time - before) * (step.at_most_n - below) / (force - below)
+    return max(crossed, step.from_s)
+
+
+def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int) -> PointStep:
+    peaks = [test.peak for test in tests]
+    if average_of == 1:
+        force = max((peak for peak in peaks if math.isfinite(peak)), default=float("nan"))
+    else:
+        force = sum(peaks) / len(peaks) if peaks else float("nan")
+    above = sum(test.outcome == "fail" for test in tests)
+    if len(tests) < average_of:
+        reason = f"{len(tests)} of the {average_of} tests that are averaged" if tests else "no test"
+        return PointStep(step, "not assessable", force, above, reason)
+    if force > step.at_most_n:
+        word = "mean" if average_of > 1 else "highest"
+        reason = f"{word} of {len(tests)} peaks {force:.4g} N where {step.at_most_n:g} N are allowed"
+        return PointStep(step, "fail", force, above, reason)
+    blind = next((test for test in tests if test.outcome == "not assessable"), None)
+    if blind:
+        return PointStep(step, "not assessable", force, above, blind.reason)
+    return PointStep(step, "pass", force, above)
+
+
+def _counted(tests: int, average_of: int) -> str:
+    counted = f"{tests} {'test' if tests == 1 else 'tests'}"
+    if average_of == 1:
+        return f"highest of {counted}"
+    asked = "" if tests == average_of else f" where the profile averages {average_of}"
+    return f"mean of {counted}{asked}"
+
+
+def _worst(outcomes: Sequence[Outcome]) -> Outcome:
+    order: tuple[Outcome, ...] = ("fail", "not assessable", "pass")
+    return min(outcomes, key=order.index)
+
+
+def _first_reason(steps: Sequence[StepVerdict] | Sequence[PointStep], outcome: Outcome) -> str:
+    if outcome == "pass":
+        return ""
+    return next(f"{item.step.name}: {item.reason}" for item in steps if item.outcome == outcome)

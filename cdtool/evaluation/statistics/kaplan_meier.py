@@ -1,0 +1,127 @@
+"""Latency where contacts were missed: the Kaplan-Meier curve of the share still undetected, and its quantiles.
+
+Conventions: a missed contact is right-censored at the end of the time in which it was watched; at equal times a
+detection comes before a miss. Latencies are not below 0. Contacts are taken as independent of each other.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.statistics.interval import Interval, check_level
+
+if TYPE_CHECKING:
+    from cdtool.recording import BoolArray, FloatArray
+
+# A level of the curve within this of the one that is sought is hit exactly: the tolerance of R's survival package.
+_EXACT = math.sqrt(np.finfo(np.float64).eps)
+
+
+class Survival(NamedTuple):
+    """A step curve: from `times` (m,) on, up to the next one, this `share` (m,) is undetected, with its band.
+
+    The first time is 0 with share 1.
+    """
+
+    times: FloatArray
+    share: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def survival(latency: npt.ArrayLike, censored: npt.ArrayLike, level: float = 0.95) -> Survival:
+    """Share still undetected over time: S(t) = product over t_i <= t of 1 - d_i / n_i (Kaplan and Meier 1958).
+
+    `latency` (n,) in any unit of time, `censored` (n,) True where the contact was missed. d_i contacts are detected at
+    t_i, n_i were watched and undetected until then. The band holds at each time by itself, not for the whole curve:
+    S ** exp(-+ z sqrt(V) / ln S), V = sum of d_i / (n_i (n_i - d_i)) (log-log of Greenwood's variance). That does not
+    exist at S = 1, where the exact bound of none of n_i stands, nor at S = 0, where the upper limit stays and the lower
+    is 0. Empty input gives the first time alone, its band from 0 to 1. Raises UsageError for arrays that do not fit.
+    """
+    check_level(level)
+    time, missed = _checked(latency, censored)
+    if not len(time):
+        return Survival(np.zeros(1), np.ones(1), np.zeros(1), np.ones(1))
+    times, share, low, high = _curve(time, missed, level)
+    times = np.concatenate(([0.0], times))
+    share, low, high = (np.concatenate(([1.0], column)) for column in (share, low, high))
+    watched = len(time) - np.searchsorted(np.sort(time), times)
+    low = np.where(share == 1.0, (0.5 - 0.5 * level) ** (1.0 / watched), low)
+    high = np.where(share == 1.0, 1.0, high)
+    return Survival(times, share, low, np.where(np.isnan(high), np.fmin.accumulate(high), high))
+
+
+def latency_quantile(latency: npt.ArrayLike, censored: npt.ArrayLike, share: float, level: float = 0.95) -> Interval:
+    """Latency within which `share` of the contacts is detected, misses counted: the time at which S(t) = 1 - share.
+
+    `latency` (n,) in any unit of time; `censored` (n,) True where the contact was missed, `latency` is then the time up
+    to which it was watched. Definition of R's survival::quantile.survfit: the first time at which S is at or below
+    1 - share; where S equals 1 - share on a whole step, the middle of that step (from its beginning to the next
+    detection, or to the last time watched). So the median of an even number of detections is the usual one.
+    Interval of Brookmeyer and Crowley (1982): the times, by the same definition, at which the lower and the upper limit
+    of the log-log band (see `survival`) pass 1 - share. Infinite: not reached in the time watched, too many were missed
+    or there are too few contacts (all detected, the median has an upper limit from 7 contacts on, the P95 from 98).
+    Where all were detected at one time, or none was, the curve has no band: exact binomial bounds take its place.
+    Empty input: NaN. Raises UsageError for arrays that do not fit or a share outside 0 to 1.
+    """
+    check_level(level)
+    if not 0.0 < share < 1.0:
+        raise UsageError(f"quantile asked for is {share:g}", "a share between 0 and 1, such as 0.95 for the P95")
+    time, missed = _checked(latency, censored)
+    if not len(time):
+        return Interval(math.nan, math.nan, math.nan, level)
+    times, curve, low, high = _curve(time, missed, level)
+    value = _reached(times, curve, 1.0 - share)
+    if np.all((curve == 0.0) | (curve == 1.0)):
+        return _without_band(time, missed, value, share, level)
+    return Interval(value, _reached(times, low, 1.0 - share), _reached(times, high, 1.0 - share), level)
+
+
+def _checked(latency: npt.ArrayLike, censored: npt.ArrayLike) -> tuple[FloatArray, BoolArray]:
+    time = np.asarray(latency, dtype=np.float64)
+    missed = np.asarray(censored, dtype=np.bool_)
+    if time.ndim != 1 or time.shape != missed.shape:
+        raise UsageError(f"latency {time.shape} and censored {missed.shape} do not fit", "one each for every contact")
+    if not np.all(np.isfinite(time) & (time >= 0.0)):
+        raise UsageError("a latency is missing or below 0", "for a missed contact, give the time that it was watched")
+    return time, missed
+
+
+def _curve(time: FloatArray, missed: BoolArray, level: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Times, S and its log-log band; the lower limit is 0 at S = 0, the upper one NaN; both are NaN at S = 1."""
+    from scipy import stats
+
+    sample: stats.CensoredData[np.float64] = stats.CensoredData(time[~missed], right=time[missed])
+    curve = stats.ecdf(sample).sf
+    with warnings.catch_warnings():
+        # scipy warns of the NaN at S = 0 and S = 1, which the callers deal with.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        band: Any = curve.confidence_interval(level, method="log-log")
+    low = np.where(curve.probabilities == 0.0, 0.0, band.low.probabilities)
+    return curve.quantiles, curve.probabilities, low, band.high.probabilities
+
+
+def _reached(times: FloatArray, level: FloatArray, target: float) -> float:
+    """When a falling step curve is at `target`; infinite if never."""
+    at = np.flatnonzero(level <= target + _EXACT)
+    if not len(at):
+        return math.inf
+    below = np.flatnonzero(level < target - _EXACT)
+    end = below[0] if len(below) else len(times) - 1
+    return float(0.5 * (times[at[0]] + times[end]))
+
+
+def _without_band(time: FloatArray, missed: BoolArray, value: float, share: float, level: float) -> Interval:
+    """All at one time, or none detected: P(n of n on one side of the quantile) > (1 - level) / 2 for the bounds."""
+    detected = time[~missed]
+    watched = np.count_nonzero(time >= detected[0]) if len(detected) else len(time)
+    certain = (0.5 - 0.5 * level) ** (1.0 / watched)
+    low = value if certain > 1.0 - share else 0.0
+    high = value if 1.0 - certain < 1.0 - share else math.inf
+    return Interval(value, low, high, level)

@@ -1,0 +1,195 @@
+"""Statistics of the outcomes of one detector in one group, each figure with its interval; undefined = NaN, never zero.
+
+Mean and standard deviation describe the detected contacts only and are to be read beside n, missed, not assessable and
+false alarms: a detector that misses its slow cases looks fast. Median and P95 take missed contacts as censored.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.results import ContactResult, ExposureResult, ForceResult, Results
+from cdtool.evaluation.statistics.bootstrap import bca
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
+from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Latency [ms] over the contacts, shares, rates, and the counts to read them with; intervals at 95 %.
+
+    `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. `missed_share`
+    is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
+    `peak_force` [N] are medians of the detected contacts.
+    """
+
+    detector: str
+    group: str
+    contacts: int
+    detected: int
+    missed: int
+    not_assessable: int
+    mean: Interval
+    std: Interval
+    median: Interval
+    p95: Interval
+    max_ms: float
+    missed_share: Interval
+    missed_at_most: float
+    false_alarms: int
+    operations: int
+    hours: float
+    false_alarms_per_hour: Interval
+    false_alarms_per_operation: Interval
+    at_most_per_hour: float
+    at_most_per_operation: float
+    force_at_alarm: float
+    force_at_alarm_max: float
+    peak_force: float
+    force_failed: int
+
+    @property
+    def mean_ms(self) -> float:
+        """Mean latency of the detected contacts [ms]."""
+        return self.mean.value
+
+    @property
+    def std_ms(self) -> float:
+        """Standard deviation of the latency of the detected contacts [ms]."""
+        return self.std.value
+
+    @property
+    def median_ms(self) -> float:
+        """Median latency [ms], missed contacts taken as censored."""
+        return self.median.value
+
+    def why_undefined(self, figure: str) -> str:
+        """Why a figure of this summary is NaN."""
+        if figure in COUNTED_ALWAYS:
+            return "nothing was watched"
+        if self.contacts == self.not_assessable:
+            return f"none of {self.contacts} contacts could be assessed"
+        if "force" in figure:
+            return "no load-cell force at an alarm"
+        return f"{self.detected} of {self.contacts} contacts detected: too few for it"
+
+
+# What [limits] and reports may ask of a summary.
+FIGURES: Mapping[str, Callable[[Summary], float]] = {
+    "mean_ms": lambda item: item.mean.value,
+    "mean_ms_upper": lambda item: item.mean.high,
+    "std_ms": lambda item: item.std.value,
+    "median_ms": lambda item: item.median.value,
+    "median_ms_upper": lambda item: item.median.high,
+    "p95_ms": lambda item: item.p95.value,
+    "p95_ms_upper": lambda item: item.p95.high,
+    "max_ms": lambda item: item.max_ms,
+    "contacts": lambda item: item.contacts,
+    "detected": lambda item: item.detected,
+    "missed": lambda item: item.missed,
+    "missed_share": lambda item: item.missed_share.value,
+    "missed_share_at_most": lambda item: item.missed_at_most,
+    "not_assessable": lambda item: item.not_assessable,
+    "false_alarms": lambda item: item.false_alarms,
+    "false_alarms_per_hour": lambda item: item.false_alarms_per_hour.value,
+    "false_alarms_per_hour_at_most": lambda item: item.at_most_per_hour,
+    "false_alarms_per_operation": lambda item: item.false_alarms_per_operation.value,
+    "false_alarms_per_operation_at_most": lambda item: item.at_most_per_operation,
+    "operations": lambda item: item.operations,
+    "hours": lambda item: item.hours,
+    "force_at_alarm_n": lambda item: item.force_at_alarm,
+    "force_at_alarm_max_n": lambda item: item.force_at_alarm_max,
+    "peak_force_n": lambda item: item.peak_force,
+    "force_failed": lambda item: item.force_failed,
+}
+# Figures that a group without contacts has too.
+COUNTED_ALWAYS = frozenset(
+    name for name in FIGURES if name.startswith("false_alarms") or name in ("operations", "hours")
+)
+
+
+def summarise(results: Results) -> list[Summary]:
+    """One Summary for each detector and group, in the order of the benchmark file; hold-out last."""
+    contacts: dict[tuple[str, str], list[ContactResult]] = {}
+    for contact in results.contacts:
+        contacts.setdefault((contact.detector, contact.group), []).append(contact)
+    false_alarms: dict[tuple[str, str], int] = {}
+    for alarm in results.false_alarms:
+        false_alarms[alarm.detector, alarm.group] = false_alarms.get((alarm.detector, alarm.group), 0) + 1
+    exposures = {(item.detector, item.group): item for item in results.exposure}
+    clusters = campaigns(results)
+    return [
+        _summary(
+            detector,
+            group,
+            contacts.get((detector, group), []),
+            false_alarms.get((detector, group), 0),
+            exposures.get((detector, group)),
+            clusters,
+            [item for item in results.forces if item.group == group],
+        )
+        for group in results.groups
+        for detector in results.detectors
+    ]
+
+
+def campaigns(results: Results) -> dict[str, str]:
+    """What each recording is resampled with: its campaign where one is named, else itself."""
+    return {item.recording: item.campaign or item.recording for item in results.recordings}
+
+
+def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
+    """Latency [ms] of every assessable contact, and whether it is censored (the contact was missed)."""
+    seen = [item for item in contacts if item.outcome != "not_assessable"]
+    values = [item.latency_ms if item.latency_ms is not None else item.watched_ms or 0.0 for item in seen]
+    return np.array(values, dtype=np.float64), np.array([item.outcome == "missed" for item in seen], dtype=bool)
+
+
+def _summary(
+    detector: str,
+    group: str,
+    contacts: Sequence[ContactResult],
+    false_alarms: int,
+    exposure: ExposureResult | None,
+    clusters: Mapping[str, str],
+    forces: Sequence[ForceResult],
+) -> Summary:
+    detected = [item for item in contacts if item.latency_ms is not None]
+    values = np.array([item.latency_ms for item in detected], dtype=np.float64)
+    labels = [clusters.get(item.recording, item.recording) for item in detected]
+    latency, censored = latencies(contacts)
+    missed = int(censored.sum())
+    operations, hours = (exposure.operations, exposure.hours) if exposure else (0, 0.0)
+    at_alarm = [item.force_at_alarm_n for item in detected if item.force_at_alarm_n is not None]
+    peaks = [item.peak_force_n for item in detected if item.peak_force_n is not None]
+    return Summary(
+        detector=detector,
+        group=group,
+        contacts=len(contacts),
+        detected=len(values),
+        missed=missed,
+        not_assessable=len(contacts) - len(latency),
+        mean=bca(values, labels, "mean"),
+        std=bca(values, labels, "std"),
+        median=latency_quantile(latency, censored, 0.5),
+        p95=latency_quantile(latency, censored, 0.95),
+        max_ms=float(values.max()) if len(values) and not missed else (math.inf if missed else math.nan),
+        missed_share=binomial_share(missed, len(latency)),
+        missed_at_most=binomial_at_most(missed, len(latency)) if len(latency) else math.nan,
+        false_alarms=false_alarms,
+        operations=operations,
+        hours=hours,
+        false_alarms_per_hour=poisson_rate(false_alarms, hours),
+        false_alarms_per_operation=poisson_rate(false_alarms, float(operations)),
+        at_most_per_hour=poisson_at_most(false_alarms, hours) if hours else math.nan,
+        at_most_per_operation=poisson_at_most(false_alarms, float(operations)) if operations else math.nan,
+        force_at_alarm=float(np.median(at_alarm)) if at_alarm else math.nan,
+        force_at_alarm_max=max(at_alarm, default=math.nan),
+        peak_force=float(np.median(peaks)) if peaks else math.nan,
+        force_failed=sum(item.verdict == "fail" for item in forces),
+    )

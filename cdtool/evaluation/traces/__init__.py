@@ -1,0 +1,1 @@
+"""Curves that are kept at detection, so that reports draw without computing again."""

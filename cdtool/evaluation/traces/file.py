@@ -1,0 +1,158 @@
+"""Traces beside results.json: gzipped strict JSON, arrays as whole numbers of a stated step.
+
+Conventions: a curve is {"from": a, "step": b, "at": [...]}: value = a + b * number, null = missing, +-1 000 000 000 =
+without a limit. A panel's value and limits share one step, so that what is above a limit stays above it.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import zlib
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
+from cdtool.recording import Contact, FloatArray
+from cdtool.strict_json import finite, strict_json
+
+SCHEMA_VERSION = 1
+NO_LIMIT = 1_000_000_000
+
+# Steps over the range of a panel; a plot has fewer pixels.
+_LEVELS = 8000
+_TIME_STEP = 1e-5
+
+
+def traces_path(results: Path) -> Path:
+    """Where the traces of a results file are kept."""
+    return results.with_name(f"{results.stem}.traces.json.gz")
+
+
+def encode_traces(traces: Sequence[Trace]) -> bytes:
+    """All traces as gzipped JSON; the same bytes for the same traces."""
+    values = {"schema_version": SCHEMA_VERSION, "traces": [trace_values(trace) for trace in traces]}
+    return gzip.compress(strict_json(values, compact=True).encode("utf-8"), compresslevel=6, mtime=0)
+
+
+def read_traces(path: Path) -> tuple[Trace, ...]:
+    """The traces of a file; raises RecordingError where it is none."""
+    try:
+        values = json.loads(gzip.decompress(path.read_bytes()))
+        if values["schema_version"] != SCHEMA_VERSION:
+            raise RecordingError(
+                f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
+                "run cdtool benchmark again",
+            )
+        return tuple(_trace(item) for item in values["traces"])
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zlib.error) as fault:
+        raise RecordingError(f"{path}: not a file of traces: {fault}", "run cdtool benchmark again") from fault
+
+
+def trace_values(trace: Trace) -> dict[str, Any]:
+    """One trace as JSON values."""
+    low, step = _scale([trace.force])
+    return {
+        "recording": trace.recording,
+        "group": trace.group,
+        "start": trace.start,
+        "end": trace.end,
+        "contacts": [finite(asdict(contact)) for contact in trace.contacts],
+        "contact": trace.contact,
+        "view": list(trace.view),
+        "joints": trace.joints,
+        "chosen": trace.chosen,
+        "force_time": _coded(trace.force_time, trace.start, _TIME_STEP),
+        "force": _coded(trace.force, low, step),
+        "panels": [_panel_values(panel, trace.start) for panel in trace.panels],
+    }
+
+
+def _panel_values(panel: Panel, start: float) -> dict[str, Any]:
+    course = panel.course
+    low, step = _scale([course.value, course.lower, course.upper])
+    return {
+        "detector": panel.detector,
+        "unit": panel.unit,
+        "joint": panel.joint,
+        "verdict": panel.verdict,
+        "reason": panel.reason,
+        "seen": [finite(asdict(seen)) for seen in panel.seen],
+        "alarms": list(panel.alarms),
+        "false_alarms": list(panel.false_alarms),
+        "why": list(panel.why),
+        "time": _coded(course.time, start, _TIME_STEP),
+        "value": _coded(course.value, low, step),
+        "lower": _coded(course.lower, low, step),
+        "upper": _coded(course.upper, low, step),
+        "status": course.status.tolist(),
+    }
+
+
+def _trace(values: dict[str, Any]) -> Trace:
+    return Trace(
+        recording=str(values["recording"]),
+        group=str(values["group"]),
+        start=float(values["start"]),
+        end=float(values["end"]),
+        contacts=tuple(Contact(**_numbers(item)) for item in values["contacts"]),
+        contact=int(values["contact"]),
+        view=(float(values["view"][0]), float(values["view"][1])),
+        force_time=_decoded(values["force_time"]),
+        force=_decoded(values["force"]),
+        panels=tuple(_panel(item) for item in values["panels"]),
+        joints=int(values["joints"]),
+        chosen=str(values["chosen"]),
+    )
+
+
+def _panel(values: dict[str, Any]) -> Panel:
+    time, value, lower, upper = (_decoded(values[name]) for name in ("time", "value", "lower", "upper"))
+    return Panel(
+        detector=str(values["detector"]),
+        unit=str(values["unit"]),
+        joint=str(values["joint"]),
+        course=Course(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
+        verdict=str(values["verdict"]),
+        reason=str(values["reason"]),
+        seen=tuple(Seen(**_numbers(item)) for item in values["seen"]),
+        alarms=tuple(map(float, values["alarms"])),
+        false_alarms=tuple(map(float, values["false_alarms"])),
+        why=tuple(map(str, values["why"])),
+    )
+
+
+def _scale(arrays: Sequence[FloatArray]) -> tuple[float, float]:
+    present = np.concatenate(arrays) if arrays else np.empty(0)
+    present = present[np.isfinite(present)]
+    if not len(present):
+        return 0.0, 1.0
+    low, high = float(present.min()), float(present.max())
+    # Few digits: a trace that was read comes out as the same bytes again.
+    step = float(f"{(high - low) / _LEVELS:.6g}")
+    return low, step if step > 0.0 and math.isfinite(step) else 1.0
+
+
+def _coded(values: FloatArray, low: float, step: float) -> dict[str, Any]:
+    numbers = np.where(np.isfinite(values), np.round((np.where(np.isfinite(values), values, low) - low) / step), 0.0)
+    numbers = np.where(np.isinf(values), np.copysign(NO_LIMIT, values), numbers)
+    whole = numbers.astype(np.int64).tolist()
+    missing = np.isnan(values)
+    return {"from": low, "step": step, "at": [None if gone else n for gone, n in zip(missing, whole, strict=True)]}
+
+
+def _decoded(values: dict[str, Any]) -> FloatArray:
+    numbers = np.array([math.nan if n is None else n for n in values["at"]], dtype=np.float64)
+    decoded = float(values["from"]) + float(values["step"]) * numbers
+    return np.where(np.abs(numbers) == NO_LIMIT, np.copysign(np.inf, numbers), decoded)
+
+
+def _numbers(values: dict[str, Any]) -> dict[str, Any]:
+    """The inverse of `finite`: every null of a contact or an outcome is a number that is not known."""
+    return {key: math.nan if item is None else item for key, item in values.items()}

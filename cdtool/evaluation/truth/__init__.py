@@ -1,0 +1,1 @@
+"""What truly happened, and which alarm belongs to it: onsets, labels, triggers, matching."""

@@ -1,0 +1,70 @@
+"""A trigger file: when a controller, or any other program, raised its alarms.
+
+Conventions: a CSV with the columns recording and time_s and, where needed, detector and blind_until_s. A row is one
+alarm. A row without a time: watched, no alarm. A row with blind_until_s: from time_s until then it could not judge.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cdtool.errors import ConfigurationError
+from cdtool.evaluation.truth.named_rows import NamedRow, by_recording, read_named_rows
+
+
+@dataclass
+class Triggered:
+    """What one detector said of one recording: alarms [s], and stretches [s] that it could not judge."""
+
+    alarms: list[float] = field(default_factory=list)
+    blind: list[tuple[float, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class TriggerFile:
+    """The rows of a trigger file by detector and recording, as the file names them."""
+
+    path: Path
+    rows: Mapping[str, Mapping[str, Triggered]]
+    digest: str
+
+    def assigned(self, recordings: Collection[str]) -> tuple[dict[str, dict[str, Triggered]], list[str]]:
+        """What each detector said of each of the recordings, and the names that mean none of them.
+
+        Raises ConfigurationError where a file's name alone fits several.
+        """
+        meant = by_recording(self.path, {name for by_name in self.rows.values() for name in by_name}, recordings)
+        said: dict[str, dict[str, Triggered]] = {}
+        for detector, by_name in self.rows.items():
+            of_detector = said.setdefault(detector, {})
+            for name, item in by_name.items():
+                recording = meant[name]
+                if recording is not None:
+                    both = of_detector.setdefault(recording, Triggered())
+                    both.alarms += item.alarms
+                    both.blind += item.blind
+        return said, sorted(name for name, recording in meant.items() if recording is None)
+
+
+def read_triggers(path: Path) -> TriggerFile:
+    """Read and check a trigger file; raises ConfigurationError with the line."""
+    rows: dict[str, dict[str, Triggered]] = {}
+    for row in read_named_rows(path, ("recording", "time_s"), ("detector", "blind_until_s"), "trigger"):
+        by_name = rows.setdefault(row.text("detector") or path.stem, {})
+        _take(row, by_name.setdefault(row.recording, Triggered()))
+    if not rows:
+        raise ConfigurationError(f"{path}: holds no row", "write one a trigger; an empty time_s: watched, no alarm")
+    return TriggerFile(path, rows, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def _take(row: NamedRow, said: Triggered) -> None:
+    time, until = row.seconds("time_s"), row.seconds("blind_until_s")
+    if until is not None:
+        if time is None or until < time:
+            raise row.fault(f"blind from {time} until {until}", "time_s is the begin, and comes first")
+        said.blind.append((time, until))
+    elif time is not None:
+        said.alarms.append(time)

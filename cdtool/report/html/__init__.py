@@ -1,0 +1,1 @@
+"""The report as one HTML file: tables, plots that zoom, no network."""

@@ -1,0 +1,205 @@
+"""The HTML report's tables of figures: limits, detectors, comparisons, calibration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from cdtool.evaluation.comparison import Comparison
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.summary import Summary
+from cdtool.report.figure_text import NOTHING, counted, missed, number, rate, with_interval
+from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, nothing, shown
+from cdtool.report.verdict_words import allowed, value_of
+
+_TONES = {"kept": "good", "pass": "good", "broken": "bad", "fail": "bad", "not assessable": "unknown"}
+_WORST_FIRST = ("broken", "not assessable", "kept")
+
+
+def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """A table of the provenance; empty where it has none, since a file may hold anything there."""
+    found = provenance.get(key)
+    return found if isinstance(found, Mapping) else {}
+
+
+def detector_cell(results: Results, detector: str) -> Cell:
+    """A detector's full name with its short one."""
+    short = part_of(results.provenance, "short_names").get(detector)
+    return Cell(shown(detector), (f"({shown(short)})",) if short else ())
+
+
+def outcome_cell(outcome: str) -> Cell:
+    """A verdict in words with its tone."""
+    return Cell(outcome, tone=tone_of(outcome))
+
+
+def tone_of(outcome: str) -> str:
+    """Whether a verdict is good, bad or unknown."""
+    return _TONES.get(outcome, "")
+
+
+def limits_table(results: Results, *, kept: bool) -> Table:
+    """The limits that are kept, or those that are not, the broken ones first."""
+    columns = (
+        Column("outcome", choice=True),
+        Column("detector"),
+        Column("group"),
+        Column("figure"),
+        Column("value", numeric=True),
+        Column("allowed"),
+        Column("why"),
+        Column("limit"),
+    )
+    meant = [item for item in results.limits if (item.outcome == "kept") == kept]
+    ordered = sorted(meant, key=lambda item: _WORST_FIRST.index(item.outcome))
+    caption = f"{counted(len(meant), 'limit')} {'' if kept else 'not '}kept"
+    rows = [
+        (
+            outcome_cell(item.outcome),
+            Cell(shown(item.detector)),
+            Cell(shown(item.group)),
+            Cell(item.figure),
+            Cell(value_of(item), key=key_of(item.value)),
+            Cell(allowed(item)),
+            Cell(item.reason or ""),
+            Cell(item.limit),
+        )
+        for item in ordered
+    ]
+    return Table("kept-table" if kept else "limits-table", caption, columns, rows)
+
+
+def summary_table(evaluated: Evaluated) -> Table:
+    """A row a detector and group: latency with what it has to be read beside."""
+    columns = [
+        Column("detector"),
+        Column("group", choice=True),
+        *(Column(f"{name} [ms]", numeric=True) for name in ("mean", "std", "median", "P95")),
+        Column("contacts detected", numeric=True),
+        Column("missed", numeric=True),
+        Column("not assessable", numeric=True),
+        *(Column(f"false alarms{per}", numeric=True) for per in ("", " per hour", " per operation")),
+        Column("force at alarm [N]", numeric=True),
+        Column("peak force [N]", numeric=True),
+    ]
+    if evaluated.results.forces:
+        columns.append(Column("force limit exceeded", numeric=True))
+    rows = [_summary_row(evaluated.results, item)[: len(columns)] for item in evaluated.summaries]
+    return Table("figures-table", "Latency, misses and false alarms by detector and group", columns, rows)
+
+
+def comparisons_table(evaluated: Evaluated) -> Table:
+    """Every pair of detectors on the contacts that both could assess."""
+    columns = (
+        Column("group", choice=True),
+        Column("first"),
+        Column("second"),
+        Column("finding", choice=True),
+        Column("contacts", numeric=True),
+        Column("latency, first less second [ms]", numeric=True),
+        Column("p", numeric=True),
+        Column("missed by first only", numeric=True),
+        Column("missed by second only", numeric=True),
+        Column("p of misses", numeric=True),
+    )
+    rows = [_comparison_row(item) for item in evaluated.comparisons]
+    return Table("comparisons-table", "Pairs of detectors on the same contacts", columns, rows)
+
+
+def calibration_table(results: Results) -> Table:
+    """How safety factors were set for a false-alarm budget."""
+    names = ("detector", "false alarms allowed", "safety factor set", "alarms with it", "operations", "hours")
+    columns = [Column(name, numeric=i > 1) for i, name in enumerate(names)]
+    rows = [
+        (
+            Cell(shown(item.detector)),
+            Cell(item.budget),
+            figure_cell(item.safety_factor),
+            count_cell(item.alarms),
+            count_cell(item.operations),
+            figure_cell(item.hours),
+        )
+        for item in results.calibration
+    ]
+    return Table("calibration-table", "Safety factors set for a false-alarm budget", columns, rows)
+
+
+def interval_cell(interval: Interval) -> Cell:
+    """A figure with its interval in small print."""
+    # What rounding leaves of equal numbers is no figure of its own.
+    widest = max(abs(interval.low), abs(interval.high))
+    nothing_left = math.isfinite(widest) and abs(interval.value) < 1e-9 * widest
+    figure = replace(interval, value=0.0) if nothing_left else interval
+    return _split(with_interval(figure), figure.value)
+
+
+def _summary_row(results: Results, item: Summary) -> Row:
+    hit = item.contacts > 0
+    assessable = item.detected + item.missed
+    return (
+        detector_cell(results, item.detector),
+        Cell(shown(item.group)),
+        *(interval_cell(figure) for figure in (item.mean, item.std, item.median, item.p95)),
+        Cell(f"{item.detected} of {item.contacts}", key=item.detected) if hit else nothing(),
+        _split(
+            missed(item.missed, assessable, item.missed_at_most),
+            float(item.missed) if assessable else math.nan,
+            tone="bad" if item.missed else "",
+        ),
+        Cell(str(item.not_assessable), key=item.not_assessable, tone="unknown" if item.not_assessable else "")
+        if hit
+        else nothing(),
+        Cell(
+            str(item.false_alarms),
+            (f"in {counted(item.operations, 'operation')}", f"{number(item.hours)} h"),
+            item.false_alarms,
+            "bad" if item.false_alarms else "",
+        ),
+        _split(
+            rate(item.false_alarms, item.false_alarms_per_hour, item.at_most_per_hour), item.false_alarms_per_hour.value
+        ),
+        _split(
+            rate(item.false_alarms, item.false_alarms_per_operation, item.at_most_per_operation),
+            item.false_alarms_per_operation.value,
+        ),
+        Cell(number(item.force_at_alarm), (f"largest {number(item.force_at_alarm_max)}",), key_of(item.force_at_alarm))
+        if not math.isnan(item.force_at_alarm)
+        else nothing(),
+        figure_cell(item.peak_force),
+        Cell(str(item.force_failed), key=item.force_failed, tone="bad" if item.force_failed else "")
+        if hit
+        else nothing(),
+    )
+
+
+def _comparison_row(item: Comparison) -> Row:
+    words = [f"{shown(item.faster)} is faster"] if item.faster else []
+    words += [f"{shown(item.misses_less)} misses less"] if item.misses_less else []
+    return (
+        Cell(shown(item.group)),
+        Cell(shown(item.first)),
+        Cell(shown(item.second)),
+        Cell("; ".join(words) or "no difference shown", tone="" if words else "unknown"),
+        count_cell(item.contacts),
+        interval_cell(item.latency.mean),
+        _p(item.latency_p),
+        count_cell(item.only_first_missed),
+        count_cell(item.only_second_missed),
+        _p(item.missed_p),
+    )
+
+
+def _p(value: float) -> Cell:
+    return Cell(NOTHING if math.isnan(value) else f"{value:.2g}", key=key_of(value))
+
+
+def _split(words: str, value: float, tone: str = "") -> Cell:
+    """Words such as "84.3 (17.4 to 246): at most 218": what follows the figure goes into lines of small print."""
+    figures, _, bound = words.partition(": ")
+    text, bracket, interval = figures.partition(" (")
+    rest = ((f"({interval}",) if bracket else ()) + ((bound,) if bound else ())
+    return Cell(text, rest, key_of(value), tone)

@@ -1,0 +1,1 @@
+"""The report as Markdown, fit for a pull request."""

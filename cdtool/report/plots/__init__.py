@@ -1,0 +1,1 @@
+"""Figures. matplotlib is loaded by the first one."""

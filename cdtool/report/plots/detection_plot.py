@@ -1,0 +1,221 @@
+"""One log and one detector: signal and band, trigger and load cell over time (thesis figures 5.6 to 5.8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdtool.detection import Alarm
+from cdtool.evaluation.traces.trace import Course, Span
+from cdtool.evaluation.truth.matching import Match
+from cdtool.pipeline import Detection
+from cdtool.recording import Contact
+from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
+from cdtool.report.plots.outcome import outcome_words
+from cdtool.report.plots.panels import (
+    Legend,
+    count_from,
+    draw_alarm,
+    draw_force,
+    draw_onset,
+    draw_signal,
+    draw_trigger,
+    frame_signal,
+)
+from cdtool.report.plots.style import look_of
+from cdtool.workflows.detection import Detected
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_PANELS = 6
+# A zoom is drawn where it shows less than this share of the log.
+_ZOOM_SHARE = 0.4
+_BEFORE, _AFTER = 0.2, 0.6
+
+
+@dataclass(frozen=True)
+class _Event:
+    """What the zoom shows: a contact with the alarm that it was detected by, or an alarm alone."""
+
+    contact: Contact | None
+    alarm: Alarm | None
+
+    @property
+    def zero(self) -> float:
+        if self.contact:
+            return self.contact.start
+        return self.alarm.time if self.alarm else 0.0
+
+
+def plot_detected(found: Detected, path: Path) -> None:
+    """Draw one log: a panel a joint that alarms (else the leading joint), trigger, load cell, and a zoom on the event.
+
+    Raises UsageError, CdtoolError (see `save`).
+    """
+    with drawing():
+        figure = _figure(found)
+        save(figure, path)
+
+
+def _figure(found: Detected) -> Figure:
+    alarming, joints = _shown_joints(found)
+    recording = found.recording
+    whole = (recording.start, recording.end)
+    matches = [item for matching in found.matchings for item in matching.matches]
+    event = _event(matches, [alarm for item in found.detections for alarm in item.verdict.alarms])
+    zoom = _zoom(event, whole)
+    spans = [whole] if zoom is None else [whole, zoom]
+    forced = "force" in recording and len(recording["force"]) > 0
+    heights = [2.3 if len(joints) == 1 else 1.15] * len(joints) + [0.5] + [1.2] * forced
+    figure = new_figure(11.0 if zoom else 9.0, 1.5 + sum(heights))
+    grid = figure.subplots(
+        len(heights),
+        len(spans),
+        sharex="col",
+        squeeze=False,
+        height_ratios=heights,
+        width_ratios=[1.0, 1.2][: len(spans)],
+    )
+    detector = found.detections[0].detector if found.detections else ""
+    legend = Legend(detector)
+    for column, span in enumerate(spans):
+        _column(list(grid[:, column]), found, joints, span, matches, legend)
+    _name_rows(list(grid[:, 0]), found, joints)
+    if zoom is None:
+        grid[-1, 0].set_xlabel("time [s]")
+    else:
+        _finish_zoom(grid, event, zoom)
+    _name_event(list(grid[:, -1]), joints, event)
+    if event.contact and event.alarm:
+        late = next(item.latency for item in matches if item.alarm is event.alarm)
+        _write_latency(grid[len(joints), -1], event, late)
+    figure.suptitle(
+        f"{label(recording.name, 60)}  ·  {label(detector)}\n{outcome_words(found, alarming, joints)}",
+        fontsize=10,
+        x=0.01,
+        ha="left",
+    )
+    figure.align_ylabels()
+    figure.legend(handles=legend.handles(), loc="outside lower left", ncols=4 if zoom else 3)
+    return figure
+
+
+def _column(
+    rows: list[Axes], found: Detected, joints: list[int], span: Span, matches: Sequence[Match], legend: Legend
+) -> None:
+    parts = [item for item in found.detections if _overlap(item, span)]
+    colour = look_of(found.detections[0].detector).colour if found.detections else "0.35"
+    for axes, joint in zip(rows, joints, strict=False):
+        frame_signal(axes, [Course.of(item, joint) for item in parts], span, headroom=2.0)
+        for item in parts:
+            draw_signal(axes, Course.of(item, joint), item.detector, span, legend)
+            for alarm in item.verdict.alarms:
+                if alarm.joint == joint:
+                    draw_alarm(axes, alarm, colour, legend)
+    draw_trigger(rows[len(joints)], parts, colour)
+    if len(rows) > len(joints) + 1:
+        force = found.recording["force"]
+        draw_force(rows[-1], force.time, force.values[:, 0], span, contact=bool(matches))
+    for axes in rows:
+        for made in matches:
+            draw_onset(axes, made.contact.start, legend)
+        axes.set_xlim(span)
+
+
+def _name_rows(rows: list[Axes], found: Detected, joints: list[int]) -> None:
+    unit = unit_label(found.detections[0].statistic.unit) if found.detections else "–"
+    for axes, joint in zip(rows, joints, strict=False):
+        several = len(found.recording.joints) > 1
+        axes.set_ylabel(f"{label(found.joints[joint], 16)}\n[{unit}]" if several else f"signal [{unit}]")
+    rows[len(joints)].set_ylabel("trigger")
+    if len(rows) > len(joints) + 1:
+        rows[-1].set_ylabel(f"load cell [{unit_label(found.recording['force'].unit)}]")
+
+
+def _finish_zoom(grid: np.ndarray, event: _Event, zoom: Span) -> None:
+    grid[-1, 0].set_xlabel("time [s]")
+    what = "contact onset" if event.contact else "alarm"
+    grid[-1, 1].set_xlabel(f"time from {what} [ms]")
+    for axes in grid[:, 0]:
+        axes.axvspan(*zoom, facecolor="none", edgecolor="0.3", linewidth=0.8, zorder=5)
+    grid[0, 0].set_title("whole log", loc="left")
+    count_from(grid[-1, 1], event.zero, 0.1)
+
+
+def _name_event(rows: list[Axes], joints: list[int], event: _Event) -> None:
+    if event.contact:
+        side = "left" if event.alarm and event.alarm.time < event.contact.start else "right"
+        _write_above(rows[0], event.contact.start, f" onset {event.contact.start:.3f} s ", side)
+    if event.alarm and event.alarm.joint in joints:
+        side = "right" if event.contact and event.alarm.time < event.contact.start else "left"
+        axes = rows[joints.index(event.alarm.joint)]
+        _write_above(axes, event.alarm.time, f" alarm {event.alarm.time:.3f} s ", side, bold=True)
+
+
+def _write_above(axes: Axes, time: float, text: str, side: str, *, bold: bool = False) -> None:
+    axes.annotate(
+        text,
+        (time, 1.0),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha=side,
+        va="bottom",
+        fontsize=9,
+        fontweight="bold" if bold else "normal",
+        annotation_clip=False,
+    )
+
+
+def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
+    if event.contact is None or event.alarm is None:
+        return
+    axes.annotate(
+        "",
+        (event.alarm.time, 0.5),
+        (event.contact.start, 0.5),
+        arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0, "linewidth": 0.9},
+    )
+    axes.annotate(
+        f"latency {1e3 * latency:.0f} ms ",
+        (min(event.contact.start, event.alarm.time), 0.5),
+        ha="right",
+        va="center",
+        fontsize=9,
+        fontweight="bold",
+    )
+
+
+def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:
+    """The joints that alarm, and those that are drawn."""
+    alarming = sorted({alarm.joint for item in found.detections for alarm in item.verdict.alarms})
+    leading = sorted({item.leading for item in found.detections})
+    return alarming, (alarming or leading)[:_MOST_PANELS]
+
+
+def _event(matches: Sequence[Match], alarms: Sequence[Alarm]) -> _Event:
+    detected = next((item for item in matches if item.alarm), None)
+    if detected or matches:
+        chosen = detected or matches[0]
+        return _Event(chosen.contact, chosen.alarm)
+    return _Event(None, alarms[0] if alarms else None)
+
+
+def _zoom(event: _Event, whole: Span) -> Span | None:
+    if event.contact is None and event.alarm is None:
+        return None
+    last = max(event.zero, event.alarm.time if event.alarm else event.zero)
+    start = max(event.zero - _BEFORE, whole[0])
+    end = min(max(event.zero + _AFTER, last + _BEFORE), whole[1])
+    return (start, end) if 0.0 < end - start < _ZOOM_SHARE * (whole[1] - whole[0]) else None
+
+
+def _overlap(detection: Detection, span: Span) -> bool:
+    time = detection.statistic.time
+    return len(time) > 0 and bool(time[0] <= span[1] and time[-1] >= span[0])

@@ -1,0 +1,269 @@
+"""Force over the time since the contact began, under the staircase of its limits: a panel a group of contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdtool.detection import Status
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
+from cdtool.evaluation.traces.decimation import kept_samples
+from cdtool.recording import FloatArray
+from cdtool.report.plots.figures import drawing, label, new_figure, save
+from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WORST = "#A3123F"
+_EMPHASISED = 6
+_MOST_CURVES = 100
+_ALARMS_TOLD = 4
+# A record that reaches this share of the time axis is drawn as one that fills it.
+_WHOLE = 0.99
+_MOST_TICKS = 8.01
+_PIXELS = 700
+# The first part of the time axis [s] is the shortest of these that shows what happens; what follows is compressed.
+_VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
+_VIEW_SHARE = 0.72
+_UNSEEN = HATCHES[Status.GAP]
+_TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+_ORDER = ("fail", "not assessable", "pass")
+
+
+@dataclass(frozen=True)
+class ForceCurve:
+    """One contact: force (n,) [N] at times (n,) and the detectors' alarms [s after the onset], and its verdict."""
+
+    label: str
+    time: FloatArray
+    force: FloatArray
+    verdict: ForceVerdict
+    alarms: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ForcePanel:
+    """The contacts of one group."""
+
+    group: str
+    curves: tuple[ForceCurve, ...]
+
+
+def plot_forces(panels: Sequence[ForcePanel], profile: ForceProfile, path: Path) -> None:
+    """Draw a panel a group: its worst contact coloured, the others grey; raises UsageError, CdtoolError (see `save`).
+
+    The worst is the one that fails with the largest share of a limit. Right of the first grey line time is
+    compressed: each of the later limits has an equal width.
+    """
+    with drawing():
+        save(_figure(panels, profile), path)
+
+
+def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
+    shown = [panel for panel in panels if panel.curves]
+    if not shown:
+        figure = new_figure(9.0, 1.2)
+        figure.text(0.5, 0.5, "no contact with a load-cell force: nothing to show", ha="center", va="center")
+        return figure
+    ranked = [sorted(panel.curves, key=_badness) for panel in shown]
+    nodes = _nodes(ranked, profile)
+    figure = new_figure(9.5, 1.5 + 2.3 * len(shown))
+    rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, panel, curves in zip(rows, shown, ranked, strict=True):
+        _set_time(axes, nodes)
+        _draw_limits(axes, profile, nodes)
+        axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
+        _draw_curves(axes, curves)
+        axes.set_ylabel("force [N]")
+        axes.set_title(label(panel.group, 60), loc="left", fontweight="bold")
+        _tell(axes, curves)
+    rows[-1].set_xlabel(
+        "time from contact onset [ms]" + ("; compressed right of the first grey line" if len(nodes) > 2 else "")
+    )
+    figure.suptitle(f"{label(profile.title, 70)}", fontsize=10, x=0.01, ha="left")
+    footer = "evidence, not a certificate" + (f"; {profile.warning}" if profile.warning else "")
+    figure.legend(
+        handles=_handles(ranked, nodes[-1]),
+        loc="outside lower left",
+        ncols=5,
+        title=f"{label(profile.source, 130)}\n{footer}",
+        title_fontsize=7,
+        alignment="left",
+    )
+    return figure
+
+
+def _badness(curve: ForceCurve) -> tuple[int, float]:
+    return _ORDER.index(curve.verdict.outcome), -curve.verdict.utilisation
+
+
+def _highest(curves: Sequence[ForceCurve]) -> float:
+    return max(float(np.max(curve.force)) for curve in curves)
+
+
+def _nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -> list[float]:
+    """Where the time axis bends [s]: 0, the end of its first part, the later limits' beginnings, the end."""
+    moments = [0.0]
+    for curves in ranked:
+        worst = curves[0]
+        moments += [1.15 * time for time in worst.alarms.values() if math.isfinite(time)]
+        moments += [2.0 * step.peak_at for step in worst.verdict.steps[:1] if math.isfinite(step.peak_at)]
+    view = next((view for view in _VIEWS if view >= max(moments)), _VIEWS[-1])
+    later = [step.from_s for step in profile.steps if step.from_s > view]
+    ends = [float(curve.time[-1]) for curves in ranked for curve in curves]
+    end = _rounded_up(max([1e-3, 1.2 * profile.steps[-1].from_s, *ends]))
+    return [0.0, end] if not later and end <= 2.0 * view else [0.0, view, *later, end]
+
+
+def _rounded_up(time: float) -> float:
+    """To two digits, for the axis's last label."""
+    digit = 10.0 ** (math.floor(math.log10(time)) - 1)
+    return round(math.ceil(time / digit - 1e-9) * digit, 9)
+
+
+def _set_time(axes: Axes, nodes: Sequence[float]) -> None:
+    """A time axis that is linear between its bends; nothing beyond its end is drawn."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    shares = np.linspace(_VIEW_SHARE, 1.0, len(nodes) - 1) if len(nodes) > 2 else np.array([1.0])
+    times, places = np.asarray(nodes), np.concatenate(([0.0], shares))
+    to_place, to_time = partial(np.interp, xp=times, fp=places), partial(np.interp, xp=places, fp=times)
+    axes.set_xscale("function", functions=(to_place, to_time))
+    axes.set_xlim(nodes[0], nodes[-1])
+    step = next((step for step in _TICKS if nodes[1] / step <= _MOST_TICKS), _TICKS[-1])
+    ticks = [tick for tick in np.arange(0.0, nodes[1], step).tolist() if nodes[1] - tick > 0.6 * step]
+    axes.xaxis.set_major_locator(FixedLocator([*ticks, *nodes[1:]]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(lambda value, _: f"{1e3 * value:.0f}")
+    for bend in nodes[1:-1]:
+        axes.axvline(bend, color="0.75", linewidth=0.7, zorder=0.5)
+
+
+def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> None:
+    """The staircase: what is allowed below it."""
+    begins = [step.from_s for step in profile.steps]
+    forces = [step.at_most_n for step in profile.steps]
+    times, heights = [*begins, nodes[-1]], [*forces, forces[-1]]
+    axes.fill_between(times, heights, step="post", color=BAND, linewidth=0, zorder=0.4)
+    axes.step(times, heights, where="post", color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=2)
+    for step in profile.steps:
+        axes.annotate(
+            f"{label(step.name, 22) if step.from_s < nodes[1] else ''} ≤ {step.at_most_n:g} N".lstrip(),
+            (step.from_s, step.at_most_n),
+            xytext=(4, 2),
+            textcoords="offset points",
+            fontsize=7,
+            color=LIMIT,
+            zorder=5,
+        )
+
+
+def _draw_curves(axes: Axes, curves: Sequence[ForceCurve]) -> None:
+    """The worst on top, the next ones grey, the rest paler."""
+    for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
+        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (UNJUDGED, 0.5)
+        kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, _PIXELS)
+        axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
+    worst = curves[0]
+    end = axes.get_xlim()[1]
+    if worst.verdict.end < _WHOLE * end:
+        axes.axvspan(worst.verdict.end, end, fill=False, edgecolor=UNJUDGED, linewidth=0, hatch=_UNSEEN, zorder=0.6)
+    seen = [step for step in worst.verdict.steps if math.isfinite(step.peak)]
+    if seen:
+        peak = max(seen, key=lambda step: step.peak)
+        _point(axes, (peak.peak_at, peak.peak), f"{peak.peak:.0f} N at {1e3 * peak.peak_at:.0f} ms", 4)
+    for step in worst.verdict.steps:
+        if step.time_budget == worst.verdict.time_budget and math.isfinite(step.time_budget):
+            place = (step.time_budget, step.step.at_most_n)
+            axes.plot(*place, "o", markersize=5, markerfacecolor="white", markeredgecolor=_WORST, zorder=6)
+            lift = -4 if step.step.at_most_n > 0.15 * axes.get_ylim()[1] else 14  # clear of the time axis
+            _point(axes, place, f"{1e3 * step.time_budget:.1f} ms", lift)
+    for detector, time in worst.alarms.items():
+        if not time <= worst.time[-1]:
+            continue
+        force = float(np.interp(time, worst.time, worst.force))
+        look = look_of(detector)
+        axes.plot(
+            max(time, 0.0), force, look.marker, color=look.colour, markersize=7, markeredgecolor="white", zorder=7
+        )
+
+
+def _point(axes: Axes, place: tuple[float, float], text: str, lift: float) -> None:
+    axes.annotate(
+        text,
+        place,
+        xytext=(8, lift),
+        textcoords="offset points",
+        va="top" if lift < 0.0 else "bottom",
+        fontsize=8,
+        color=_WORST,
+        bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1.0},
+        zorder=8,
+    )
+
+
+def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
+    """Right of a panel: how many contacts keep the limits, and what became of the worst, step by step."""
+    worst = curves[0]
+    outcomes = [curve.verdict.outcome for curve in curves]
+    counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in _ORDER if outcome in outcomes)
+    lines = [f"{len(curves)} {'contact' if len(curves) == 1 else 'contacts'}:", *fill(counts, 30).splitlines()]
+    lines.append(f"worst: {label(worst.label, 26)}")
+    lines += [_told(step) for step in worst.verdict.steps]
+    if math.isfinite(worst.verdict.time_budget):
+        lines.append(f"first exceeded after {1e3 * worst.verdict.time_budget:.1f} ms")
+    alarms = sorted(worst.alarms.items(), key=lambda item: item[1])
+    lines += [f"alarm {label(detector, 18)} {1e3 * time:.0f} ms" for detector, time in alarms[:_ALARMS_TOLD]]
+    if len(alarms) > _ALARMS_TOLD:
+        lines.append(f"and {len(alarms) - _ALARMS_TOLD} later")
+    for text, lift, size, weight in ((worst.verdict.outcome, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
+        axes.annotate(
+            text,
+            (1.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(10, lift),
+            textcoords="offset points",
+            va="top",
+            fontsize=size,
+            fontweight=weight,
+            annotation_clip=False,
+        )
+
+
+def _told(step: StepVerdict) -> str:
+    name = label(step.step.name, 22)
+    if step.outcome == "not assessable":
+        return f"{name}: not assessable"
+    return f"{name}: {step.peak:.0f} of {step.step.at_most_n:g} N"
+
+
+def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Artist] = [
+        Line2D([], [], color=_WORST, linewidth=1.5, label="worst contact"),
+        Patch(facecolor=BAND, edgecolor="none", label="allowed"),
+    ]
+    if any(len(curves) > 1 for curves in ranked):
+        handles.insert(1, Line2D([], [], color="0.45", linewidth=0.8, label="other contacts"))
+    if any(curves[0].verdict.end < _WHOLE * end for curves in ranked):
+        text = "worst contact's record has ended"
+        handles.append(Patch(facecolor="white", edgecolor=UNJUDGED, hatch=_UNSEEN, label=text))
+    detectors = dict.fromkeys(name for curves in ranked for name in curves[0].alarms)
+    for name in detectors:
+        look = look_of(name)
+        text = f"alarm {label(name, 24)}"
+        handles.append(Line2D([], [], color=look.colour, marker=look.marker, linestyle="none", label=text))
+    return handles

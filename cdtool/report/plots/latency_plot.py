@@ -1,0 +1,236 @@
+"""Latency of every detector in every group: each contact a mark, the median with its interval, and all the counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.summary import Summary
+from cdtool.recording import FloatArray
+from cdtool.report.figure_text import NOTHING, with_interval
+from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
+from cdtool.report.plots.side_table import Column, SideTable
+from cdtool.report.plots.style import look_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLUMNS = (
+    Column("median [ms]\n(95 % interval)", 132),
+    Column("detected", 66),
+    Column("missed", 38),
+    Column("not\nassessable", 52),
+    Column("false\nalarms", 36),
+)
+_IMPACT_FREE = 70.0
+_ROW, _PANEL = 0.36, 0.2
+_MOST_MARKS = 400
+# Low-discrepancy sequences spread the marks evenly, without chance.
+_GOLDEN, _ACROSS = 0.6180339887, 0.7548776662
+# Right of the axis's end lies a strip for the missed contacts that were watched for longer: its share of the width.
+_BEYOND = 0.09
+
+
+@dataclass(frozen=True)
+class _Marks:
+    """Latencies of the detected contacts, and how long the missed ones were watched, both ascending [ms]."""
+
+    detected: FloatArray
+    missed: FloatArray
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """The time axis [ms]: data from `low` to `end`, then the strip of missed contacts up to `high`, if there is one."""
+
+    low: float
+    end: float
+    high: float
+    logarithmic: bool
+
+    def shown(self, times: FloatArray) -> FloatArray:
+        """Where times are drawn: below a logarithmic axis at its floor, beyond its end evenly over the strip."""
+        inside = np.maximum(times, FLOOR_MS) if self.logarithmic else times
+        share = 0.2 + 0.6 * (_ACROSS * np.arange(len(times), dtype=np.float64) % 1.0)
+        return np.asarray(np.where(times > self.end, self._strip(share), inside))
+
+    def placed(self, time: float) -> float:
+        """Where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
+        if time > self.end:
+            return float(self._strip(np.array(0.5, dtype=np.float64)))
+        return max(time, FLOOR_MS) if self.logarithmic else time
+
+    def _strip(self, share: FloatArray) -> FloatArray:
+        if self.logarithmic:
+            return np.asarray(self.end * (self.high / self.end) ** share)
+        return self.end + (self.high - self.end) * share
+
+
+def plot_latencies(evaluated: Evaluated, path: Path) -> None:
+    """Draw a panel a group and a row a detector; raises UsageError, CdtoolError (see `save`).
+
+    The median counts missed contacts as later than all others. It is to be read beside the counts at the right.
+    """
+    with drawing():
+        save(_figure(evaluated), path)
+
+
+def _figure(evaluated: Evaluated) -> Figure:
+    summaries = [item for item in evaluated.summaries if item.contacts]
+    groups = list(dict.fromkeys(item.group for item in summaries))
+    if not groups:
+        figure = new_figure(9.0, 1.2)
+        figure.text(0.5, 0.5, "no contact in any group: there is no latency to show", ha="center", va="center")
+        return figure
+    known = _all_marks(evaluated.results)
+    marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
+    impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
+    more = [Column(f"false alarms\nin {label(group, 11)}", _IMPACT_FREE) for group in impact_free]
+    table = SideTable((*_COLUMNS, *more))
+    rows = {group: [item for item in summaries if item.group == group] for group in groups}
+    names = [label(item.detector, 28) for item in summaries]
+    margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, 0.85)
+    heights = [_PANEL + _ROW * len(rows[group]) for group in groups]
+    figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
+    axis = _axis_of(list(marks.values()))
+    set_latency_scale(panels[-1], axis.low, axis.end, axis.logarithmic)
+    panels[-1].set_xlim(axis.low, axis.high)
+    counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
+    for axes, group in zip(panels, groups, strict=True):
+        _draw_group(axes, rows[group], marks, axis)
+        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        for i, row in enumerate(rows[group]):
+            free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
+            _write_row(table, axes, i, row, free)
+    table.write_headings(panels[0])
+    panels[-1].set_xlabel(_explained(list(marks.values()), axis), linespacing=1.4)
+    return figure
+
+
+def _all_marks(results: Results) -> dict[tuple[str, str], _Marks]:
+    found: dict[tuple[str, str], tuple[list[float], list[float]]] = {}
+    for item in results.contacts:
+        detected, missed = found.setdefault((item.detector, item.group), ([], []))
+        if item.latency_ms is not None:
+            detected.append(item.latency_ms)
+        elif item.outcome == "missed":
+            missed.append(item.watched_ms or 0.0)
+    return {key: _Marks(np.sort(detected), np.sort(missed)) for key, (detected, missed) in found.items()}
+
+
+def _axis_of(marks: Sequence[_Marks]) -> _Axis:
+    detected = np.concatenate([item.detected for item in marks])
+    missed = np.concatenate([item.missed for item in marks])
+    low, end, logarithmic = latency_range(detected if len(detected) else missed)
+    if not np.any(missed > end):
+        return _Axis(low, end, end, logarithmic)
+    high = end * (end / low) ** _BEYOND if logarithmic else end + _BEYOND * (end - low)
+    return _Axis(low, end, high, logarithmic)
+
+
+def _draw_group(axes: Axes, rows: Sequence[Summary], marks: dict[tuple[str, str], _Marks], axis: _Axis) -> None:
+    for i, row in enumerate(rows):
+        _draw_marks(axes, i, row.detector, marks[row.detector, row.group], axis)
+        _draw_median(axes, i, row, axis)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_yticks(range(len(rows)), [label(row.detector, 28) for row in rows])
+    axes.tick_params(axis="y", length=0, labelsize=9)
+    axes.grid(axis="x", color="0.88", linewidth=0.6)
+    if axis.high > axis.end:
+        _name_strip(axes, np.concatenate([marks[row.detector, row.group].missed for row in rows]), axis)
+
+
+def _name_strip(axes: Axes, missed: FloatArray, axis: _Axis) -> None:
+    axes.axvline(axis.end, color="0.6", linewidth=0.7, linestyle=(0, (2, 2)), zorder=0.5)
+    beyond = missed[missed > axis.end]
+    if not len(beyond):
+        return
+    axes.annotate(
+        f"> {between(float(beyond.min()), float(beyond.max()))} ms",
+        (1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(2, 3),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=7.5,
+    )
+
+
+def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis) -> None:
+    """Detected contacts filled, missed ones open."""
+    look = look_of(detector)
+    for times, filled in ((marks.detected, True), (marks.missed, False)):
+        shown = axis.shown(_thinned(times))
+        height = row - 0.12 + 0.42 * (np.arange(len(shown)) * _GOLDEN % 1.0 - 0.5)
+        axes.plot(
+            shown,
+            height,
+            look.marker,
+            color=look.colour,
+            markerfacecolor=look.colour if filled else "white",
+            markersize=4,
+            alpha=0.7 if filled else 1.0,
+            markeredgewidth=0.0 if filled else 0.9,
+            linestyle="none",
+        )
+
+
+def _thinned(ordered: FloatArray) -> FloatArray:
+    if len(ordered) <= _MOST_MARKS:
+        return ordered
+    return np.asarray(ordered[np.linspace(0, len(ordered) - 1, _MOST_MARKS).astype(int)])
+
+
+def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
+    """Below the marks: the interval of the median as a bar, open to the right where it has no end."""
+    height, median = row + 0.28, summary.median
+    if median.low <= axis.end:
+        low, high = axis.placed(median.low), axis.placed(median.high)
+        if median.high > axis.end:
+            high = min(axis.placed(median.value), axis.end) if np.isfinite(median.value) else low
+            axes.plot([high, axis.end], [height, height], color="black", linewidth=0.8, linestyle=":", zorder=3)
+            axes.plot(axis.end, height, ">", color="black", markersize=4, clip_on=False, zorder=3)
+        axes.plot([low, high], [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
+    if np.isfinite(median.value):
+        at = axis.placed(median.value)
+        axes.plot(
+            [at, at], [height - 0.13, height + 0.13], color="black", linewidth=2.0, solid_capstyle="butt", zorder=4
+        )
+
+
+def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
+    cells = (
+        with_interval(row.median),
+        f"{row.detected} of {row.contacts}",
+        str(row.missed),
+        str(row.not_assessable),
+        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
+        *impact_free,
+    )
+    loud = [False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0]
+    table.write_row(axes, place, cells, [*loud, *(not cell.startswith(("0 ", NOTHING)) for cell in impact_free)])
+
+
+def _count(item: Summary) -> str:
+    """False alarms; a dash where the detector could judge nothing."""
+    return f"{item.false_alarms} in {item.operations} op." if item.hours > 0.0 else NOTHING
+
+
+def _explained(marks: Sequence[_Marks], axis: _Axis) -> str:
+    below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
+    missed = any(len(item.missed) for item in marks)
+    lines = [f"latency from contact onset to alarm [ms]{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
+    lines.append(f"mark: one contact{', open where it was missed: watched up to there' if missed else ''}")
+    if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
+        lines[-1] += f" ({_MOST_MARKS} at most are drawn)"
+    lines.append(f"black: median and its 95 % interval{', missed contacts counted as later' if missed else ''}")
+    return "\n".join(lines)

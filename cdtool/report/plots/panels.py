@@ -1,0 +1,192 @@
+"""The marks that figures over time share: signal with its band, what is not judged, force, trigger, onset and alarm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdtool.detection import REASONS, Alarm, Status
+from cdtool.evaluation.traces.decimation import decimate, kept_samples
+from cdtool.evaluation.traces.trace import Course, Span
+from cdtool.pipeline import Detection
+from cdtool.recording import BoolArray, FloatArray
+from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, ONSET_DASHES, UNJUDGED, look_of
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+_PIXELS = 1000
+
+
+class Legend:
+    """The kinds of marks that a figure holds, each once and in a fixed order."""
+
+    def __init__(self, detector: str | None) -> None:
+        self._detector = detector
+        self._seen: set[str] = set()
+
+    def add(self, kind: str) -> None:
+        """Note that a kind of mark is drawn."""
+        self._seen.add(kind)
+
+    def handles(self) -> list[Artist]:
+        """One handle a kind."""
+        from matplotlib.lines import Line2D
+        from matplotlib.patches import Patch
+
+        colour = look_of(self._detector).colour if self._detector else "0.35"
+        known: dict[str, Artist] = {
+            "signal": Line2D([], [], color=colour, label="signal"),
+            "limit": Line2D([], [], color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, label="limit"),
+            "band": Patch(facecolor=BAND, edgecolor="none", label="normal band"),
+            "onset": Line2D([], [], color=FORCE, linestyle=ONSET_DASHES, linewidth=1.0, label="contact onset"),
+            "alarm": Line2D([], [], color=colour, linewidth=2.2, label="alarm"),
+            "trigger": Patch(facecolor=colour, alpha=0.25, edgecolor="none", label="trigger on"),
+        }
+        for code, reason in REASONS.items():
+            known[reason] = Patch(
+                facecolor="white", edgecolor=UNJUDGED, hatch=HATCHES[Status(code)], label=f"not assessable: {reason}"
+            )
+        return [handle for kind, handle in known.items() if kind in self._seen]
+
+
+def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: Legend) -> None:
+    """Signal, limits and normal band of one joint within `span` [s], and where it is not judged."""
+    part = course.within(span)
+    if not len(part.time):
+        return
+    judged = part.status == 0
+    axes.plot(*decimate(part.time, part.value, _PIXELS), color=UNJUDGED, linewidth=0.8, zorder=2)
+    value = np.where(judged, part.value, np.nan)
+    axes.plot(*decimate(part.time, value, _PIXELS), color=look_of(detector).colour, zorder=3)
+    legend.add("signal")
+    _draw_band(axes, part.time, part.lower, part.upper, judged, legend)
+    _draw_unjudged(axes, part.time, part.status, span, legend)
+
+
+def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: float) -> None:
+    """Set the vertical range: all limits and judged values within `span`, excursions up to `headroom` bands beyond."""
+    values, normal, limits = [], [], []
+    for course in courses:
+        part = course.within(span)
+        judged = part.value[part.status == 0]
+        values.append(judged if len(judged) else part.value)
+        if not len(judged):
+            normal.append(part.value)
+        normal.append(part.value[(part.value >= part.lower) & (part.value <= part.upper) & (part.status == 0)])
+        limits += [part.lower, part.upper]
+    inside, bounds = _finite(values), _finite([*normal, *limits])
+    if not len(inside) and not len(bounds):
+        return
+    everything = np.concatenate((inside, bounds))
+    low, high = float(everything.min()), float(everything.max())
+    if len(bounds):
+        near, far = float(bounds.min()), float(bounds.max())
+        room = headroom * max(far - near, 1e-12)
+        low, high = max(low, near - room), min(high, far + room)
+    margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
+    axes.set_ylim(low - margin, high + margin)
+
+
+def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, contact: bool) -> None:
+    """The load cell (n,) over time (n,) [s]; without a contact its noise is kept small."""
+    axes.margins(y=0.06 if contact else 1.2)
+    part = (time >= span[0]) & (time <= span[1])
+    if part.any():
+        axes.plot(*decimate(time[part], force[part], _PIXELS), color=FORCE, linewidth=0.9)
+
+
+def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str) -> None:
+    """0, and 1 from the first alarm of an operation to its end; nothing where a detector could judge nothing."""
+    for detection in detections:
+        time = detection.statistic.time
+        if not len(time) or detection.verdict.outcome == "not assessable":
+            continue
+        steps: list[Span] = [(float(time[0]), 0.0), (float(time[-1]), 0.0)]
+        if detection.verdict.alarms:
+            at = detection.verdict.alarms[0].time
+            steps = [steps[0], (at, 0.0), (at, 1.0), (float(time[-1]), 1.0)]
+        axes.plot(*zip(*steps, strict=True), color=colour, linewidth=1.6)
+    axes.set_ylim(-0.2, 1.3)
+    axes.set_yticks([0, 1])
+
+
+def draw_onset(axes: Axes, time: float, legend: Legend) -> None:
+    """The line of a contact's onset."""
+    axes.axvline(time, color=FORCE, linestyle=ONSET_DASHES, linewidth=1.0, zorder=4)
+    legend.add("onset")
+
+
+def draw_alarm(axes: Axes, alarm: Alarm, colour: str, legend: Legend) -> None:
+    """The line of an alarm."""
+    axes.axvline(alarm.time, color=colour, linewidth=2.2, zorder=4, alpha=0.9)
+    legend.add("alarm")
+
+
+def count_from(axes: Axes, zero: float, step: float) -> None:
+    """Write the time axis as milliseconds from `zero` [s], with a tick every `step` [s]."""
+    from matplotlib.ticker import MultipleLocator
+
+    axes.xaxis.set_major_locator(MultipleLocator(step, offset=zero))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{1e3 * (value - zero):.0f}".replace("-", "−"))
+
+
+def stretches(mask: BoolArray, time: FloatArray, closer: float) -> list[Span]:
+    """Where `mask` holds, each sample up to the next; stretches that lie `closer` than that [s] are drawn as one."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    found: list[Span] = []
+    for first, after in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        start, end = float(time[first]), float(time[min(after, len(time) - 1)])
+        if end <= start:
+            continue
+        if found and start - found[-1][1] < closer:
+            found[-1] = (found[-1][0], end)
+        else:
+            found.append((start, end))
+    return found
+
+
+def _draw_band(
+    axes: Axes, time: FloatArray, lower: FloatArray, upper: FloatArray, judged: BoolArray, legend: Legend
+) -> None:
+    edge_low, edge_high = axes.get_ylim()
+    for limit in (lower, upper):
+        finite = np.where(np.isfinite(limit), limit, np.nan)
+        if np.isfinite(finite).any():
+            axes.plot(*decimate(time, finite, _PIXELS), color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=3)
+            legend.add("limit")
+    if not ((np.isfinite(lower) | np.isfinite(upper)) & judged).any():
+        return
+    low = np.where(np.isneginf(lower), edge_low, lower)
+    low[~judged] = np.nan
+    high = np.where(np.isposinf(upper), edge_high, upper)
+    kept = np.union1d(kept_samples(time, low, _PIXELS), kept_samples(time, high, _PIXELS))
+    axes.fill_between(time[kept], low[kept], high[kept], color=BAND, linewidth=0, zorder=1)
+    legend.add("band")
+
+
+def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span, legend: Legend) -> None:
+    for code, reason in REASONS.items():
+        column = (span[1] - span[0]) / _PIXELS
+        found = [item for item in stretches(status == code, time, column) if item[1] - item[0] > 2.0 * column]
+        if not found:
+            continue
+        axes.broken_barh(
+            [(start, end - start) for start, end in found],
+            (0.0, 1.0),
+            transform=axes.get_xaxis_transform(),
+            facecolor="none",
+            edgecolor=UNJUDGED,
+            linewidth=0.0,
+            hatch=HATCHES[Status(code)],
+            zorder=0.5,
+        )
+        legend.add(reason)
+
+
+def _finite(parts: Sequence[FloatArray]) -> FloatArray:
+    joined = np.concatenate(parts) if parts else np.empty(0)
+    return joined[np.isfinite(joined)]

@@ -1,0 +1,104 @@
+"""Figures in columns right of a panel: what its marks have to be read beside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cdtool.report.plots.style import look_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ROW = 12.5
+_SIZE, _HEADING_SIZE = 8, 7.5
+_INDENT = 12.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """A heading of one or two lines, and how wide the column is [points]; `left`: its texts begin at its left edge."""
+
+    heading: str
+    width: float
+    left: bool = False
+
+
+@dataclass(frozen=True)
+class SideTable:
+    """Columns right of the panels of a figure, the first one `gap` [points] from their edge."""
+
+    columns: Sequence[Column]
+    gap: float = 10.0
+
+    @property
+    def width(self) -> float:
+        """Room for all of it [inch]."""
+        return (self.gap + sum(column.width for column in self.columns)) / 72.0
+
+    def write_headings(self, axes: Axes) -> None:
+        """The headings above the panel's upper edge."""
+        for i, column in enumerate(self.columns):
+            self._write(axes, i, column.heading, "axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE)
+
+    def write_row(self, axes: Axes, y: float, cells: Sequence[str], loud: Sequence[bool]) -> None:
+        """A row at height `y` of the panel's own scale; `loud` cells are bold."""
+        for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
+            self._write(axes, i, cell, axes.get_yaxis_transform(), y, 0.0, "center", _SIZE, bold)
+
+    def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
+        """A row counted from the panel's upper edge, the detector's mark before it."""
+        from matplotlib.lines import Line2D
+        from matplotlib.transforms import ScaledTranslation
+
+        lift = -_ROW * (row + 0.5)
+        look, figure = look_of(detector), axes.figure
+        moved = ScaledTranslation((self.gap + 0.35 * _INDENT) / 72.0, lift / 72.0, figure.dpi_scale_trans)
+        mark = Line2D(
+            [1.0],
+            [1.0],
+            transform=axes.transAxes + moved,
+            color=look.colour,
+            marker=look.marker,
+            markersize=5.5,
+            linestyle="none",
+            clip_on=False,
+        )
+        axes.add_line(mark)
+        for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
+            self._write(axes, i, cell, "axes fraction", 1.0, lift, "center", _SIZE, bold, _INDENT if i == 0 else 0.0)
+
+    def _write(
+        self,
+        axes: Axes,
+        number: int,
+        text: str,
+        across: object,
+        y: float,
+        lift: float,
+        side: str,
+        size: float,
+        bold: bool = False,
+        indent: float = 0.0,
+    ) -> None:
+        column = self.columns[number]
+        before = self.gap + sum(item.width for item in self.columns[:number])
+        offset = before + (indent if column.left else 0.5 * column.width)
+        axes.annotate(
+            text,
+            (1.0, y),
+            xycoords=across,  # type: ignore[arg-type]
+            xytext=(offset, lift),
+            textcoords="offset points",
+            ha="left" if column.left else "center",
+            va=side,
+            fontsize=size,
+            fontweight="bold" if bold else "normal",
+            annotation_clip=False,
+        )
+
+
+def key_height(rows: int) -> float:
+    """Room for so many rows of a key [inch]."""
+    return _ROW * rows / 72.0

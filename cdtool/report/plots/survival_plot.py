@@ -1,0 +1,155 @@
+"""Share of the contacts that are still undetected over time: a panel a group, a step curve a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.summary import Summary
+from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
+from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
+from cdtool.report.plots.side_table import Column, SideTable, key_height
+from cdtool.report.plots.style import look_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_FIGURES = (
+    Column("median\n[ms]", 62),
+    Column("detected", 66),
+    Column("missed", 38),
+    Column("not\nassessable", 50),
+    Column("false\nalarms", 34),
+)
+_NAME = 24
+_PANEL = 1.75
+# With more curves their bands would hide each other.
+_MOST_BANDS = 3
+_MARKS = 6
+_MOST_CENSORED = 200
+
+
+def plot_survival(evaluated: Evaluated, path: Path) -> None:
+    """Draw a panel a group; raises UsageError, CdtoolError (see `save`).
+
+    A missed contact leaves its curve where it was last watched: a curve that ends above 0 never detects that share.
+    """
+    with drawing():
+        save(_figure(evaluated), path)
+
+
+def _figure(evaluated: Evaluated) -> Figure:
+    curves = survival_curves(evaluated.results)
+    groups = list(dict.fromkeys(item.group for item in curves))
+    if not groups:
+        figure = new_figure(9.0, 1.2)
+        figure.text(0.5, 0.5, "no contact in any group: no share of them to show", ha="center", va="center")
+        return figure
+    summaries = {(item.detector, item.group): item for item in evaluated.summaries}
+    name = 72.0 * text_width([label(item.detector, _NAME) for item in curves], 8) + 20.0
+    table = SideTable((Column("", name, left=True), *_FIGURES))
+    panels_of = {group: [item for item in curves if item.group == group] for group in groups}
+    heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in panels_of.values()]
+    margins = Margins(0.75, table.width + 0.1, 0.5, 0.7)
+    figure, panels = stacked_panels(margins.left + 4.6 + margins.right, heights, margins, gap=0.36)
+    low, high, logarithmic = latency_range(_times(curves))
+    high = max([high, *(item.end for item in curves)])
+    set_latency_scale(panels[-1], low, high, logarithmic)
+    for axes, (group, items) in zip(panels, panels_of.items(), strict=True):
+        _draw_group(axes, items, low, high)
+        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        for row, item in enumerate(_by_median(items, summaries)):
+            _write_row(table, axes, row, item)
+    table.write_headings(panels[0])
+    panels[-1].set_xlabel(_explained(panels_of.values()), linespacing=1.4)
+    return figure
+
+
+def _times(curves: Sequence[SurvivalCurve]) -> np.ndarray:
+    """When contacts were detected; where none was, when the watching ended."""
+    steps = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
+    times = np.concatenate(steps)
+    return times if len(times) else np.array([item.end for item in curves if item.end > 0.0])
+
+
+def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], low: float, high: float) -> None:
+    seen = [item for item in curves if item.contacts > item.not_assessable]
+    for item in seen:
+        _draw_curve(axes, item, low, banded=len(seen) <= _MOST_BANDS)
+    axes.set_ylim(0.0, 1.06)
+    axes.set_xlim(low, high)
+    axes.set_yticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
+    axes.set_ylabel("still undetected")
+    axes.grid(color="0.9", linewidth=0.6)
+    if not seen:
+        axes.text(0.5, 0.5, "not assessable", transform=axes.transAxes, ha="center", va="center", fontsize=9)
+
+
+def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) -> None:
+    look, curve = look_of(item.detector), item.curve
+    # A logarithmic axis has no 0: the curve begins at its left edge.
+    times = np.maximum(np.append(curve.times, item.end), low)
+    share, below, above = (np.append(line, line[-1]) for line in (curve.share, curve.low, curve.high))
+    axes.step(times, share, where="post", color=look.colour, linewidth=1.4, zorder=3)
+    if banded:
+        axes.fill_between(times, below, above, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=1)
+    falls = np.flatnonzero(np.diff(curve.share) < 0.0) + 1
+    shown = falls[np.linspace(0, len(falls) - 1, min(_MARKS, len(falls))).astype(int)] if len(falls) else falls
+    axes.plot(
+        times[shown],
+        curve.share[shown],
+        look.marker,
+        color=look.colour,
+        markersize=4.5,
+        linestyle="none",
+        zorder=4,
+        clip_on=False,
+    )
+    missed = np.unique(item.missed)[:_MOST_CENSORED]
+    left = curve.share[np.searchsorted(curve.times, missed, side="right") - 1]
+    axes.plot(
+        np.maximum(missed, low),
+        left,
+        look.marker,
+        markerfacecolor="white",
+        markeredgecolor=look.colour,
+        markersize=5.5,
+        linestyle="none",
+        zorder=5,
+        clip_on=False,
+    )
+
+
+def _by_median(curves: Sequence[SurvivalCurve], summaries: dict[tuple[str, str], Summary]) -> list[Summary]:
+    """The fastest first; those without a median last."""
+    rows = [summaries[item.detector, item.group] for item in curves]
+    return sorted(rows, key=lambda row: np.nan_to_num(row.median.value, nan=np.inf, posinf=1e12))
+
+
+def _write_row(table: SideTable, axes: Axes, place: int, row: Summary) -> None:
+    cells = (
+        label(row.detector, _NAME),
+        number(row.median.value),
+        f"{row.detected} of {row.contacts}",
+        str(row.missed),
+        str(row.not_assessable),
+        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
+    )
+    loud = (False, False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
+    table.write_key(axes, place, row.detector, cells, loud)
+
+
+def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
+    words = []
+    if any(len(item.missed) for items in panels for item in items):
+        words.append("open mark: missed, watched up to there")
+    if any(sum(item.contacts > item.not_assessable for item in items) <= _MOST_BANDS for items in panels):
+        words.append("band: 95 % at each time")
+    return "\n".join(["time from contact onset [ms]", "; ".join(words)]).rstrip()

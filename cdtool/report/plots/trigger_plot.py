@@ -1,0 +1,176 @@
+"""All detectors under one load-cell curve: who raises an alarm when (thesis figures 5.7 and 5.8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
+from cdtool.report.plots.figures import Margins, drawing, label, save, stacked_panels, text_width, unit_label
+from cdtool.report.plots.panels import Legend, count_from, draw_force, draw_onset, draw_signal, frame_signal
+from cdtool.report.plots.style import look_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
+_WIDTH = 9.0
+_FORCE, _ROW = 0.98, 0.66
+_NAME_SIZE, _VERDICT_SIZE, _DETAIL_SIZE = 9, 10, 8
+# From the axis to a row's name, with the numbers of its ticks between them; from the axis to a verdict [points].
+_TICKS, _AWAY = 44.0, 8.0
+_LEGEND_COLUMNS, _LEGEND_ROW = 4, 0.18
+
+
+def plot_triggers(trace: Trace, path: Path) -> None:
+    """Draw the load cell with the contact's onset, below it a row a detector, the fastest first.
+
+    Raises UsageError, CdtoolError (see `save`).
+    """
+    with drawing():
+        save(_figure(trace), path)
+
+
+def _figure(trace: Trace) -> Figure:
+    contact = trace.shown
+    rows = sorted(trace.panels, key=lambda row: (_late(trace, row), contact is not None and _blind(trace, row)))
+    forced = len(trace.force) > 0
+    heights = [_FORCE] * forced + [_ROW] * len(rows)
+    figure, panels = stacked_panels(_WIDTH, heights, _margins(trace, rows), gap=0.14)
+    legend = Legend(None)
+    if forced:
+        draw_force(panels[0], trace.force_time, trace.force, trace.view, contact=contact is not None)
+        panels[0].locator_params(axis="y", nbins=4)
+        _name(panels[0], "load cell\n[N]")
+    for axes, row in zip(panels[int(forced) :], rows, strict=True):
+        _draw_row(axes, trace, row, trace.view, legend)
+    for axes in panels:
+        if contact:
+            draw_onset(axes, contact.start, legend)
+    panels[-1].set_xlim(trace.view)
+    panels[-1].set_xlabel("time from contact onset [ms]" if contact else "time [s]")
+    if contact:
+        step = next((step for step in _STEPS if (trace.view[1] - trace.view[0]) / step <= 12), _STEPS[-1])
+        count_from(panels[-1], contact.start, step)
+    height = figure.get_figheight()
+    figure.text(0.01, 1.0 - 0.06 / height, _title(trace), fontsize=10, ha="left", va="top")
+    figure.legend(handles=legend.handles(), loc="lower left", ncols=_LEGEND_COLUMNS, borderaxespad=0.2)
+    return figure
+
+
+def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
+    """Room for the names at the left, the verdicts at the right, and a legend of as many rows as there may be."""
+    names = [_row_name(trace, row) for row in rows]
+    verdicts = [_verdict(trace, row) for row in rows]
+    verdict = text_width([words for words, _ in verdicts], _VERDICT_SIZE)
+    # Bold letters are wider than those that are measured.
+    right = max(1.2 * verdict, text_width([detail for _, detail in verdicts], _DETAIL_SIZE))
+    left = text_width([*names, "load cell"], _NAME_SIZE) + _TICKS / 72.0
+    kinds = 5 + len({code for row in rows for code in row.course.within(trace.view).status.tolist() if code})
+    return Margins(
+        left + 0.08, right + _AWAY / 72.0 + 0.1, 0.34, 0.52 + _LEGEND_ROW * math.ceil(kinds / _LEGEND_COLUMNS)
+    )
+
+
+def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) -> None:
+    frame_signal(axes, [row.course], span, headroom=1.5)
+    draw_signal(axes, row.course, row.detector, span, legend)
+    axes.locator_params(axis="y", nbins=3)
+    colour = look_of(row.detector).colour
+    trigger = _trigger(trace, row)
+    if trigger is not None:
+        axes.axvspan(trigger, span[1], color=colour, alpha=0.25, linewidth=0, zorder=1.5)
+        axes.axvline(trigger, color=colour, linewidth=2.2, zorder=4)
+        legend.add("trigger")
+    _name(axes, _row_name(trace, row))
+    verdict, detail = _verdict(trace, row)
+    axes.annotate(
+        verdict,
+        (1.0, 0.5),
+        xycoords="axes fraction",
+        xytext=(_AWAY, 0),
+        textcoords="offset points",
+        va="bottom" if detail else "center",
+        fontsize=_VERDICT_SIZE,
+        fontweight="bold",
+    )
+    axes.annotate(
+        detail,
+        (1.0, 0.5),
+        xycoords="axes fraction",
+        xytext=(_AWAY, -3),
+        textcoords="offset points",
+        va="top",
+        fontsize=_DETAIL_SIZE,
+    )
+
+
+def _seen(trace: Trace, row: Panel) -> Seen | None:
+    return row.seen[trace.contact] if trace.contact >= 0 else None
+
+
+def _late(trace: Trace, row: Panel) -> float:
+    seen = _seen(trace, row)
+    return seen.late if seen and seen.outcome == "detected" else math.inf
+
+
+def _trigger(trace: Trace, row: Panel) -> float | None:
+    """When the trigger rises [s]: the contact's alarm, or the first one of a run without contacts."""
+    seen = _seen(trace, row)
+    if seen:
+        return seen.alarm if seen.outcome == "detected" else None
+    return row.alarms[0] if row.alarms else None
+
+
+def _blind(trace: Trace, row: Panel) -> bool:
+    seen = _seen(trace, row)
+    return seen.outcome == "not_assessable" if seen else row.blind
+
+
+def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
+    seen = _seen(trace, row)
+    if _blind(trace, row):
+        reason = (seen.reason if seen else "") or row.reason
+        return "not assessable", fill(label(reason, 66), 24, break_on_hyphens=False)
+    count = len(row.false_alarms)
+    false = f"{count} false {'alarm' if count == 1 else 'alarms'}" if count else ""
+    if seen is None:
+        return (false or "no alarm"), ""
+    if seen.outcome == "detected":
+        return f"{1e3 * seen.late:.0f} ms", false
+    return "missed", false
+
+
+def _row_name(trace: Trace, row: Panel) -> str:
+    joint = f" {label(row.joint, 14)}" if trace.joints > 1 else ""
+    return f"{label(row.detector, 24)}\n[{unit_label(row.unit)}]{joint}"
+
+
+def _name(axes: Axes, text: str) -> None:
+    """Names in one line below each other, whatever the numbers beside them."""
+    axes.annotate(
+        text,
+        (0.0, 0.5),
+        xycoords="axes fraction",
+        xytext=(-_TICKS, 0),
+        textcoords="offset points",
+        ha="right",
+        va="center",
+        fontsize=_NAME_SIZE,
+    )
+
+
+def _title(trace: Trace) -> str:
+    words = [f"{label(trace.group, 40)}  ·  {label(trace.recording, 50)}"]
+    contact = trace.shown
+    if contact is None:
+        words.append("no contact")
+    elif len(trace.contacts) > 1:
+        words.append(f"contact {trace.contact + 1} of {len(trace.contacts)}")
+    if contact and math.isfinite(contact.peak_force):
+        words.append(f"peak {contact.peak_force:.0f} N")
+    return "  ·  ".join(words)

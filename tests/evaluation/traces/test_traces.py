@@ -1,0 +1,111 @@
+"""Traces: what is kept of an operation, which operations, and the file beside results.json."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.traces.choice import MOST_KEPT, TraceChoice
+from cdtool.evaluation.traces.file import encode_traces, read_traces
+from cdtool.evaluation.traces.trace import Trace, make_trace
+from cdtool.evaluation.truth.matching import match
+from cdtool.recording import Contact, Series
+from tests.evaluation.test_sweep import OPERATION, TIME, detection
+
+CONTACT = Contact(3.0, 3.2, 0.005, 900.0)
+
+
+def trace(seed: int = 1, why: str = "sample") -> Trace:
+    found = detection(seed)
+    force = Series(TIME, np.where((TIME > 3.0) & (TIME < 3.2), 900.0, 0.0) + 0.01 * np.sin(40.0 * TIME), "N")
+    recording = replace(OPERATION.recording, channels={**OPERATION.recording.channels, "force": force})
+    operation = replace(OPERATION, recording=recording)
+    matching = match(found.verdict, [CONTACT], found.statistic)
+    return make_trace("stiff", operation, [CONTACT], [found], [matching], [["because"]], why)
+
+
+def test_a_trace_keeps_extremes_the_view_and_what_became_of_the_contact():
+    kept, found = trace(), detection(1)
+    (panel,) = kept.panels
+    assert len(panel.course.time) <= 4 * (200 + 250) < len(TIME)
+    column = found.statistic.joints.index(panel.joint)
+    assert panel.course.value.max() == found.statistic.values[:, column].max()
+    assert kept.view[0] < 3.0 < kept.view[1] and kept.shown == CONTACT
+    assert panel.seen[0].outcome == "detected" and panel.seen[0].late == pytest.approx(panel.seen[0].alarm - 3.0)
+    assert kept.force.max() == pytest.approx(900.0, abs=0.02) and panel.why == ("because",)
+
+
+def test_traces_survive_writing_and_reading_within_a_pixel_and_give_the_same_bytes_again(tmp_path):
+    kept = trace()
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(encode_traces([kept]))
+    (again,) = read_traces(path)
+    course, read = kept.panels[0].course, again.panels[0].course
+    span = np.ptp(course.value)
+    np.testing.assert_allclose(read.value, course.value, atol=2e-4 * span)
+    np.testing.assert_allclose(read.time, course.time, atol=1e-5)
+    np.testing.assert_array_equal(read.status, course.status)
+    np.testing.assert_array_equal(np.isnan(read.upper), np.isnan(course.upper))
+    assert again.contacts == kept.contacts and again.panels[0].seen == kept.panels[0].seen
+    assert encode_traces([again]) == path.read_bytes()
+
+
+def test_what_is_above_a_limit_stays_above_it_and_no_limit_stays_none(tmp_path):
+    kept = trace()
+    course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))
+    one_sided = replace(kept, panels=(replace(kept.panels[0], course=course),))
+    path = tmp_path / "t.json.gz"
+    path.write_bytes(encode_traces([one_sided]))
+    read = read_traces(path)[0].panels[0].course
+    assert np.isneginf(read.lower).all()
+    clear = np.abs(course.value - course.upper) > 1e-3 * np.ptp(course.value)
+    np.testing.assert_array_equal((read.value > read.upper)[clear], (course.value > course.upper)[clear])
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"not gzip", gzip.compress(b"{}"), gzip.compress(b'{"schema_version": 7, "traces": []}')]
+)
+def test_what_is_no_traces_file_is_one_clear_error(tmp_path, content):
+    path = tmp_path / "t.json.gz"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"t\.json\.gz"):
+        read_traces(path)
+
+
+def test_the_file_is_strict_json_whatever_the_detector_could_not_judge(tmp_path):
+    text = gzip.decompress(encode_traces([trace()])).decode()
+    json.loads(text, parse_constant=lambda name: pytest.fail(name))
+
+
+def choose(outcomes: list[tuple[str, float]], work: int | None = None) -> tuple[Trace, ...]:
+    choice = TraceChoice(work or len(outcomes))
+    base = trace()
+    for number, (striking, slowest) in enumerate(outcomes):
+        choice.offer(
+            number, "stiff", 1, striking, slowest, lambda why, n=number: replace(base, recording=str(n), chosen=why)
+        )
+    return choice.kept()
+
+
+def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
+    outcomes = [("missed by gm" if i % 500 == 7 else "", float(i % 997)) for i in range(3000)]
+    kept = choose(outcomes)
+    numbers = [int(item.recording) for item in kept]
+    assert numbers == sorted(numbers) and len(kept) <= MOST_KEPT + 1
+    assert {7, 507, 1007, 1507, 2007, 2507} <= set(numbers)
+    slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
+    assert set(slowest) <= set(numbers)
+    assert sum(item.chosen == "taken evenly from all" for item in kept) == 20
+
+
+def test_more_misses_than_there_is_room_for_are_counted():
+    choice = TraceChoice(500)
+    base = trace()
+    for number in range(500):
+        choice.offer(number, "stiff", 1, "missed by gm", 0.0, lambda why: replace(base, chosen=why))
+    assert len(choice.kept()) <= MOST_KEPT and choice.left_out == 500 - 70

@@ -1,0 +1,88 @@
+"""The onset rule on load-cell curves whose onset is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.recording import Recording, Series
+
+TIME = np.arange(4000) * 1e-3
+GATE_RULE = OnsetRule(above=20.0, back_to=8.0)
+
+
+def recording(force: np.ndarray, channel: str = "force") -> Recording:
+    return Recording("r", "r", ("axis",), {channel: Series(TIME, force, "N")})
+
+
+def ramp(start: float, slope: float, noise: float = 0.0, offset: float = 0.0, end: float = 9.0) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    force = slope * np.clip(TIME - start, 0.0, 1.0) * (end > TIME)
+    return offset + force + noise * rng.normal(size=len(TIME))
+
+
+def test_the_onset_is_where_the_force_left_the_lower_level():
+    (contact,) = find_contacts(recording(ramp(2.0, 1000.0)), GATE_RULE)
+    assert contact.start == pytest.approx(2.0085, abs=6e-4)  # the first sample above 8 N
+    assert contact.uncertainty == pytest.approx(0.0005 + 0.0125, abs=6e-4)
+    assert contact.peak_force == pytest.approx(1000.0)
+
+
+def test_an_offset_and_a_negative_load_cell_do_not_matter():
+    for sign in (1.0, -1.0):
+        (contact,) = find_contacts(recording(sign * ramp(2.0, 1000.0, noise=1.0, offset=300.0)), GATE_RULE)
+        assert contact.start == pytest.approx(2.008, abs=0.003)
+
+
+def test_without_levels_they_come_from_the_noise():
+    (contact,) = find_contacts(recording(ramp(2.0, 5000.0, noise=1.0)), OnsetRule())
+    assert contact.start == pytest.approx(2.001, abs=0.002)
+
+
+def test_noise_alone_is_no_contact():
+    assert find_contacts(recording(ramp(9.0, 0.0, noise=1.0)), OnsetRule()) == []
+    assert find_contacts(recording(np.zeros(4000)), OnsetRule()) == []
+
+
+def test_a_rebound_is_the_same_contact_and_a_later_touch_another():
+    force = np.where(
+        (TIME > 1.0) & (TIME < 1.2) | (TIME > 1.7) & (TIME < 1.8) | (TIME > 3.0) & (TIME < 3.1), 100.0, 0.0
+    )
+    contacts = find_contacts(recording(force), GATE_RULE)
+    assert [contact.start for contact in contacts] == pytest.approx([1.001, 3.001])
+    assert contacts[0].end == pytest.approx(1.799)
+
+
+def test_a_contact_from_the_first_sample_on_is_found():
+    force = np.full(4000, 0.0)
+    force[:1] = 0.0
+    force[1:600] = 500.0
+    assert len(find_contacts(recording(force), GATE_RULE)) == 1
+
+
+def test_labels_serve_where_there_is_no_load_cell():
+    label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
+    (contact,) = find_contacts(recording(label, "label"), GATE_RULE)
+    assert (contact.start, contact.end) == (pytest.approx(1.001), pytest.approx(1.5))
+    assert contact.found_by == "label"
+
+
+def test_events_mark_the_beginning_of_contacts_and_a_rebound_is_none():
+    times = np.array([1.0, 1.2, 5.0, 6.5])
+    events = Recording("r", "r", ("a",), {"event": Series(times, np.array([1.0, 1.0, 0.0, 2.0]), "1")})
+    contacts = find_contacts(events, GATE_RULE)
+    assert [(item.start, item.found_by) for item in contacts] == [(1.0, "event"), (6.5, "event")]
+
+
+def test_without_any_ground_truth_the_error_says_what_to_map():
+    with pytest.raises(RecordingError, match="force"):
+        find_contacts(Recording("r", "r", ("a",), {"speed": Series(TIME, TIME, "m/s")}), GATE_RULE)
+
+
+def test_missing_load_cell_samples_are_skipped():
+    force = ramp(2.0, 1000.0)
+    force[1000:1500] = np.nan
+    (contact,) = find_contacts(recording(force), GATE_RULE)
+    assert contact.start == pytest.approx(2.0085, abs=6e-4)

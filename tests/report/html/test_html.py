@@ -1,0 +1,365 @@
+"""The HTML report is one harmless file that holds every figure."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import math
+import re
+from dataclasses import dataclass, field, replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.results import ContactResult, RecordingResult, Results
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.traces.file import NO_LIMIT
+from cdtool.plain_text import plain
+from cdtool.report.figure_text import number, percent, with_interval
+from cdtool.report.html.page import to_html
+from cdtool.report.html.plots import css_colour
+from cdtool.report.html.recordings import log_of
+from cdtool.report.html.tables import interval_cell
+from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
+from cdtool.report.plots.style import BAND, LIMIT, UNJUDGED, look_of
+from tests.report.hostile import HOSTILE
+from tests.report.html.html_case import case, trace_of
+
+VOID = {"meta", "br", "input", "link", "img", "hr"}
+TAGS = {
+    *("html", "head", "meta", "title", "style", "body", "header", "main", "nav", "section", "h1", "h2", "h3", "p", "a"),
+    *("strong", "small", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "svg"),
+    *("span", "ul", "details", "summary", "noscript", "script", "button"),
+}
+ATTRIBUTES = {
+    *("lang", "charset", "http-equiv", "content", "name", "id", "class", "href", "type", "hidden", "open", "title"),
+    *("role", "aria-label", "tabindex", "scope", "height", "data-key", "data-table", "data-plot", "data-number"),
+    *("data-for", "data-do"),
+}
+
+
+@dataclass
+class Page(HTMLParser):
+    """Tags with their attributes in order, scripts and styles, and the rows of tables by the table's id."""
+
+    tags: list[str] = field(default_factory=list)
+    attributes: list[tuple[str, str, str | None]] = field(default_factory=list)
+    scripts: list[tuple[dict[str, str | None], str]] = field(default_factory=list)
+    styles: list[str] = field(default_factory=list)
+    tables: dict[str, list[list[str]]] = field(default_factory=dict)
+    words: list[str] = field(default_factory=list)
+    open_tags: list[str] = field(default_factory=list)
+    cells: list[str] | None = None
+
+    def __post_init__(self) -> None:
+        HTMLParser.__init__(self)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag in VOID:
+            return
+        self.open_tags.append(tag)
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+        elif tag == "style":
+            self.styles.append("")
+        elif tag == "table":
+            self.rows = self.tables.setdefault(str(dict(attrs)["id"]), [])
+        elif tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open_tags.pop() == tag, f"{tag} closes another element"
+
+    def handle_data(self, data: str) -> None:
+        last = self.open_tags[-1] if self.open_tags else ""
+        if last == "script":
+            self.scripts[-1] = (self.scripts[-1][0], self.scripts[-1][1] + data)
+        elif last == "style":
+            self.styles[-1] += data
+        else:
+            self.words.append(data)
+            if "td" in self.open_tags or "th" in self.open_tags:
+                self.rows[-1][-1] += data
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return strict(next(text for attrs, text in self.scripts if attrs.get("id") == "data"))
+
+
+def strict(text: str) -> Any:
+    def refuse(name: str) -> float:
+        raise AssertionError(f"{name} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def parsed(text: str) -> Page:
+    page = Page()
+    page.feed(text)
+    page.close()
+    assert not page.open_tags
+    return page
+
+
+@pytest.fixture(scope="module")
+def made() -> tuple[Evaluated, str]:
+    evaluated, traces = case()
+    return evaluated, to_html(evaluated, traces)
+
+
+@pytest.fixture(scope="module")
+def page(made) -> Page:
+    return parsed(made[1])
+
+
+def test_the_page_loads_nothing_and_has_no_handlers_or_style_attributes(made, page):
+    assert made[1].startswith('<!DOCTYPE html>\n<html lang="en">')
+    assert set(page.tags) <= TAGS
+    assert {name for _, name, _ in page.attributes} <= ATTRIBUTES
+    links = [value for _, name, value in page.attributes if name == "href"]
+    ids = {value for _, name, value in page.attributes if name == "id"}
+    assert links and all(link and link[0] == "#" and link[1:] in ids for link in links)
+    assert "http:" not in re.sub(r"http://www\.w3\.org/2000/svg", "", made[1])
+    assert "https:" not in made[1]
+
+
+def test_the_policy_allows_this_script_and_this_style_alone(page):
+    policy = next(
+        value for tag, name, value in page.attributes if (tag, name) == ("meta", "content") and "src" in value
+    )
+    run = [text for attrs, text in page.scripts if attrs.get("type") is None]
+    assert len(run) == 1 and len(page.styles) == 1
+    for kind, text in (("script", run[0]), ("style", page.styles[0])):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}';" in policy
+    assert policy.startswith("default-src 'none';")
+    assert "unsafe" not in policy
+
+
+def test_every_other_script_is_a_block_of_strict_json(made, page):
+    _, traces = case()
+    blocks = [(attrs, text) for attrs, text in page.scripts if attrs.get("type") == "application/json"]
+    assert [attrs.get("class") for attrs, _ in blocks] == [None, *["trace"] * len(traces)]
+    assert len(page.scripts) == len(blocks) + 1
+    for _, text in blocks:
+        assert isinstance(strict(text), dict)
+        assert not set("<>&\u2028\u2029") & set(text)
+
+
+def test_the_same_input_gives_the_same_bytes(made):
+    assert to_html(*case()) == made[1]
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_text_and_nothing_else(page, kind):
+    hostile = HOSTILE[kind]
+    # Names have to differ from one another, as those of detectors and groups do.
+    text = to_html(*case(lambda name: f"{hostile}{name}"))
+    found = parsed(text)
+    assert found.tags == page.tags
+    assert [name for _, name, _ in found.attributes if name != "class"] == [
+        name for _, name, _ in page.attributes if name != "class"
+    ]
+    assert all(character.isprintable() or character == "\n" for character in text)
+    assert found.data["detectors"][0]["name"] == plain(f"{hostile}quick")
+    assert found.data["recordings"][0] == plain(f"{hostile}stiff/{hostile}01.csv")
+    assert found.tables["figures-table"][1][0].split(" (")[0].strip() == plain(f"{hostile}quick").strip()
+
+
+def test_a_name_that_is_empty_can_still_be_seen():
+    evaluated, _ = case()
+    results = replace(evaluated.results, recordings=(RecordingResult("", "stiff", "", 1.0, 1, 0),))
+    found = parsed(to_html(evaluate(results), ()))
+    assert found.tables["recordings-table"][1][0] == "(no name)"
+
+
+def test_every_figure_of_the_summaries_is_in_the_table(made, page):
+    evaluated, _ = made
+    rows = page.tables["figures-table"][1:]
+    assert len(rows) == len(evaluated.summaries)
+    for row, item in zip(rows, evaluated.summaries, strict=True):
+        assert row[0].startswith(item.detector) and row[1] == item.group
+        for cell, figure in zip(row[2:6], (item.mean, item.std, item.median, item.p95), strict=True):
+            assert cell == with_interval(figure)
+        if item.contacts:
+            assert row[6] == f"{item.detected} of {item.contacts}"
+            assert row[7] == f"{item.missed} of {item.detected + item.missed} at most {percent(item.missed_at_most)}"
+            assert row[8] == str(item.not_assessable)
+            assert row[12].startswith(number(item.force_at_alarm)) and row[12].endswith(number(item.force_at_alarm_max))
+            assert row[13] == number(item.peak_force)
+        else:
+            assert set(row[2:9]) == {"–"}
+        assert row[9] == f"{item.false_alarms} in {item.operations} operations {number(item.hours)} h"
+        assert row[10].endswith(f"at most {number(item.at_most_per_hour)}")
+        assert row[11].endswith(f"at most {number(item.at_most_per_operation)}")
+
+
+def test_what_rounding_leaves_of_a_difference_is_written_as_zero():
+    assert interval_cell(Interval(-9.9e-14, -4.2222222, 6.3333333)).lines == "0.00\n(-4.22 to 6.33)"
+    assert interval_cell(Interval(0.002, math.nan, math.nan)).lines.startswith("0.00200")
+
+
+def test_misses_and_what_could_not_be_assessed_stand_beside_the_latencies(page):
+    slow = next(row for row in page.tables["figures-table"] if row[:2] == ["slow", "stiff"])
+    assert slow[6:9] == ["10 of 12", "1 of 11 at most 36 %", "1"]
+    assert "not reached" in slow[5]
+    lane = page.data["latency"][0]["rows"][1]
+    assert lane["counts"] == "10 detected, 1 missed, 1 not assessable"
+    assert lane["watched"] == [1000]
+
+
+def test_the_verdict_names_broken_limits_first_and_folds_those_that_are_kept(made, page):
+    outcomes = [row[0] for row in page.tables["limits-table"][1:]]
+    assert outcomes == ["broken"]
+    assert len(page.tables["kept-table"]) - 1 == len(made[0].results.limits) - 1
+    assert "1 of 8 limits not kept (1 broken)" in page.text
+    assert page.text.index("limits not kept") < page.text.index("Mean and std are those of the detected contacts")
+    assert "not a certificate" in page.text
+
+
+def test_without_limits_the_verdict_says_what_was_found():
+    evaluated, traces = case(limits=False)
+    found = parsed(to_html(evaluated, traces))
+    assert "No limits are set 24 contacts with 2 detectors: 44 detected, 2 missed, 2 not assessable" in found.text
+    assert "limits-table" not in found.tables
+
+
+def test_nothing_scored_is_said_and_makes_no_plots():
+    found = parsed(to_html(evaluate(Results({}, (), (), (), (), ())), ()))
+    assert "Nothing was scored." in found.text
+    assert "svg" not in found.tags
+    assert not found.tables
+
+
+def test_colours_are_those_of_the_figures(page):
+    looks = [(item["colour"], item["marker"]) for item in page.data["detectors"]]
+    assert looks == [(css_colour(look_of(name).colour), look_of(name).marker) for name in ("quick", "slow")]
+    for name, colour in (("band", BAND), ("limit", LIMIT), ("unjudged", UNJUDGED)):
+        assert f"--{name}: {css_colour(colour).lower()};" in page.styles[0]
+
+
+def test_survival_ends_at_the_share_that_was_missed(page):
+    group = page.data["survival"][0]
+    quick, slow = group["rows"]
+    assert quick["share"][0] == 1 and quick["share"][-1] == 0
+    assert slow["share"][-1] == pytest.approx(1 / 11, rel=1e-5)
+    assert slow["until"] == 1000
+    assert quick["times"] == sorted(quick["times"])
+
+
+def test_the_curve_against_false_alarms_marks_the_factor_in_use_and_bounds_zero(page):
+    row = page.data["amoc"][0]["rows"][0]
+    assert row["chosen"] == 1
+    assert row["alarms"] == [30, 2, 0]
+    assert row["median"] == [20, 40, None]
+    assert row["none"] == {"operation": "0.0999", "hour": "5.99"}
+
+
+def test_a_force_curve_has_the_verdict_of_its_contact(page):
+    panel = page.data["force"][0]
+    assert panel["steps"] == [[0, 400, "dynamic"], [0.75, 150, "static"]]
+    assert panel["curves"][0] == {"trace": 0, "contact": 0, "verdict": "fail", "peak": 900, "budget": 12.5}
+    assert "values to be checked against the standard" in page.text
+    assert page.tables["forces-table"][1][6] == "dynamic 500 of 400 N: fail; static 750 of 150 N: not assessable"
+
+
+def test_every_recording_has_a_row_without_script_and_opens_its_own_trace(made, page):
+    evaluated, _ = made
+    rows = page.tables["recordings-table"][1:]
+    assert [row[0] for row in rows] == [item.recording for item in evaluated.results.recordings]
+    assert rows[0][4] == "missed" and rows[1][4] == "not assessable"
+    assert rows[-1][3:5] == ["0 false alarms", "1 false alarm"]
+    table = next(item for item in page.data["tables"] if item["name"] == "recordings-table")
+    assert table["opens"] == {"0": [0], "1": [1], "23": [2], "24": [3]}
+    assert table["marks"]["with a missed contact"] == [0, 12]
+
+
+def test_a_hash_sign_in_a_logs_own_name_is_no_operation():
+    logs = frozenset({("a", "run#2"), ("a", "run")})
+    assert log_of("a", "run#2", logs) == ("a", "run#2")
+    assert log_of("a", "run#3", logs) == ("a", "run")
+
+
+def test_what_was_left_out_and_where_it_came_from_is_told(page):
+    assert page.tables["skipped-table"][1] == ["broken.csv", "empty file"]
+    assert page.tables["findings-table"][1] == ["odd.csv", "a gap of 2 s"]
+    assert page.tables["not-judged-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
+    assert page.tables["calibration-table"][1] == ["quick", "1/15op", "5.50", "2", "30", "0.0600"]
+    assert ["its version", "9.8.7"] in page.tables["provenance-table"]
+    assert page.tables["learned-table"][1] == ["learn.csv", "ef" * 32]
+
+
+def unpacked(text: str) -> list[int | None]:
+    """As the page's script reads it."""
+    found: list[int | None] = []
+    last = rest = shift = 0
+    for letter in text:
+        if letter in (MISSING, ABOVE_ALL, BELOW_ALL):
+            found.append({MISSING: None, ABOVE_ALL: NO_LIMIT, BELOW_ALL: -NO_LIMIT}[letter])
+            continue
+        digit = ALPHABET.index(letter)
+        rest |= (digit & 31) << shift
+        shift += 5
+        if digit < 32:
+            last += -(rest + 1) // 2 if rest % 2 else rest // 2
+            found.append(last)
+            rest = shift = 0
+    return found
+
+
+@given(st.lists(st.one_of(st.none(), st.sampled_from([NO_LIMIT, -NO_LIMIT]), st.integers(-(10**8), 10**8))))
+def test_a_packed_curve_is_read_as_it_was(numbers):
+    assert unpacked(packed(numbers)) == numbers
+
+
+def test_a_curve_of_the_page_is_that_of_the_trace(page):
+    _, traces = case()
+    panel = strict(page.scripts[1][1])["panels"][0]
+    curve = panel["value"]
+    read = [math.nan if n is None else curve["from"] + curve["step"] * n for n in unpacked(curve["at"])]
+    np.testing.assert_allclose(read, traces[0].panels[0].course.value, atol=curve["step"])
+    assert unpacked(panel["lower"]["at"]) == [-NO_LIMIT] * 300
+    assert panel["status"] == [[1, 30], [0, 170], [3, 10], [0, 90]]
+    assert panel["why"] == ["the torque moved first"]
+
+
+def test_five_thousand_recordings_stay_below_fifteen_megabytes():
+    evaluated, _ = case()
+    rng = np.random.default_rng(1)
+    detectors = tuple(f"detector_{i}" for i in range(5))
+    logs = [f"stiff/2024-05-17_gate_left_{i:05d}.mcap" for i in range(5000)]
+    contacts = tuple(
+        ContactResult(log, "stiff", name, "gate", 2.0, 5e-4, 2.1, late, "detected", 812.34, 2911.5, watched_ms=1000.0)
+        for log in logs
+        for name, late in zip(detectors, np.round(rng.gamma(9.0, 8.0, 5), 1).tolist(), strict=True)
+    )
+    results = replace(
+        evaluated.results,
+        detectors=detectors,
+        groups=("stiff",),
+        recordings=tuple(RecordingResult(log, "stiff", "ab" * 32, 7.2, 1, 1) for log in logs),
+        contacts=contacts,
+    )
+    traces = [
+        replace(trace_of(str, "stiff", log), panels=tuple(replace(panel, detector=name) for name in detectors))
+        for log in logs[:120]
+        for panel in trace_of(str, "stiff", log).panels[:1]
+    ]
+    summaries = tuple(replace(evaluated.summaries[0], detector=name) for name in detectors)
+    text = to_html(Evaluated(results, summaries, ()), traces)
+    assert 2e6 < len(text.encode()) < 15e6
+    assert all(log in text for log in (logs[0], logs[-1]))

@@ -1,0 +1,268 @@
+"""The HTML report as a reader meets it: in a real browser, without network."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdtool.plain_text import plain
+from cdtool.report.html.page import to_html
+from tests.report.hostile import HOSTILE
+from tests.report.html.html_case import case
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage", "--hide-scrollbars"),
+)
+
+pytestmark = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER), reason="Chromium or chromedriver is absent: the HTML report was not looked at"
+)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    webdriver = pytest.importorskip("selenium.webdriver")
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(CHROMIUM)
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def shown(browser: Any, tmp_path: Path) -> Callable[..., Any]:
+    """Open a report at a width of the window [px]."""
+
+    def show(text: str, width: int = 1400) -> Any:
+        path = tmp_path / "report.html"
+        path.write_text(text, encoding="utf-8")
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        browser.get(path.as_uri())
+        return browser
+
+    return show
+
+
+def all_of(browser: Any, selector: str) -> list[Any]:
+    found: list[Any] = browser.find_elements("css selector", selector)
+    return found
+
+
+def texts(browser: Any, selector: str) -> list[str]:
+    script = "return [...document.querySelectorAll(arguments[0])].map((item) => item.textContent)"
+    found: list[str] = browser.execute_script(script, selector)
+    return found
+
+
+def drawn_range(browser: Any, selector: str = "#viewer-plot") -> tuple[float, float]:
+    """What the plot's axis spans; a zoom is drawn with the next frame."""
+    browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    element = all_of(browser, selector)[0]
+    return float(element.get_attribute("data-from")), float(element.get_attribute("data-to"))
+
+
+def drag(browser: Any, element: Any, begin: float, end: float) -> None:
+    """From one share of an element's width to another."""
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", element)
+    width = element.size["width"]
+    chain = ActionChains(browser, duration=20)
+    chain.move_to_element_with_offset(element, int((begin - 0.5) * width), 0).click_and_hold()
+    chain.move_by_offset(int((end - begin) * width), 0).release().perform()
+
+
+def press(element: Any, keys: str) -> None:
+    element.send_keys(keys)
+
+
+def test_the_page_loads_without_errors_and_draws_every_plot(shown):
+    browser = shown(to_html(*case()))
+    assert browser.get_log("browser") == []
+    kinds = [item.get_attribute("data-plot") for item in all_of(browser, "svg[data-plot]")]
+    assert kinds == ["latency"] * 2 + ["survival"] * 2 + ["amoc"] * 2 + ["force"] * 2
+    drawn = (
+        "return [...document.querySelectorAll('svg[data-plot]')].map((item) => item.querySelectorAll('path').length)"
+    )
+    assert all(count > 5 for count in browser.execute_script(drawn))
+    paths = "return [...document.querySelectorAll('[d]')].map((item) => item.getAttribute('d'))"
+    assert not [path for path in browser.execute_script(paths) if any(word in path for word in ("NaN", "Inf", "und"))]
+    requests = "return performance.getEntriesByType('resource').map((item) => item.name)"
+    assert browser.execute_script(requests) == []
+
+
+def test_a_click_on_a_recording_shows_its_trigger_plot(shown):
+    browser = shown(to_html(*case()))
+    row = next(
+        item for item in all_of(browser, '.paged[data-table="recordings-table"] tr.opens') if "02.csv" in item.text
+    )
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' }); arguments[0].click()", row)
+    assert texts(browser, "#viewer-title") == ["stiff/02.csv"]
+    assert browser.switch_to.active_element.get_attribute("id") == "viewer-title"
+    assert len(all_of(browser, "#viewer-plot path.line")) == 2
+    assert len(all_of(browser, "#viewer-plot path.force")) == 1
+    words = texts(browser, "#viewer-plot text")
+    assert "30.0 ms" in words and "missed" in words
+    assert texts(browser, "#viewer-why li") == ["quick: the torque moved first", "slow: the torque moved first"]
+    assert "stiff/02.csv" in texts(browser, "tr.open")[0]
+
+
+def test_an_operation_without_contact_tells_its_false_alarm_and_who_could_judge_nothing(shown):
+    browser = shown(to_html(*case()))
+    for _ in range(3):
+        all_of(browser, '[data-do="after"]')[0].click()
+    assert texts(browser, "#viewer-title") == ["free.csv#2"]
+    words = texts(browser, "#viewer-plot text")
+    assert "1 false alarm" in words
+    assert any(word.startswith("start-up 100 %") and word.endswith("not assessable") for word in words)
+    assert not all_of(browser, '[data-do="after"]')[0].is_enabled()
+
+
+def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
+    browser = shown(to_html(*case()))
+    plot = all_of(browser, "#viewer-plot")[0]
+    home = drawn_range(browser)
+    assert home == pytest.approx((1.9, 2.5))
+    drag(browser, plot, 0.4, 0.6)
+    low, high = drawn_range(browser)
+    assert home[0] < low < high < home[1] and high - low == pytest.approx(0.2 * (home[1] - home[0]), rel=0.1)
+    press(plot, "0")
+    assert drawn_range(browser) == pytest.approx(home)
+    press(plot, "+")
+    near = drawn_range(browser)
+    assert near[1] - near[0] == pytest.approx((home[1] - home[0]) / 1.5)
+    press(plot, "\ue014")  # the right arrow
+    assert drawn_range(browser)[0] > near[0]
+    all_of(browser, '[data-do="whole"]')[0].click()
+    assert drawn_range(browser) == pytest.approx((0.0, 4.0))
+    press(plot, "-")
+    assert drawn_range(browser) == pytest.approx((0.0, 4.0))
+
+
+def test_the_wheel_zooms_only_a_plot_that_has_the_focus(shown):
+    browser = shown(to_html(*case()))
+    turn = "arguments[0].dispatchEvent(new WheelEvent('wheel', { deltaY: -100, clientX: 700, cancelable: true }))"
+    plot = all_of(browser, "#viewer-plot")[0]
+    home = drawn_range(browser)
+    browser.execute_script(turn, plot)
+    assert drawn_range(browser) == home
+    browser.execute_script("arguments[0].focus()", plot)
+    browser.execute_script(turn, plot)
+    low, high = drawn_range(browser)
+    assert high - low < home[1] - home[0]
+
+
+def test_the_first_table_sorts_by_a_click_on_its_heading(shown):
+    browser = shown(to_html(*case(limits=False)))
+    rows = "#figures-table tbody tr td:nth-child(5)"
+    before = texts(browser, rows)
+    heading = all_of(browser, "#figures-table th:nth-child(5) button")[0]
+    heading.click()
+    rising = [text.split(" ")[0] for text in texts(browser, rows)]
+    assert rising[:4] == sorted((text.split(" ")[0] for text in before[:4]), key=float)
+    assert rising[4:] == ["–", "–"]
+    heading.click()
+    falling = [text.split(" ")[0] for text in texts(browser, rows)]
+    assert falling[:4] == rising[3::-1]
+    assert falling[4:] == ["–", "–"]
+    assert all_of(browser, "#figures-table th:nth-child(5)")[0].get_attribute("aria-sort") == "descending"
+
+
+def test_recordings_are_paged_searched_and_filtered(shown):
+    browser = shown(to_html(*case()))
+    table = '.paged[data-table="recordings-table"]'
+    assert len(all_of(browser, f"{table} tbody tr")) == 15
+    assert texts(browser, f"{table} .pages span") == ["1 to 15 of 25"]
+    all_of(browser, f"{table} .pages button")[-1].click()
+    assert len(all_of(browser, f"{table} tbody tr")) == 10
+    all_of(browser, f"{table} input[type=search]")[0].send_keys("SOFT/0")
+    assert [name.lstrip("▸ ") for name in texts(browser, f"{table} tbody td:first-child")] == [
+        f"soft/0{i}.csv" for i in range(1, 10)
+    ]
+    choice = all_of(browser, f"{table} .filters label:last-child option")
+    next(item for item in choice if "missed contact" in item.text).click()
+    assert texts(browser, f"{table} tbody td:first-child") == ["soft/01.csv"]
+
+
+def test_a_detectors_curve_is_hidden_by_its_name(shown):
+    browser = shown(to_html(*case()))
+    assert len(all_of(browser, '[data-plot="survival"] path.line')) == 4
+    button = all_of(browser, '.legend[data-for="survival"] button')[0]
+    browser.execute_script("arguments[0].click()", button)
+    assert button.get_attribute("aria-pressed") == "false"
+    assert len(all_of(browser, '[data-plot="survival"] path.line')) == 2
+
+
+def test_what_is_under_the_pointer_is_told(shown):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    browser = shown(to_html(*case()))
+    plot = all_of(browser, '[data-plot="survival"]')[0]
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
+    ActionChains(browser, duration=20).move_to_element(plot).perform()
+    told = texts(browser, "#tooltip")[0].split("\n")
+    assert told[0].endswith("ms after the onset, undetected:")
+    assert told[1].startswith("quick: ") and told[2].startswith("slow: ")
+    assert all_of(browser, "#tooltip")[0].is_displayed()
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_nothing_makes_the_page_scroll_sideways(shown, width):
+    for named in (str, lambda name: HOSTILE["long"] + name):
+        browser = shown(to_html(*case(named)), width)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+
+
+def test_nothing_moves_while_the_page_is_built(shown, browser):
+    watch = (
+        "window.moved = []; new PerformanceObserver((list) => window.moved.push(...list.getEntries()"
+        ".map((entry) => entry.value))).observe({ type: 'layout-shift', buffered: true })"
+    )
+    script = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": watch})
+    try:
+        shown(to_html(*case()))
+        drawn_range(browser)
+        assert sum(browser.execute_script("return window.moved")) < 0.01
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
+
+
+@pytest.mark.parametrize("kind", ["script", "right to left", "markdown", "not a character", "empty"])
+def test_hostile_names_stay_text(shown, kind):
+    from selenium.common.exceptions import NoAlertPresentException
+
+    hostile = f'{HOSTILE[kind]}"><img src=x onerror=alert(1)>'
+    browser = shown(to_html(*case(lambda name: f"{hostile}{name}")))
+    with pytest.raises(NoAlertPresentException):
+        _ = browser.switch_to.alert
+    assert browser.get_log("browser") == []
+    assert not all_of(browser, "img, iframe, object, embed, form, base, link")
+    assert len(all_of(browser, "script")) == len(all_of(browser, 'script[type="application/json"]')) + 1
+    name = plain(f"{hostile}stiff/{hostile}01.csv")
+    assert texts(browser, "#viewer-title") == [name]
+    assert texts(browser, '[data-table="recordings-table"] tbody td button')[0] == f"▸ {name}"
+
+
+def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(shown, browser):
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        shown(to_html(*case()))
+        said = [item.text for item in all_of(browser, "noscript p")]
+        assert said == ["This plot needs script."] * 4
+        assert len(all_of(browser, "#recordings-table tbody tr")) == 25
+        assert not any(item.is_displayed() for item in all_of(browser, "svg.plot"))
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})

@@ -1,0 +1,392 @@
+"""The Markdown report: verdict first, right figures, cut to a length without losing the verdict, names as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.limits import LimitRule
+from cdtool.evaluation.results import (
+    CalibrationResult,
+    ExposureResult,
+    FalseAlarmResult,
+    ForceResult,
+    ForceStepResult,
+    LimitResult,
+    PointResult,
+    RecordingResult,
+    Results,
+    Skipped,
+)
+from cdtool.report.markdown.markdown import Image, to_markdown
+from cdtool.report.markdown.text import escape
+from tests.report.conftest import contact, contacts_of
+from tests.report.hostile import HOSTILE
+
+OWN_TAGS = re.compile(r"<details>\n<summary>[A-Za-z -]+ \(\d+\)</summary>\n?|</details>\n?")
+NO_WIDTH = "\u200b"
+
+
+def parsed(text: str) -> list[Any]:
+    return MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"]).parse(text)
+
+
+def rows(text: str) -> list[list[str]]:
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in text.splitlines() if line[:1] == "|"]
+
+
+def folded(text: str) -> list[str]:
+    return re.findall(r"<summary>(.*) \(", text)
+
+
+def limited(results: Results, *rules: LimitRule) -> Evaluated:
+    return evaluate(results, rules)
+
+
+def rule(figure: str, most: float, detector: str = "momentum", group: str = "stiff") -> LimitRule:
+    return LimitRule(f"{detector}.{group}.{figure}", detector, group, figure, largest=most)
+
+
+def test_without_limits_the_report_begins_with_what_was_found(evaluated):
+    first, counts = to_markdown(evaluated).split("\n\n")[:2]
+    assert first == "# Collision detection: no limits are set"
+    assert counts == "34 contacts with 2 detectors: 35 detected, 1 missed, 1 not assessable; 1 false alarm."
+
+
+def test_kept_limits_are_the_first_thing_said(results):
+    text = to_markdown(limited(results, rule("missed", 1), rule("median_ms", 80)))
+    assert text.startswith("# Collision detection: all 2 limits are kept\n")
+    assert "Not kept" not in text
+    assert to_markdown(limited(results, rule("missed", 1))).startswith("# Collision detection: the limit is kept\n")
+
+
+def test_limits_that_are_not_kept_are_named_first_and_lead_their_table(results):
+    rules = (rule("missed", 1), rule("mean_ms", 50), rule("peak_force_n", 400, group="holdout"))
+    limits = limited(results, *rules[:2]).results.limits
+    unknown = LimitResult("a", "momentum", "stiff", "force_at_alarm_n", None, None, 9, "not assessable", "no load cell")
+    text = to_markdown(evaluate(replace(results, limits=(*limits, unknown))))
+    assert text.startswith("# Collision detection: 2 of 3 limits not kept (1 broken, 1 not assessable)\n")
+    head = text.split("## ")[0]
+    assert "momentum, stiff, mean_ms: 65 is more than 50; momentum, stiff, force_at_alarm_n: no load cell." in head
+    assert [row[0] for row in rows(text)[2:5]] == ["**broken**", "**not assessable**", "kept"]
+    assert rows(text)[2][3:6] == ["mean_ms", "65", "at most 50"]
+    assert text.index("## Limits") < text.index("## stiff")
+
+
+def test_a_quantile_that_is_not_reached_breaks_its_limit_in_words(results):
+    text = to_markdown(limited(results, rule("p95_ms", 100)))
+    assert ["p95_ms", "not reached", "at most 100"] in [row[3:6] for row in rows(text)]
+
+
+def test_the_table_holds_the_figures_of_each_group(evaluated):
+    text = to_markdown(evaluated)
+    ekf = next(row for row in rows(text) if row[0] == "friction_ekf (feekf)" and len(row) > 10)
+    assert ekf[1] == "34.0 (30.0 to 38.0)"
+    assert ekf[2].startswith("4.00 (")
+    assert ekf[3:] == [
+        "34.0 (30.0 to not reached)",
+        "38.0 (34.0 to not reached)",
+        "3",
+        "0 of 3: at most 63 %",
+        "1",
+        "0 in 4 operations",
+        "0: at most 300",
+        "0: at most 0.749",
+    ]
+    momentum = next(row for row in rows(text) if row[0] == "momentum" and len(row) > 10)
+    assert momentum[1] == "65.0 (–)"
+    assert momentum[4:7] == ["not reached (70.0 to not reached)", "2", "1 of 3: at most 86 %"]
+    without = [row for row in rows(text) if row[0] == "friction_ekf (feekf)" and row[1] == "–"]
+    assert without[0][1:8] == ["–"] * 7
+    assert [line for line in text.splitlines() if line.startswith("## ")][:3] == [
+        "## stiff",
+        "## soft",
+        "## holdout: no contacts, false alarms only",
+    ]
+
+
+def test_false_alarms_stand_with_their_exposure_and_bounds(evaluated):
+    text = to_markdown(evaluated)
+    assert [
+        "momentum",
+        "1 in 40 operations",
+        "10.0 (0.3 to 55.7): at most 47.4",
+        "0.0250 (0.0006 to 0.1393): at most 0.119",
+    ] in rows(text)
+
+
+def test_force_at_the_alarm_has_a_column_only_where_there_is_one(results):
+    assert "force at alarm" not in to_markdown(evaluate(results))
+    felt = tuple(replace(item, force_at_alarm_n=100.0 + i) for i, item in enumerate(results.contacts[:3]))
+    text = to_markdown(evaluate(replace(results, contacts=felt)))
+    assert "force at alarm, largest [N]" in text
+    assert any(row[-1] == "101, 102" for row in rows(text))
+
+
+def test_onset_rule_skipped_recordings_and_provenance_are_stated(evaluated):
+    text = to_markdown(evaluated)
+    assert "(above 20 N, back to 8 N)" in text
+    assert "**Left out or lost: 1 item**" in text
+    assert ["broken.csv", "empty file"] in rows(text)
+    assert "evidence from recordings, not a certificate" in text
+    for expected in ("9.8.7", "c0ffee" * 10, "5eed" * 16, "ab12" * 16, "cd34" * 16, "bandwidth = 30.0"):
+        assert expected in text
+
+
+def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
+    budget = CalibrationResult("momentum", "1/1000op", 6.5, 3000, 6.0, 1)
+    text = to_markdown(evaluate(replace(results, calibration=(budget,), findings=(Skipped("a.csv", "a gap"),))))
+    assert folded(text) == [
+        "Contacts missed",
+        "False alarms",
+        "Contacts not assessable",
+        "What could not be judged",
+        "Left out",
+        "Findings",
+        "False-alarm budget",
+        "Provenance",
+        "Gains and thresholds",
+        "Recordings scored",
+        "Recordings learned from",
+    ]
+    found = rows(text)
+    assert ["stiff/03.csv", "stiff", "1", "5.000", "momentum", "1000", "3600", "no alarm in its window"] in found
+    assert ["holdout/01.csv\\#​2", "holdout", "momentum", "gate", "1.000", "above", "25.0 N", "20.0 N"] in found
+    assert ["stiff/04.csv", "stiff", "1", "5.000", "friction_ekf (feekf)", "1000", "3600", "standing still"] in found
+    assert ["stiff", "friction_ekf (feekf)", "25 %", "1 of 4", "standing still 25 %"] in found
+    assert ["momentum", "1/1000op", "6.50", "1", "3000", "6.00"] in found
+
+
+def test_comparisons_that_are_shown_are_said_and_others_are_no_proof(results):
+    text = to_markdown(evaluate(results))
+    assert "1 pair of detectors on the same contacts: no difference is shown" in text
+    fast, slow = [30.0 + i % 3 for i in range(12)], [60.0 + i % 5 for i in range(12)]
+    contacts = [*contacts_of("friction_ekf", "stiff", fast), *contacts_of("momentum", "stiff", slow)]
+    contacts += contacts_of("friction_ekf", "soft", fast) + contacts_of("momentum", "soft", [None] * 12)
+    shown = [row for row in rows(to_markdown(evaluate(replace(results, contacts=tuple(contacts))))) if "than" in row[1]]
+    assert [row[:2] for row in shown] == [
+        ["stiff", "friction_ekf (feekf) is faster than momentum"],
+        ["soft", "friction_ekf (feekf) misses less than momentum"],
+    ]
+    assert re.fullmatch(r"30\.8 \(\d\d\.\d to \d\d\.\d\) ms", shown[0][2])
+    assert shown[1][2:4] == ["only one missed: 0 to 12", "12"]
+
+
+def test_the_slower_detector_named_first_makes_the_same_sentence(results):
+    fast, slow = [30.0 + i % 3 for i in range(12)], [60.0 + i % 5 for i in range(12)]
+    contacts = (*contacts_of("friction_ekf", "stiff", slow), *contacts_of("momentum", "stiff", fast))
+    text = to_markdown(evaluate(replace(results, contacts=contacts)))
+    (shown,) = [row for row in rows(text) if "than" in row[1]]
+    assert shown[1] == "momentum is faster than friction_ekf (feekf)"
+    assert shown[2].startswith("30.8 (")
+
+
+def forces(name: str = "reducing gap") -> tuple[tuple[ForceResult, ...], tuple[PointResult, ...]]:
+    steps = (
+        ForceStepResult(name, 0.0, 400.0, 500.0, 12.0, "fail", f"500 N where 400 N are allowed {name}"),
+        ForceStepResult("static", 0.75, 150.0, None, None, "not assessable", name),
+    )
+    kept = (ForceStepResult(name, 0.0, 400.0, 300.0, None, "pass"),)
+    made = (
+        ForceResult("stiff/01.csv", "stiff", 1, name, "fail", 500.0, steps, name, 12.0, name),
+        ForceResult("stiff/02.csv", "stiff", 1, name, "pass", 300.0, kept),
+    )
+    return made, (PointResult(name, "stiff", name, 3, "fail", steps, "mean of 3 tests", name),)
+
+
+def test_force_verdicts_say_what_was_exceeded_when_and_against_which_source(results):
+    made, points = forces()
+    profile = {"title": "EN 1: a gap", "source": "EN 1, table 1", "checked": False}
+    provenance = {**results.provenance, "force_profiles": {"stiff": profile, "soft": profile}}
+    text = to_markdown(evaluate(replace(results, forces=made, points=points, provenance=provenance)))
+    assert text.count("EN 1\\: a gap (source\\: EN 1".replace("source\\:", "source:")) == 1
+    assert "values to be checked against the standard" in text
+    found = rows(text)
+    assert ["stiff", "reducing gap", "1", "1", "0", "500", "12.0 ms after the onset"] in found
+    assert any(row[3:5] == ["**fail**", "mean of 3 tests"] for row in found)
+    assert any("reducing gap 500 of 400 N, static not seen, 150 N" in row for row in found)
+    assert "Force limits not kept" in folded(text)
+
+
+def test_images_are_linked_by_relative_name_below_their_group(evaluated):
+    text = to_markdown(evaluated, [Image("latency.png", "all"), Image("triggers_soft.png", "soft [x]", "soft")])
+    assert text.index("![all](latency.png)") < text.index("## stiff") < text.index("## soft")
+    assert text.index("## soft") < text.index("](triggers_soft.png)") < text.index("## holdout")
+
+
+def named(results: Results, name: str) -> Evaluated:
+    """Results in which everything that may come from a file is this name."""
+    made, points = forces(name)
+    limit = LimitResult(name, name, name, name, 1.0, None, 0.0, "broken", name)
+    changed = replace(
+        results,
+        groups=(name,),
+        detectors=(name,),
+        contacts=(
+            contact(name, name, 30.0),
+            contact(name, name, None, "missed", name),
+            replace(contact(name, name, None, "not_assessable", name), reason=name, contact=2),
+        ),
+        false_alarms=(FalseAlarmResult(name, name, name, name, 1.0, name, 1.0, 1.0),),
+        exposure=(ExposureResult(name, name, 1, 1, 1.0, 1, {name: 1.0}),),
+        recordings=(RecordingResult(name, name, name, 1.0, 1, 1, name, name),),
+        forces=tuple(replace(item, recording=name, group=name, profile=name) for item in made),
+        points=tuple(replace(item, group=name, note=name) for item in points),
+        calibration=(CalibrationResult(name, name, 1.0, 1, 1.0, 1),),
+        limits=(limit,) * 9,
+        skipped=(Skipped(name, name),),
+        findings=(Skipped(name, name),),
+        provenance={
+            "onset": name,
+            "machine": name,
+            "plugins": [name],
+            "window_s": {name: name},
+            "units": {name: name},
+            "short_names": {name: name},
+            "gains": {name: {name: name}},
+            "signature_sha256": {name: name},
+            "learned_sha256": {name: name},
+            "force_profiles": {name: {"title": name, "source": name}, "other": name},
+        },
+    )
+    return evaluate(changed)
+
+
+def nothing_is_active(text: str, tables: int) -> None:
+    tokens = parsed(text)
+    inline = [child for token in tokens for child in token.children or ()]
+    assert [image.attrs["src"] for image in inline if image.type == "image"] == ["a.png"]
+    own = {"text", "text_special", "softbreak", "image", "strong_open", "strong_close", "em_open", "em_close"}
+    assert {child.type for child in inline} <= own | {"code_inline"}
+    assert {child.content for child in inline if child.type == "code_inline"} <= {"contacts", "limits"}
+    for token in tokens:
+        assert not token.type.startswith("html") or OWN_TAGS.fullmatch(token.content), token.content
+        assert token.type not in ("fence", "code_block", "blockquote_open", "bullet_list_open", "ordered_list_open")
+    assert sum(token.type == "table_open" for token in tokens) == tables
+    assert sum("<details>" in token.content for token in tokens) == text.count("</details>")
+    shown = "".join(child.content for child in inline if child.type != "image")
+    assert not re.search(r"[@#]\w", shown)
+    assert not re.search(r"www\.[a-z]", text)
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_shown_as_text(results, kind):
+    name = HOSTILE[kind]
+    nothing_is_active(to_markdown(named(results, name), [Image("a.png", name, name)]), 16)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.text(alphabet=st.sampled_from(list("<>|\\`*_[]()!#@&~:;$=+- \n\tawx1./\"'{}^%")), max_size=40))
+def test_no_text_is_ever_markup(text):
+    shown = parsed(f"# {escape(text)}x\n\n| a | b |\n| --- | --- |\n| {escape(text)} | c |\n")
+    assert [token.type for token in shown if token.type.startswith(("html", "td_open", "heading_open"))] == [
+        "heading_open",
+        "td_open",
+        "td_open",
+    ]
+    (cell, _) = [shown[i + 1].children or [] for i, token in enumerate(shown) if token.type == "td_open"]
+    assert {child.type for child in cell} <= {"text", "text_special"}
+    plain = "".join(child.content for child in cell).replace(NO_WIDTH, "")
+    assert plain == text.replace("\n", "?").replace("\t", "?").strip()
+
+
+def many(recordings: int, detectors: Sequence[str], rules: Sequence[LimitRule]) -> Evaluated:
+    """Every fourth contact missed, every fifth hold-out run with a false alarm, and much left out."""
+    names = [f"campaign 1/stiff/recording_{i:05}.mcap" for i in range(recordings)]
+    exposure = [
+        ExposureResult(group, name, recordings, recordings, 9.0) for group in ("stiff", "holdout") for name in detectors
+    ]
+    results = Results(
+        provenance={"learned_sha256": dict.fromkeys(names, "ab12" * 16)},
+        detectors=tuple(detectors),
+        groups=("stiff", "holdout"),
+        contacts=tuple(
+            contact(
+                detector, "stiff", None if i % 4 == 0 else 30.0 + i % 7, "missed" if i % 4 == 0 else "detected", name
+            )
+            for detector in detectors
+            for i, name in enumerate(names)
+        ),
+        false_alarms=tuple(FalseAlarmResult(name, "holdout", detectors[0], "gate", 1.0) for name in names[::5]),
+        exposure=tuple(exposure),
+        recordings=tuple(RecordingResult(name, "stiff", "cd34" * 16, 7.0, 1, 1, "campaign 1") for name in names),
+        skipped=tuple(Skipped(name, "half of it is missing") for name in names[::9]),
+    )
+    return evaluate(results, rules)
+
+
+@pytest.fixture(scope="module")
+def five_thousand() -> Evaluated:
+    rules = [LimitRule("*.*.missed", "*", "stiff", "missed", largest=0), LimitRule("*.n", "*", "*", "hours", least=1)]
+    return many(5000, ["feekf", "gm", "igm", "pi", "pt"], rules)
+
+
+def whole_blocks(text: str) -> None:
+    """Every block that is opened is closed, none within another, and no row is cut."""
+    assert re.findall(r"</?details>", text) == ["<details>", "</details>"] * text.count("<details>")
+    assert all(line.endswith(" |") for line in text.splitlines() if line.startswith("|"))
+
+
+def test_a_report_of_5000_recordings_fits_a_comment_and_says_what_it_left_out(five_thousand):
+    text = to_markdown(five_thousand)
+    assert 50_000 < len(text) <= 60_000
+    assert text.startswith("# Collision detection: 5 of 15 limits not kept (5 broken)\n")
+    assert len([row for row in rows(text) if row[0] in ("kept", "**broken**")]) == 15
+    assert "## stiff" in text and "## holdout" in text and "## Comparisons" in text
+    missed = re.search(r"Cut here: (\d+) of 6250 rows; all of them are in results.json \(`contacts`\)", text)
+    assert missed and int(missed[1]) == sum("no alarm in its window" in row for row in rows(text)) > 10
+    whole_blocks(text)
+    assert "Contacts missed (6250)" in text
+    assert ["campaign 1/stiff/recording_00000.mcap", "half of it is missing"] in rows(text)
+
+
+@pytest.mark.parametrize("most", [4000, 4444, 6000, 9000, 15_000, 30_000])
+def test_no_report_is_longer_than_it_may_be(five_thousand, most):
+    text = to_markdown(five_thousand, most=most)
+    assert len(text) <= most
+    assert text.startswith("# Collision detection: 5 of 15 limits not kept")
+    assert "| **broken** | feekf | stiff | missed | 1250 | at most 0 |" in text
+    assert most > 5_000 or "of this report left out for its length; results.json has everything" in text
+    whole_blocks(text)
+
+
+def test_a_thousand_limits_are_cut_but_not_the_broken_ones(results):
+    kept = [LimitResult(f"k{i}", "momentum", "stiff", "missed", 0.0, None, 1.0, "kept") for i in range(1000)]
+    broken = LimitResult("b", "momentum", "stiff", "p95_ms", None, None, 50.0, "broken", "not reached is more than 50")
+    text = to_markdown(evaluate(replace(results, limits=(*kept, broken))), most=20_000)
+    assert len(text) <= 20_000
+    assert rows(text)[2][:4] == ["**broken**", "momentum", "stiff", "p95_ms"]
+    assert "## Limits not kept" in text
+    assert re.search(r"of 1000 rows; all of them are in results.json \(`limits`\)", text)
+    whole_blocks(text)
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_long_and_hostile_names_do_not_push_the_verdict_out(results, kind):
+    name = HOSTILE[kind] * 40
+    text = to_markdown(named(results, name), [Image("a.png", name, name)], most=4000)
+    assert len(text) <= 4000
+    assert text.startswith("# Collision detection: 9 of 9 limits not kept (9 broken)\n")
+    assert "and 4 more" in text
+    whole_blocks(text)
+
+
+def test_a_report_too_short_for_its_verdict_is_refused(evaluated):
+    with pytest.raises(UsageError, match="at most 3999 characters"):
+        to_markdown(evaluated, most=3999)
+
+
+def test_results_of_nothing_say_so():
+    nothing = Results({}, (), (), (), (), ())
+    text = to_markdown(evaluate(nothing))
+    assert text.startswith("# Collision detection: no limits are set\n\nnothing was scored.\n")
+    assert "(rule not stated)" in text

@@ -1,0 +1,206 @@
+"""The figure of latency against false alarms: rates, the zone without any, the factor in use, what was not reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.results import Results, SweepResult
+from cdtool.evaluation.sweep import MULTIPLES
+from cdtool.report.plots import amoc_plot
+from cdtool.report.plots.amoc_plot import plot_amoc
+from cdtool.report.plots.figures import drawing
+from cdtool.report.plots.style import look_of
+from tests.evaluation.sweeps import CONTACTS, swept
+from tests.report.conftest import contacts_of
+from tests.report.hostile import HOSTILE
+from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+
+QUIET_FROM = 0.7
+
+
+def alarms(multiple: float) -> int:
+    return int(20 / multiple) if multiple < QUIET_FROM else 0
+
+
+def none(_: float) -> int:
+    return 0
+
+
+def of(
+    rows: Sequence[SweepResult], names: Sequence[str] = ("momentum",), groups: Sequence[str] = ("stiff",)
+) -> Evaluated:
+    contacts = [row for group in groups for name in names for row in contacts_of(name, group, [30.0, 40.0])]
+    return evaluate(Results({}, tuple(names), tuple(groups), tuple(contacts), (), (), sweep=tuple(rows)))
+
+
+def drawn(evaluated: Evaluated):
+    with drawing():
+        return amoc_plot._figure(evaluated)
+
+
+def small_marks(figure, open_marks: bool) -> np.ndarray:
+    """Points (n, 2) of the small marks that are open, or filled."""
+    lines = [line for line in figure.axes[0].lines if line.get_markersize() == 3.2]
+    chosen = [line for line in lines if (line.get_markerfacecolor() == "white") == open_marks]
+    return np.concatenate([np.column_stack(line.get_data()) for line in chosen] or [np.empty((0, 2))])
+
+
+def in_use(figure) -> list:
+    return [line for line in figure.axes[0].lines if line.get_markeredgecolor() == "black"]
+
+
+def arrows(figure) -> list:
+    return [text for text in figure.axes[0].texts if getattr(text, "arrow_patch", None) is not None]
+
+
+def test_every_safety_factor_is_a_mark_at_its_rate_and_median():
+    figure = drawn(of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)))
+    marks = small_marks(figure, False)
+    assert len(marks) == len(MULTIPLES)
+    assert marks[:, 1] == pytest.approx(60.0 * MULTIPLES)
+    loud = MULTIPLES < QUIET_FROM
+    assert marks[loud, 0] == pytest.approx([alarms(multiple) / 0.1 for multiple in MULTIPLES[loud]])
+
+
+def test_points_without_a_false_alarm_stand_left_of_all_rates_in_a_zone_that_says_what_that_means(tmp_path):
+    evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms, operations=40, hours=0.1))
+    marks = small_marks(drawn(evaluated), False)
+    loud = MULTIPLES < QUIET_FROM
+    assert len(set(marks[~loud, 0])) == 1
+    assert marks[~loud, 0].max() < 1.0 / 0.1 < marks[loud, 0].min()
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    for expected in ("none in 40 operations", "0.100 h", "(at most 30.0 per hour)", "false alarms per hour"):
+        assert expected in shown
+
+
+def test_detectors_that_watched_for_different_times_have_a_range_of_bounds(tmp_path):
+    rows = swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)
+    rows += swept("direct", "stiff", lambda m: 70.0 * m, none, operations=30, hours=0.05)
+    plot_amoc(of(rows, ("momentum", "direct")), tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "none in 30 to 40 operations" in shown
+    assert "(at most 30.0 to 59.9 per hour)" in shown
+
+
+def test_in_the_zone_each_detector_has_a_column_of_its_own():
+    rows = [row for name in ("momentum", "direct") for row in swept(name, "stiff", lambda m: 60.0 * m, none)]
+    marks = small_marks(drawn(of(rows, ("momentum", "direct"))), False)
+    assert len(set(marks[:, 0])) == 2
+
+
+def test_the_factor_in_use_is_marked_on_each_curve_and_its_figures_stand_beside_it(tmp_path):
+    evaluated = of(swept("momentum", "stiff", lambda m: 62.0 * m, alarms, lambda _: 1, not_assessable=2))
+    (mark,) = in_use(drawn(evaluated))
+    assert mark.get_ydata() == pytest.approx([62.0])
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    for expected in ("momentum", "5.50", "62.0", "1 of 20", "2", "0 in 40 op."):
+        assert expected in shown
+
+
+def test_marks_are_open_where_contacts_were_missed(tmp_path):
+    evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms, lambda m: 3 if m > 1.5 else 0))
+    figure = drawn(evaluated)
+    assert len(small_marks(figure, True)) == np.count_nonzero(MULTIPLES > 1.5)
+    assert len(small_marks(figure, False)) == np.count_nonzero(MULTIPLES <= 1.5)
+    assert in_use(figure)[0].get_markerfacecolor() == look_of("momentum").colour
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    assert "open: contacts were missed" in joined(tmp_path / "a.svg")
+
+
+def test_a_curve_whose_median_is_not_reached_ends_with_an_arrow_up(tmp_path):
+    evaluated = of(
+        swept("momentum", "stiff", lambda m: None if m > 2.0 else 60.0 * m, alarms, lambda m: 12 if m > 2.0 else 0)
+    )
+    figure = drawn(evaluated)
+    (arrow,) = arrows(figure)
+    last = MULTIPLES[MULTIPLES <= 2.0].max()
+    assert arrow.xy[1] == pytest.approx(60.0 * last)
+    assert arrow.xyann[1] > 0.0
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    assert "arrow: the median is not reached" in joined(tmp_path / "a.svg")
+
+
+def test_a_factor_in_use_whose_median_is_not_reached_stands_at_the_top_and_is_said(tmp_path):
+    evaluated = of(
+        swept("momentum", "stiff", lambda m: 60.0 if m < 0.5 else None, alarms, lambda m: 0 if m < 0.5 else 15)
+    )
+    figure = drawn(evaluated)
+    (mark,) = in_use(figure)
+    assert mark.get_markerfacecolor() == "white"
+    assert mark.get_transform() == figure.axes[0].get_xaxis_transform()
+    assert len(arrows(figure)) == 2
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    assert "not reached" in texts(tmp_path / "a.svg") and "15 of 20" in texts(tmp_path / "a.svg")
+
+
+def test_a_curve_is_named_where_there_is_room_and_the_key_names_all(tmp_path):
+    far = swept("momentum", "stiff", lambda m: 600.0 * m, alarms) + swept("direct", "stiff", lambda m: 20.0 * m, alarms)
+    plot_amoc(of(far, ("momentum", "direct")), tmp_path / "far.svg")
+    assert [texts(tmp_path / "far.svg").count(name) for name in ("momentum", "direct")] == [2, 2]
+    names = tuple(f"detector_{i}" for i in range(12))
+    same = [row for name in names for row in swept(name, "stiff", lambda m: 60.0 * m, alarms)]
+    plot_amoc(of(same, names), tmp_path / "same.svg")
+    assert [texts(tmp_path / "same.svg").count(name) for name in names] == [1] * 12
+
+
+def test_a_detector_without_a_curve_stays_in_the_key_with_what_it_could_not_assess(tmp_path):
+    contacts = [*contacts_of("momentum", "stiff", [30.0]), *contacts_of("direct", "stiff", ["blind"] * 3)]
+    rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
+    evaluated = evaluate(Results({}, ("momentum", "direct"), ("stiff",), tuple(contacts), (), (), sweep=rows))
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    assert shown[shown.index("direct") + 1 :][:5] == ["–", "–", "–", "3", "–"]
+
+
+def test_panels_share_both_axes():
+    rows = [row for group in ("stiff", "soft") for row in swept("momentum", group, lambda m: 60.0 * m, alarms)]
+    first, second = drawn(of(rows, groups=("stiff", "soft"))).axes
+    assert first.get_xlim() == second.get_xlim() and first.get_ylim() == second.get_ylim()
+
+
+def test_rates_are_per_operation_where_the_budget_is(tmp_path):
+    rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
+    results = Results({"false_alarm_budget": "1/1000op"}, ("momentum",), ("stiff",), (), (), (), sweep=rows)
+    plot_amoc(evaluate(results), tmp_path / "a.svg")
+    assert "false alarms per operation" in joined(tmp_path / "a.svg")
+    assert "per operation)" in joined(tmp_path / "a.svg")
+
+
+def test_no_sweep_no_false_alarm_everything_missed_and_nothing_assessable_are_drawn_too(tmp_path):
+    plot_amoc(of([]), tmp_path / "none.svg")
+    assert "no impact-free hold-out" in joined(tmp_path / "none.svg")
+    assert len(small_marks(drawn(of(swept("momentum", "stiff", lambda m: 60.0 * m, none))), False)) == len(MULTIPLES)
+    missed = of(swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS))
+    assert len(small_marks(drawn(missed), True)) == 0
+    plot_amoc(missed, tmp_path / "missed.svg")
+    assert "20 of 20" in texts(tmp_path / "missed.svg")
+    blind = swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS, not_assessable=CONTACTS)
+    figure = drawn(of([SweepResult(**{**vars(row), "missed": 0}) for row in blind]))
+    assert in_use(figure) == [] and arrows(figure) == []
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_the_same_figure_has_the_same_bytes(tmp_path, suffix):
+    evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
+    for name in ("a", "b"):
+        plot_amoc(evaluated, tmp_path / f"{name}{suffix}")
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_drawn_as_plain_text(tmp_path, kind):
+    name = HOSTILE[kind]
+    plot_amoc(of(swept(name, name, lambda m: 60.0 * m, alarms), (name,), (name,)), tmp_path / "a.svg")
+    assert_harmless(tmp_path / "a.svg", kind)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "W" * 300, "i"])
+def test_nothing_is_clipped_whatever_the_names(name):
+    rows = swept(name, name, lambda m: None if m > 2.0 else 60.0 * m, alarms, lambda m: 12 if m > 2.0 else 0)
+    assert_within(drawn(of(rows, (name,), (name,))))

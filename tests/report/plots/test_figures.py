@@ -1,0 +1,277 @@
+"""Figures say what happened, in plain text, with the same bytes each time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import nan
+
+import matplotlib
+import numpy as np
+import pytest
+
+from cdtool.activation import Activation
+from cdtool.detection import Signal, Status, Verdict
+from cdtool.errors import CdtoolError, UsageError
+from cdtool.evaluation.traces.trace import Seen, Trace
+from cdtool.evaluation.truth.matching import Matching, match
+from cdtool.operations import operations_of
+from cdtool.pipeline import Detection
+from cdtool.recording import Recording, Series
+from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
+from cdtool.report.plots.detection_plot import plot_detected
+from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
+from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.report.plots.style import look_of
+from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.thresholds.limit import Limit
+from cdtool.workflows.detection import Detected
+from tests.report.conftest import NAMES, Bench
+from tests.report.hostile import HOSTILE
+from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+
+
+@pytest.fixture
+def six_joints() -> Detected:
+    """A log of 6 joints with hand-set limits of which joints 1 and 3 are exceeded; joint 4 is not watched."""
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 10.0, 2e-3)
+    torque = rng.normal(0.0, 1.0, (len(time), 6))
+    torque[2500:2600, [1, 3]] += 60.0
+    names = tuple(f"joint_{i}" for i in range(6))
+    channels = {"torque": Series(time, torque, "N m"), "speed": Series(time, np.ones((len(time), 6)), "rad/s")}
+    recording = Recording("arm", "arm.csv", names, channels)
+    status = np.zeros(torque.shape, dtype=np.uint8)
+    status[1000:1200] = Status.GAP
+    statistic, band = Limit.given((40, 40, 40, 40, float("inf"), 40)).evaluate(
+        recording, Signal(time, torque, status, "N m", joints=names)
+    )
+    alarms, _ = Activation().alarms(statistic, band)
+    assert {alarm.joint for alarm in alarms} == {1, 3}
+    operation = operations_of(recording)[0]
+    return Detected(
+        recording,
+        (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),),
+        (),
+        (Matching((), alarms),),
+    )
+
+
+def test_a_detection_names_latency_alarm_onset_and_what_was_not_assessable(bench: Bench, simulated, tmp_path):
+    found = bench.detected(simulated("stiff", 1), "friction_ekf")
+    (alarm, *_), (hit, *_) = found.detections[0].verdict.alarms, found.contacts
+    plot_detected(found, tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert f"latency {1e3 * (alarm.time - hit.start):.0f} ms" in shown
+    assert f"alarm {alarm.time:.3f} s" in shown
+    assert f"onset {hit.start:.3f} s" in shown
+    for expected in (
+        "stiff1",
+        "friction_ekf",
+        "not assessable: start-up",
+        "load cell [N]",
+        "trigger",
+        "signal [N s/m]",
+    ):
+        assert expected in shown
+    assert "time from contact onset [ms]" in shown
+
+
+def test_a_run_without_alarm_has_neither_zoom_nor_latency(bench: Bench, simulated, tmp_path):
+    plot_detected(bench.detected(simulated("none", 77), "momentum"), tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "no alarm" in shown
+    assert "time [s]" in shown
+    assert "latency" not in shown
+    assert "[ms]" not in shown
+
+
+def judged_anew(found: Detected, detection: Detection) -> Detected:
+    """The same log with another detection, matched with its contacts."""
+    matching = match(detection.verdict, found.contacts, detection.statistic)
+    return replace(found, detections=(detection,), matchings=(matching,))
+
+
+def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simulated, tmp_path):
+    found = bench.detected(simulated("stiff", 1), "momentum")
+    detection = found.detections[0]
+    silent = replace(detection, verdict=Verdict("no alarm"))
+    plot_detected(judged_anew(found, silent), tmp_path / "missed.svg")
+    assert "missed" in joined(tmp_path / "missed.svg")
+    assert "not assessable: missing samples" not in joined(tmp_path / "missed.svg")
+    status = np.full_like(detection.statistic.status, Status.GAP)
+    blind = replace(
+        detection,
+        statistic=replace(detection.statistic, status=status),
+        verdict=Verdict("not assessable", reason="missing samples 100 %"),
+    )
+    plot_detected(judged_anew(found, blind), tmp_path / "blind.svg")
+    shown = joined(tmp_path / "blind.svg")
+    assert "not assessable: missing samples 100 %" in shown
+    assert "missed" not in shown
+
+
+def test_only_the_joints_that_alarm_are_drawn_and_the_others_are_counted(six_joints, tmp_path):
+    plot_detected(six_joints, tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "joint_1" in shown
+    assert "joint_3" in shown
+    assert "joint_0" not in shown
+    assert "2 of 6 joints shown: those that alarm" in shown
+    assert "not assessable: missing samples" in shown
+    assert "load cell" not in shown
+
+
+def missed_by(trace: Trace, name: str) -> Trace:
+    """The same with nothing noticed by one detector."""
+    panels = tuple(
+        replace(panel, seen=(Seen("missed"),), alarms=(), verdict="no alarm") if panel.detector == name else panel
+        for panel in trace.panels
+    )
+    return replace(trace, panels=panels)
+
+
+def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(bench: Bench, simulated, tmp_path):
+    trace = missed_by(bench.trace(simulated("stiff", 2), "stiff"), "pure_inertia")
+    plot_triggers(trace, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    order = [next(i for i, text in enumerate(shown) if text.startswith(name)) for name in NAMES]
+    by_name = dict(zip(NAMES, order, strict=True))
+    assert sorted(NAMES, key=by_name.__getitem__) == ["friction_ekf", "momentum", "pure_torque", "pure_inertia"]
+    late = {panel.detector: panel.seen[0].late for panel in trace.panels}
+    for name in ("friction_ekf", "momentum", "pure_torque"):
+        assert f"{1e3 * late[name]:.0f} ms" in shown
+    assert "missed" in shown
+
+
+def test_a_detector_that_could_not_judge_says_so_in_its_row(bench: Bench, simulated, tmp_path):
+    trace = bench.trace(simulated("stiff", 2), "stiff", ("momentum",))
+    blind = replace(trace.panels[0], seen=(Seen("not_assessable", nan, nan, "the axis stands still"),))
+    plot_triggers(replace(trace, panels=(blind,)), tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    assert "not assessable" in shown and "the axis stands still" in shown
+    assert not any(text.endswith(" ms") for text in shown)
+
+
+def test_a_trace_without_a_load_cell_has_a_row_for_each_detector_alone(bench: Bench, simulated):
+    trace = bench.trace(simulated("stiff", 2), "stiff")
+    with drawing():
+        assert len(trigger_plot._figure(trace).axes) == len(NAMES) + 1
+        figure = trigger_plot._figure(replace(trace, force_time=np.empty(0), force=np.empty(0)))
+    assert len(figure.axes) == len(NAMES)
+
+
+def test_triggers_of_a_run_without_contact_say_so(bench: Bench, simulated, tmp_path):
+    plot_triggers(bench.trace(simulated("none", 77), "holdout"), tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    assert shown.count("no alarm") == len(NAMES)
+    assert any("no contact" in text for text in shown)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_same_figure_has_the_same_bytes(bench: Bench, simulated, evaluated, tmp_path, suffix):
+    found, trace = bench.detected(simulated("soft", 1), "pure_inertia"), bench.trace(simulated("soft", 1), "soft")
+    written = []
+    for name in ("a", "b"):
+        plot_detected(found, tmp_path / f"{name}d{suffix}")
+        plot_triggers(trace, tmp_path / f"{name}t{suffix}")
+        plot_latencies(evaluated, tmp_path / f"{name}l{suffix}")
+        written.append([(tmp_path / f"{name}{kind}{suffix}").read_bytes() for kind in "dtl"])
+    assert written[0] == written[1]
+    assert all(len(content) > 1000 for content in written[0])
+
+
+def test_neither_the_users_settings_nor_ours_leak(evaluated, tmp_path):
+    plot_latencies(evaluated, tmp_path / "a.png")
+    with matplotlib.rc_context({"text.usetex": True, "savefig.dpi": 30, "lines.linewidth": 9, "savefig.bbox": "tight"}):
+        before = dict(matplotlib.rcParams)
+        plot_latencies(evaluated, tmp_path / "b.png")
+        assert dict(matplotlib.rcParams) == before
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "suffix"), [*((kind, ".svg") for kind in HOSTILE), ("math", ".png"), ("long", ".pdf")]
+)
+def test_hostile_names_are_drawn_as_plain_text(bench: Bench, simulated, tmp_path, kind, suffix):
+    name = HOSTILE[kind]
+    recording = replace(simulated("stiff", 1), name=name, joints=(name,))
+    plot_detected(bench.detected(recording, "momentum"), tmp_path / f"d{suffix}")
+    trace = bench.trace(recording, name, ("momentum",))
+    panel = replace(trace.panels[0], detector=name, joint=name, unit=name, reason=name)
+    plot_triggers(replace(trace, recording=name, joints=2, panels=(panel,)), tmp_path / f"t{suffix}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"{figure}{suffix}" for figure in "dt")
+    if suffix == ".svg":
+        for figure in "dt":
+            assert_harmless(tmp_path / f"{figure}.svg", kind)
+
+
+def test_no_text_of_any_figure_is_read_as_mathematics(bench: Bench, simulated, evaluated):
+    from matplotlib.text import Text
+
+    recording = simulated("stiff", 1)
+    found = bench.detected(recording, "momentum")
+    with drawing():
+        figures = [
+            detection_plot._figure(found),
+            trigger_plot._figure(bench.trace(recording, "stiff")),
+            latency_plot._figure(evaluated),
+        ]
+        for figure in figures:
+            figure.draw_without_rendering()
+            artists = figure.findobj(Text)
+            assert len(artists) > 10
+            assert not any(artist.get_parse_math() for artist in artists)
+
+
+def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, six_joints):
+    recording = simulated("stiff", 1)
+    found = bench.detected(replace(recording, name="n" * 300, joints=("j" * 300,)), "friction_ekf")
+    six = replace(six_joints, recording=replace(six_joints.recording, name="n" * 300))
+    trace = bench.trace(recording, "g" * 300)
+    blind = Seen("not_assessable", nan, nan, "W" * 300)
+    wide = replace(trace.panels[0], detector="W" * 300, unit="W" * 300, joint="W" * 300, seen=(blind,))
+    with drawing():
+        figures = [
+            detection_plot._figure(found),
+            detection_plot._figure(six),
+            trigger_plot._figure(trace),
+            trigger_plot._figure(replace(trace, joints=2, panels=(wide, *trace.panels[1:]))),
+        ]
+        for figure in figures:
+            assert_within(figure)
+
+
+def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(evaluated, tmp_path):
+    with pytest.raises(CdtoolError, match="cannot be written") as fault:
+        plot_latencies(evaluated, tmp_path / "no" / "a.png")
+    assert "make the folder" in fault.value.hint
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(CdtoolError) as fault:
+        plot_latencies(evaluated, tmp_path / "folder.png")
+    assert "folder" in fault.value.hint
+    with pytest.raises(UsageError, match=r"a\.gif") as fault:
+        plot_latencies(evaluated, tmp_path / "a.gif")
+    assert ".svg" in fault.value.hint
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch):
+    target = tmp_path / "a.png"
+    target.write_bytes(b"old")
+
+    def fail(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with drawing():
+        figure = new_figure(2.0, 2.0)
+        monkeypatch.setattr("matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", fail)
+        with pytest.raises(CdtoolError, match="No space left"):
+            save(figure, target)
+    assert target.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_detector_looks_the_same_everywhere_and_known_ones_differ():
+    assert len({look_of(name).colour for name in (*NAMES, "inertial_momentum")}) == 5
+    assert len({look_of(name).marker for name in (*NAMES, "inertial_momentum")}) == 5
+    assert look_of("someone's plug-in") == look_of("someone's plug-in")

@@ -1,0 +1,134 @@
+"""A report folder's figures: those for which there is something to show, under names that are safe."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.limits import ForceProfile, ForceStep
+from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.results import RecordingResult, Results
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.report.outputs import Report
+from cdtool.report.plots.folder_figures import most_telling, write_figures
+from cdtool.workflows.force_rows import force_rows
+from tests.evaluation.sweeps import swept
+from tests.report.conftest import Bench, contact
+from tests.report.hostile import HOSTILE
+
+PROFILE = ForceProfile("gap", "A gap", "a standard", False, (ForceStep(0.0, 400.0, "dynamic"),))
+
+
+@pytest.fixture
+def hit(bench: Bench, simulated) -> Trace:
+    return bench.trace(simulated("stiff", 1), "stiff", ("momentum", "pure_inertia"))
+
+
+@pytest.fixture
+def free(bench: Bench, simulated) -> Trace:
+    return bench.trace(simulated("none", 77), "holdout", ("momentum", "pure_inertia"))
+
+
+def with_forces(results: Results, bench: Bench, simulated, *names: str, profile: str = "gap") -> Results:
+    """The same with the force rows of logs of those names, all made from the first stiff impact."""
+    recording = simulated("stiff", 1)
+    (hit,) = bench.trace(recording, "stiff", ("momentum",)).contacts
+    course = force_course(recording, hit)
+    verdict = judge(course, replace(PROFILE, name=profile))
+    rows = [
+        row
+        for name in names
+        for row in force_rows(RecordingResult(name, "stiff", "", 1.0, 1, 1), {1: verdict}, {1: course})
+    ]
+    late = [replace(contact("momentum", "stiff", 60.0, name=name), onset_s=hit.start) for name in names]
+    profiles = {**results.provenance.get("force_profiles", {}), profile: asdict(replace(PROFILE, name=profile))}
+    return replace(
+        results,
+        provenance={**results.provenance, "force_profiles": profiles},
+        forces=(*results.forces, *rows),
+        contacts=(*results.contacts, *late),
+    )
+
+
+def written(folder) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_every_figure_is_written_and_named_with_a_caption(results, bench, simulated, hit, free, tmp_path):
+    rows = swept("momentum", "stiff", lambda m: 60.0 * m, lambda m: 3 if m < 1.0 else 0)
+    full = replace(with_forces(results, bench, simulated, hit.recording), sweep=tuple(rows))
+    images = write_figures(Report(evaluate(full), (hit, free)), tmp_path)
+    names = ["latency.png", "survival.png", "amoc.png", "forces.png", "triggers_stiff.png", "triggers_holdout.png"]
+    assert [image.name for image in images] == names
+    assert written(tmp_path) == sorted(names)
+    assert all(image.caption for image in images)
+    assert [image.group for image in images] == [None, None, None, None, "stiff", "holdout"]
+    assert f"{hit.recording}: all detectors" == images[4].caption
+
+
+def test_what_there_is_nothing_to_show_of_is_not_written(results, tmp_path):
+    images = write_figures(Report(evaluate(replace(results, contacts=())), ()), tmp_path)
+    assert [image.name for image in images] == written(tmp_path) == ["latency.png"]
+
+
+def test_force_verdicts_without_a_kept_curve_draw_nothing(results, bench, simulated, hit, tmp_path):
+    full = with_forces(results, bench, simulated, "another log")
+    images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
+    assert "forces.png" not in [image.name for image in images]
+
+
+def test_a_caption_says_how_many_of_the_judged_contacts_are_drawn(results, bench, simulated, hit, tmp_path):
+    full = with_forces(results, bench, simulated, hit.recording, "another log", "a third")
+    images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
+    caption = next(image.caption for image in images if image.name == "forces.png")
+    assert "the 1 of 3 contacts whose curves were kept" in caption
+    assert "mass" not in caption
+    heavy = replace(full, provenance={**full.provenance, "mass_before_cell_kg": 4.0})
+    images = write_figures(Report(evaluate(heavy), (hit,)), tmp_path)
+    assert "corrected for the mass" in next(image.caption for image in images if image.name == "forces.png")
+
+
+def test_each_of_several_profiles_has_a_figure_of_its_own(results, bench, simulated, hit, tmp_path):
+    other = replace(hit, recording="another log")
+    full = with_forces(results, bench, simulated, hit.recording)
+    full = with_forces(full, bench, simulated, "another log", profile="../wide gap")
+    write_figures(Report(evaluate(full), (hit, other)), tmp_path)
+    assert [name for name in written(tmp_path) if name.startswith("forces")] == [
+        "forces_gap.png",
+        "forces_wide-gap.png",
+    ]
+
+
+def test_groups_named_alike_or_with_a_path_get_safe_names_of_their_own(evaluated: Evaluated, hit, tmp_path):
+    groups = ("a b", "A/B", "../../etc/passwd", *HOSTILE.values())
+    results = replace(evaluated.results, groups=groups)
+    traces = tuple(replace(hit, group=group) for group in groups)
+    images = write_figures(Report(evaluate(results), traces), tmp_path)
+    assert sorted(image.name for image in images) == written(tmp_path)
+    triggers = [image for image in images if image.name.startswith("triggers_")]
+    assert [image.group for image in triggers] == list(groups)
+    assert len({image.name for image in triggers}) == len(groups)
+    assert [image.name for image in triggers[:3]] == [
+        "triggers_a-b.png",
+        "triggers_a-b-2.png",
+        "triggers_etc-passwd.png",
+    ]
+
+
+def test_the_most_telling_trace_has_a_contact_and_most_detectors_that_could_judge(hit, free):
+    fewer = replace(hit, panels=hit.panels[:1])
+    blind = replace(hit, panels=(replace(hit.panels[0], verdict="not assessable"), hit.panels[1]))
+    assert most_telling([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
+    assert most_telling([free, fewer]) is fewer
+    assert most_telling([free]) is free
+
+
+def test_the_same_report_gives_the_same_bytes(evaluated: Evaluated, hit, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        write_figures(Report(evaluated, (hit,)), tmp_path / name)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()

@@ -1,0 +1,167 @@
+"""The latency figure: a mark a contact, missed ones open, the median with its interval, and the counts beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.evaluation.evaluated import evaluate
+from cdtool.evaluation.results import Results
+from cdtool.report.plots import latency_plot
+from cdtool.report.plots.figures import drawing
+from cdtool.report.plots.latency_plot import plot_latencies
+from tests.report.conftest import contact, contacts_of
+from tests.report.hostile import HOSTILE
+from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+
+# The width of the lines that mark medians, and of no other.
+TICK = 2.0
+
+
+def of(results: Results, stiff: Sequence[float | str | None], detector: str = "momentum") -> Results:
+    """One detector and one group with these latencies."""
+    return replace(
+        results, detectors=(detector,), groups=("stiff",), contacts=tuple(contacts_of(detector, "stiff", stiff))
+    )
+
+
+def marks(figure, panel: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the filled and of the open marks."""
+    found = {True: [np.empty(0)], False: [np.empty(0)]}
+    for line in figure.axes[panel].lines:
+        if line.get_color() != "black" and line.get_marker() not in ("None", ">"):
+            found[line.get_markerfacecolor() != "white"].append(line.get_xdata())
+    return np.concatenate(found[True]), np.concatenate(found[False])
+
+
+def drawn(results: Results):
+    with drawing():
+        return latency_plot._figure(evaluate(results))
+
+
+def test_counts_stand_beside_the_latencies(evaluated, tmp_path):
+    plot_latencies(evaluated, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    for expected in ("stiff", "soft", "friction_ekf", "momentum", "3 of 4", "2 of 3", "30 of 30", "missed"):
+        assert expected in shown
+    assert "34.0 (30.0 to not reached)" in shown
+    assert "1 in 40 op." in shown and "in holdout" in shown
+    assert "holdout" not in shown
+
+
+def test_every_detected_contact_has_a_filled_mark_and_every_missed_one_an_open_mark(results):
+    filled, opened = marks(drawn(of(results, [30.0, 34.0, 50.0, None, None, "blind"])))
+    assert sorted(filled) == [30.0, 34.0, 50.0]
+    assert len(opened) == 2
+
+
+def test_missed_contacts_stand_in_a_strip_that_says_how_long_they_were_watched(results, tmp_path):
+    one = of(results, [30.0, 34.0, None])
+    figure = drawn(one)
+    _, opened = marks(figure)
+    low, high = figure.axes[0].get_xlim()
+    assert low < 34.0 < opened[0] < high < 1000.0
+    plot_latencies(evaluate(one), tmp_path / "a.svg")
+    assert "> 1000 ms" in joined(tmp_path / "a.svg")
+    assert "open where it was missed" in joined(tmp_path / "a.svg")
+    lasting = tuple(replace(item, watched_ms=400.0 + 10.0 * i) for i, item in enumerate(one.contacts))
+    plot_latencies(evaluate(replace(one, contacts=lasting)), tmp_path / "b.svg")
+    assert "> 420 ms" in joined(tmp_path / "b.svg")
+
+
+def test_a_missed_contact_that_was_watched_for_less_than_others_took_stands_at_its_time(results):
+    rows = of(results, [30.0, 60.0, None]).contacts
+    cut_off = tuple(replace(item, watched_ms=45.0) if item.outcome == "missed" else item for item in rows)
+    _, opened = marks(drawn(replace(of(results, []), contacts=cut_off)))
+    assert opened.tolist() == [45.0]
+
+
+def test_without_a_miss_there_is_neither_a_strip_nor_a_word_of_it(results, tmp_path):
+    plot_latencies(evaluate(of(results, [30.0, 34.0])), tmp_path / "a.svg")
+    shown = joined(tmp_path / "a.svg")
+    assert "open" not in shown
+    assert "> " not in shown
+    assert "black: median and its 95 % interval" in shown
+
+
+def test_a_median_that_is_not_reached_is_said_and_has_no_tick(results, tmp_path):
+    one = of(results, [30.0, None, None, None])
+    plot_latencies(evaluate(one), tmp_path / "a.svg")
+    assert any(text.startswith("not reached") for text in texts(tmp_path / "a.svg"))
+    assert not [line for line in drawn(one).axes[0].lines if line.get_linewidth() == TICK]
+
+
+def test_a_median_between_the_last_detection_and_the_end_of_watching_stands_in_the_strip(results):
+    one = of(results, [30.0, 34.0, None, None])
+    median = evaluate(one).summaries[0].median.value
+    assert median > 100.0
+    figure = drawn(one)
+    ticks = [line.get_xdata() for line in figure.axes[0].lines if line.get_linewidth() == TICK]
+    assert 34.0 < ticks[0][0] < figure.axes[0].get_xlim()[1] < median
+
+
+def test_latencies_over_more_than_a_decade_get_a_logarithmic_axis(results):
+    wide, narrow = drawn(results), drawn(replace(results, groups=("stiff",)))
+    assert {axes.get_xscale() for axes in wide.axes} == {"log"}
+    assert {axes.get_xscale() for axes in narrow.axes} == {"linear"}
+    assert narrow.axes[0].get_xlim()[0] == 0.0
+
+
+def test_panels_share_their_axis_and_stand_below_each_other(results):
+    first, second = drawn(results).axes
+    assert first.get_xlim() == second.get_xlim()
+    assert (first.get_position().x0, first.get_position().x1) == (second.get_position().x0, second.get_position().x1)
+    assert first.get_position().y0 > second.get_position().y1
+
+
+def test_a_latency_of_zero_is_drawn_on_a_logarithmic_axis_and_said(results, tmp_path):
+    more = replace(results, contacts=(*results.contacts, contact("momentum", "stiff", 0.0)))
+    plot_latencies(evaluate(more), tmp_path / "a.svg")
+    assert "below 1 ms drawn there" in joined(tmp_path / "a.svg")
+
+
+def test_a_detector_that_watched_nothing_has_no_count_of_false_alarms(results, tmp_path):
+    blind = tuple(replace(item, hours=0.0) for item in results.exposure)
+    plot_latencies(evaluate(replace(results, exposure=blind, false_alarms=())), tmp_path / "a.svg")
+    assert not any(text.endswith("op.") for text in texts(tmp_path / "a.svg"))
+
+
+def test_no_contact_only_missed_and_a_single_one_are_drawn_too(results, tmp_path):
+    plot_latencies(evaluate(replace(results, contacts=())), tmp_path / "none.svg")
+    assert "no contact in any group" in joined(tmp_path / "none.svg")
+    plot_latencies(evaluate(of(results, [None] * 30)), tmp_path / "missed.svg")
+    assert "0 of 30" in texts(tmp_path / "missed.svg")
+    _, opened = marks(drawn(of(results, [None] * 30)))
+    assert set(opened) == {1000.0}
+    plot_latencies(evaluate(of(results, [25.0])), tmp_path / "one.svg")
+    assert "1 of 1" in texts(tmp_path / "one.svg")
+
+
+def test_thousands_of_contacts_are_thinned_to_marks_that_span_them_and_it_is_said(results, tmp_path):
+    many = of(results, [float(x) for x in np.linspace(20.0, 90.0, 2000)])
+    filled, _ = marks(drawn(many))
+    assert len(filled) == 400
+    assert (filled.min(), filled.max()) == (20.0, 90.0)
+    plot_latencies(evaluate(many), tmp_path / "a.svg")
+    assert "(400 at most are drawn)" in joined(tmp_path / "a.svg")
+    plot_latencies(evaluate(of(results, [20.0, 30.0])), tmp_path / "b.svg")
+    assert "at most are drawn" not in joined(tmp_path / "b.svg")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_drawn_as_plain_text(results, tmp_path, kind):
+    name = HOSTILE[kind]
+    renamed = tuple(replace(item, group=name, detector=name) for item in results.contacts)
+    exposure = (replace(results.exposure[-1], group=name + " ", detector=name),)
+    hostile = replace(results, groups=(name, name + " "), detectors=(name,), contacts=renamed, exposure=exposure)
+    plot_latencies(evaluate(hostile), tmp_path / "a.svg")
+    assert_harmless(tmp_path / "a.svg", kind)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "W" * 300, "i"])
+def test_nothing_is_clipped_whatever_the_names(results, name):
+    renamed = tuple(replace(item, detector=name, group=name) for item in results.contacts)
+    assert_within(drawn(replace(results, detectors=(name,), groups=(name, "holdout"), contacts=renamed)))

@@ -1,0 +1,124 @@
+"""The survival figure: a step curve a detector, its band where there are few, missed contacts open at their end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.results import Results
+from cdtool.report.plots import survival_plot
+from cdtool.report.plots.figures import drawing
+from cdtool.report.plots.survival_plot import plot_survival
+from tests.report.conftest import contacts_of
+from tests.report.hostile import HOSTILE
+from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+
+FOUR = ("friction_ekf", "momentum", "direct", "pure_torque")
+
+
+def of(latencies: Mapping[str, Sequence[float | str | None]], group: str = "stiff") -> Evaluated:
+    """Detectors with their latencies in one group."""
+    rows = [row for name, late in latencies.items() for row in contacts_of(name, group, late)]
+    return evaluate(Results({}, tuple(latencies), (group,), tuple(rows), (), ()))
+
+
+def drawn(evaluated: Evaluated):
+    with drawing():
+        return survival_plot._figure(evaluated)
+
+
+def steps(figure, panel: int = 0) -> list:
+    return [line for line in figure.axes[panel].lines if line.get_drawstyle() == "steps-post"]
+
+
+def opened(figure, panel: int = 0) -> list[tuple[float, float]]:
+    """Where open marks stand."""
+    lines = [line for line in figure.axes[panel].lines if line.get_markerfacecolor() == "white"]
+    return [point for line in lines for point in zip(line.get_xdata(), line.get_ydata(), strict=True)]
+
+
+def test_a_curve_falls_by_one_step_a_contact_to_nothing():
+    (curve,) = steps(drawn(of({"momentum": [20.0, 40.0, 60.0, 80.0]})))
+    assert curve.get_xdata().tolist() == [0.0, 20.0, 40.0, 60.0, 80.0, 80.0]
+    assert curve.get_ydata() == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0, 0.0])
+
+
+def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_watching():
+    figure = drawn(of({"momentum": [20.0, 40.0, None, "blind"]}))
+    assert opened(figure) == [(1000.0, pytest.approx(1 / 3))]
+    assert steps(figure)[0].get_xdata()[-1] == 1000.0
+    assert figure.axes[0].get_xlim()[1] >= 1000.0
+
+
+def test_few_curves_have_bands_and_many_have_none(tmp_path):
+    few, many = ({name: [20.0, 30.0, 40.0] for name in FOUR[:count]} for count in (3, 4))
+    assert len(drawn(of(few)).axes[0].collections) == 3
+    assert len(drawn(of(many)).axes[0].collections) == 0
+    plot_survival(of(few), tmp_path / "few.svg")
+    plot_survival(of(many), tmp_path / "many.svg")
+    assert "band: 95 % at each time" in joined(tmp_path / "few.svg")
+    assert "band" not in joined(tmp_path / "many.svg")
+
+
+def test_counts_stand_beside_the_curves_the_fastest_first(evaluated, tmp_path):
+    plot_survival(evaluated, tmp_path / "a.svg")
+    shown = texts(tmp_path / "a.svg")
+    for expected in ("stiff", "soft", "3 of 4", "2 of 3", "30 of 30", "missed", "34.0", "still undetected"):
+        assert expected in shown
+    assert shown.index("friction_ekf") < shown.index("momentum")
+    assert "open mark: missed" in joined(tmp_path / "a.svg")
+
+
+def test_a_panel_a_group_with_contacts_all_on_one_axis(evaluated):
+    first, second = drawn(evaluated).axes
+    assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("stiff", "soft")
+    assert first.get_xlim() == second.get_xlim()
+    assert first.get_position().x0 == second.get_position().x0
+
+
+def test_on_a_logarithmic_axis_a_curve_begins_at_the_edge():
+    figure = drawn(of({"momentum": [3.0, 400.0]}))
+    assert figure.axes[0].get_xscale() == "log"
+    assert steps(figure)[0].get_xdata()[0] == figure.axes[0].get_xlim()[0] > 0.0
+
+
+def test_everything_missed_nothing_assessable_one_contact_and_none_are_drawn_too(evaluated, tmp_path):
+    figure = drawn(of({"momentum": [None] * 20}))
+    assert set(steps(figure)[0].get_ydata()) == {1.0}
+    assert opened(figure) == [(1000.0, 1.0)]
+    plot_survival(of({"momentum": ["blind"] * 3}), tmp_path / "blind.svg")
+    assert "not assessable" in texts(tmp_path / "blind.svg")
+    assert steps(drawn(of({"momentum": ["blind"] * 3}))) == []
+    assert steps(drawn(of({"momentum": [25.0]})))[0].get_ydata().tolist() == [1.0, 0.0, 0.0]
+    plot_survival(evaluate(replace(evaluated.results, contacts=())), tmp_path / "none.svg")
+    assert "no contact in any group" in joined(tmp_path / "none.svg")
+
+
+def test_thousands_of_contacts_give_few_marks():
+    late = [float(x) for x in np.linspace(20.0, 90.0, 2000)]
+    figure = drawn(of({"momentum": late}))
+    marked = [line for line in figure.axes[0].lines if line.get_drawstyle() == "default" and len(line.get_xdata())]
+    assert sum(len(line.get_xdata()) for line in marked) <= 10
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_the_same_figure_has_the_same_bytes(evaluated, tmp_path, suffix):
+    for name in ("a", "b"):
+        plot_survival(evaluated, tmp_path / f"{name}{suffix}")
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_names_are_drawn_as_plain_text(tmp_path, kind):
+    name = HOSTILE[kind]
+    plot_survival(of({name: [20.0, 30.0, None]}, name), tmp_path / "a.svg")
+    assert_harmless(tmp_path / "a.svg", kind)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "W" * 300, "i"])
+def test_nothing_is_clipped_whatever_the_names(name):
+    assert_within(drawn(of({name: [20.0, None]}, name)))
