@@ -11,7 +11,8 @@ from pathlib import Path
 
 QUESTIONS = (
     *("friction_ekf", "momentum", "robot_dynamics", "detectors"),
-    *("start_up", "whole_benchmark", "gate_accuracy", "arm_accuracy"),
+    *("start_up", "whole_benchmark", "reports", "interval_coverage", "compare_builds"),
+    *("gate_accuracy", "arm_accuracy"),
 )
 
 

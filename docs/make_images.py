@@ -49,6 +49,20 @@ def gate(work: Path) -> None:
     write_figures(Report(done.evaluated, done.traces), work)
     for name in ("latency.png", "triggers_soft.png"):
         shutil.copyfile(work / name, IMAGES / name)
+    torque = work / "gate.pt.json"
+    cdtool("learn-signature", *free, "-m", "machine.toml", "-d", "pt", "-o", torque, folder=logs)
+    image = IMAGES / "explain_stiff_pt.png"
+    cdtool("explain", "stiff/03.csv", "-m", "machine.toml", "-s", torque, "--plot", image, folder=logs)
+
+
+def budget(work: Path) -> None:
+    """Latency against false alarms on 300 + 300 simulated impact-free runs, at one false alarm in 100 operations."""
+    counts = ("--free", 300, "--holdout", 300, "--stiff", 30, "--soft", 30, "--seed", 5)
+    cdtool("simulate", "gate", "-o", "budget", *counts, folder=work)
+    done = benchmark(work / "budget" / "benchmark.toml", false_alarm_budget="1/100op", jobs=2)
+    write_figures(Report(done.evaluated, done.traces), work)
+    for name in ("amoc.png", "survival.png"):
+        shutil.copyfile(work / name, IMAGES / name)
 
 
 def emps(work: Path) -> None:
@@ -82,7 +96,8 @@ def main() -> int:
     """Make all images that can be made; 1 where one is too large."""
     IMAGES.mkdir(exist_ok=True)
     arm = DATA / "ur10e"
-    sources = {gate: ROOT / "sample_logs" / "gate", emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
+    samples = ROOT / "sample_logs" / "gate"
+    sources = {gate: samples, budget: samples, emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for make, needed in sources.items():
             if needed.is_dir():

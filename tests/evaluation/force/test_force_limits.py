@@ -80,7 +80,7 @@ def test_the_file_is_part_of_the_package():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     data = project["tool"]["setuptools"]["package-data"]["cdtool"]
     assert "evaluation/force/limits.toml" in data
-    assert (ROOT / "cdtool" / "evaluation" / "force_limits.toml").exists()
+    assert (ROOT / "cdtool" / "evaluation" / "force" / "limits.toml").exists()
 
 
 def test_a_file_of_the_user_replaces_the_shipped_one(tmp_path):
