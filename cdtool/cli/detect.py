@@ -108,7 +108,9 @@ def detect(
         for item in skipped:
             print_error(CdtoolError(item.reason))
         raise typer.Exit(ExitStatus.UNUSABLE)
-    print_skipped(skipped)
+    taught = "the signature was learned from it: no alarm here shows nothing"
+    learned = [Skipped(str(log), taught) for log, found in done if found.learned]
+    print_skipped(skipped, learned)
     if as_json:
         pairs = (
             (log, found, *pair) for log, found in done for pair in zip(found.detections, found.matchings, strict=True)

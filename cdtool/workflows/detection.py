@@ -25,7 +25,7 @@ class Detected:
     """A log, what the detector says of each of its operations, and the contacts where the log has ground truth.
 
     `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `activation` is what
-    raised the alarms.
+    raised the alarms. `learned`: the signature was learned from this log, so that no alarm shows nothing.
     """
 
     recording: Recording
@@ -33,6 +33,7 @@ class Detected:
     contacts: tuple[Contact, ...]
     matchings: tuple[Matching, ...]
     activation: Activation = field(default_factory=Activation)
+    learned: bool = False
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -63,6 +64,7 @@ def detect(
         raise UsageError("one threshold is needed: a signature or a limit", "give --signature FILE or --limit VALUE")
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     thresholds: tuple[FittedThreshold, ...]
+    learned: set[str] = set()
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
@@ -70,6 +72,7 @@ def detect(
         if joints:
             raise UsageError("joints belong to a limit", "a signature watches the joints that it was learned for")
         thresholds, joints = stored.current, stored.joints
+        learned = {run.sha256 for run in stored.runs}
         debounce = stored.debounce if debounce is None else debounce
     else:
         if detector is None:
@@ -86,7 +89,7 @@ def detect(
     matchings = tuple(
         match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window) for item in detections
     )
-    return Detected(recording, detections, contacts, matchings, activation)
+    return Detected(recording, detections, contacts, matchings, activation, recording.digest in learned)
 
 
 def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:

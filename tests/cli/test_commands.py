@@ -154,6 +154,13 @@ def test_a_log_of_another_speed_is_not_assessable_not_silent(gate_folder, feekf_
     assert done.status == 0 and "not assessable" in done.out and "no signature for its class" in done.out
 
 
+def test_a_log_that_was_learned_from_is_told_and_shows_nothing(gate_folder, feekf_signature):
+    machine = ("-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    learned = cdtool("detect", gate_folder / "free" / "01.csv", *machine)
+    assert learned.status == 0 and "the signature was learned from it" in learned.err
+    assert "learned from it" not in cdtool("detect", gate_folder / "holdout" / "01.csv", *machine).err
+
+
 def test_updating_adds_free_runs_and_refuses_impacts_and_repeats(gate_folder, feekf_signature, tmp_path):
     signature = tmp_path / "s.json"
     signature.write_bytes(feekf_signature.read_bytes())
