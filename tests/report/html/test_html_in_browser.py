@@ -116,7 +116,8 @@ def test_a_click_on_a_recording_shows_its_trigger_plot(shown):
     assert len(all_of(browser, "#viewer-plot path.force")) == 1
     words = texts(browser, "#viewer-plot text")
     assert "30.0 ms" in words and "missed" in words
-    assert texts(browser, "#viewer-why li") == ["quick: the torque moved first", "slow: the torque moved first"]
+    assert texts(browser, "#viewer-why strong") == ["quick", "slow"]
+    assert texts(browser, "#viewer-why p") == ["the torque moved first"] * 2
     assert "stiff/02.csv" in texts(browser, "tr.open")[0]
 
 

@@ -341,7 +341,10 @@ function makeViewer(data, sources, opened) {
     const list = document.getElementById("viewer-why");
     list.replaceChildren();
     for (const panel of trace.panels) {
-      for (const line of panel.why) make(list, "li", {}, `${data.detectors[panel.detector].name}: ${line}`);
+      if (panel.why.length === 0) continue;
+      const item = make(list, "li", {});
+      make(item, "strong", {}, data.detectors[panel.detector].name);
+      for (const line of panel.why) make(item, "p", {}, line);
     }
     viewer.querySelector('[data-do="before"]').disabled = number === 0;
     viewer.querySelector('[data-do="after"]').disabled = number === sources.length - 1;
