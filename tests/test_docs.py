@@ -51,6 +51,7 @@ EXAMPLES = {
     "docs/python.md": 10,
     "docs/own-detector.md": 2,
     "docs/comparing.md": 1,
+    "docs/impact.md": 6,
     "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }

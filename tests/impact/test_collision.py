@@ -1,0 +1,308 @@
+"""Simulated collisions against closed forms, the chapter 4 example, and what no passive contact may do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.errors import UsageError
+from cdtool.impact.bodies import Bodies, effective_mass
+from cdtool.impact.collision import collide
+from cdtool.impact.contact_laws.base import ContactLaw
+from cdtool.impact.contact_laws.hertz import Hertz
+from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.contact_laws.hysteresis_damping import HysteresisDamping
+from cdtool.impact.contact_laws.kelvin_voigt import KelvinVoigt
+from cdtool.impact.contact_laws.lankarani_nikravesh import LankaraniNikravesh
+from cdtool.impact.restitution import coefficients, damping_for_restitution, hunt_crossley_restitution
+from cdtool.recording import FloatArray
+
+# Table 4.1 on the load side: J_t/r^2, d_t/r^2 and tau/r; the machine touches the wall at r tau/d_t.
+STIFFNESS = 9.8261e8
+EXAMPLE = Bodies(mass_1=2.35e-4 / 0.015**2, speed_1=0.25, push=0.5 / 0.015, friction=0.03 / 0.015**2)
+
+
+@st.composite
+def laws(draw: st.DrawFn) -> ContactLaw:
+    k, x = draw(st.floats(1e5, 1e10)), draw(st.floats(0.0, 3.0))
+    kinds = (
+        Hertz(k, draw(st.sampled_from([1.0, 1.5, 2.0])), draw(st.floats(0.0, 1e-3))),
+        KelvinVoigt(k, x * math.sqrt(k)),
+        HysteresisDamping(k, x * k),
+        HuntCrossley(k, x * k, draw(st.sampled_from([1.0, 1.5, 2.5]))),
+        LankaraniNikravesh(k, draw(st.floats(0.0, 1.0)), draw(st.floats(0.05, 1.0))),
+    )
+    return draw(st.sampled_from(kinds))
+
+
+def test_a_steel_sphere_meets_the_closed_form_of_hertz_to_a_millionth():
+    law, mass = Hertz(1.538462e10), 0.032882
+    hit = collide(law, Bodies(mass, 0.25)).first
+    assert hit.greatest_penetration == pytest.approx(law.greatest_penetration(mass, 0.25), rel=1e-6)
+    assert hit.greatest_penetration == pytest.approx(7.74577e-6, rel=2e-6)
+    assert hit.peak_force == pytest.approx(331.653, rel=1e-5)
+    assert hit.duration == pytest.approx(law.contact_duration(mass, 0.25), rel=1e-6)
+    assert hit.duration == pytest.approx(91.192e-6, rel=1e-5)
+    assert hit.rate[-1] == pytest.approx(-0.25, rel=1e-8)
+
+
+def test_the_example_of_chapter_4_has_the_reference_first_contact():
+    hit = collide(HuntCrossley(STIFFNESS, 0.3 * STIFFNESS), EXAMPLE).first
+    assert hit.peak_force == pytest.approx(864.57, abs=0.05)
+    assert hit.greatest_penetration == pytest.approx(0.0917e-3, abs=5e-8)
+    assert hit.duration == pytest.approx(1.130e-3, abs=1e-6)
+    assert hit.energy_loss == pytest.approx(0.239, abs=5e-4)
+    assert hit.contact_loss == pytest.approx(0.093, abs=5e-4)
+    assert hit.friction_loss[-1] / hit.kinetic[0] == pytest.approx(0.146, abs=5e-4)
+    assert hit.push_work[-1] == pytest.approx(0.0, abs=1e-9)
+    assert hit.rate[-1] == pytest.approx(-0.2181, abs=1e-4)
+    assert hit.restitution.newton == pytest.approx(0.8724, abs=2e-4)
+
+
+def test_the_contact_of_chapter_4_alone_rebounds_with_the_exact_relation():
+    free = replace(EXAMPLE, push=0.0, friction=0.0)
+    hit = collide(HuntCrossley(STIFFNESS, 0.3 * STIFFNESS), free).first
+    assert hit.restitution.newton == pytest.approx(0.95237, abs=5e-6)
+    assert hit.greatest_penetration == pytest.approx(0.0910e-3, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "peak", "depth", "duration", "loss"),
+    [
+        (0.0, 888.1, 0.0935, 1.122, 15.2),
+        (0.3, 864.6, 0.0917, 1.130, 23.9),
+        (0.6, 846.3, 0.0900, 1.137, 31.3),
+        (1.2, 821.8, 0.0870, 1.154, 43.5),
+        (1.7315, 809.5, 0.0847, 1.169, 52.0),
+        (2.5, 801.8, 0.0817, 1.191, 61.5),
+    ],
+)
+def test_the_sweep_of_the_damping_has_the_reference_values(ratio, peak, depth, duration, loss):
+    hit = collide(HuntCrossley(STIFFNESS, ratio * STIFFNESS), EXAMPLE).first
+    assert hit.peak_force == pytest.approx(peak, abs=0.06)
+    assert 1e3 * hit.greatest_penetration == pytest.approx(depth, abs=6e-5)
+    assert 1e3 * hit.duration == pytest.approx(duration, abs=6e-4)
+    assert 100.0 * hit.energy_loss == pytest.approx(loss, abs=0.06)
+
+
+def test_the_example_of_chapter_4_bounces_as_the_reference_and_then_stays():
+    done = collide(HuntCrossley(STIFFNESS, 0.3 * STIFFNESS), EXAMPLE, contacts=20)
+    stated = [
+        (0.0, 0.25, 864.6),
+        (12.25, 0.1368, 447.0),
+        (20.14, 0.0906, 292.8),
+        (26.08, 0.0649, 213.7),
+        (30.89, 0.0482, 166.2),
+        (35.00, 0.0360, 134.6),
+    ]
+    found = [(1e3 * hit.time[0], hit.approach_speed, hit.peak_force) for hit in done.impacts]
+    for (time, speed, peak), (expected_time, expected_speed, expected_peak) in zip(found, stated, strict=False):
+        assert time == pytest.approx(expected_time, abs=0.006)
+        assert speed == pytest.approx(expected_speed, abs=6e-5)
+        assert peak == pytest.approx(expected_peak, abs=0.06)
+    assert len(done.impacts) == 9
+    assert done.stays and [hit.separated for hit in done.impacts] == [True] * 8 + [False]
+    assert done.last_separation == pytest.approx(44.25e-3, abs=5e-6)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("x", [0.01, 0.075, 0.3, 1.0, 2.0])
+def test_hunt_crossley_rebounds_as_its_exact_relation_says_for_every_exponent(x, exponent):
+    law = HuntCrossley(1e8, 2.0 * x * 1e8, exponent)
+    hit = collide(law, Bodies(3.0, 0.5)).first
+    assert hit.restitution.newton == pytest.approx(float(hunt_crossley_restitution(x)), abs=1e-8)
+    assert hit.greatest_penetration == pytest.approx(law.greatest_penetration(3.0, 0.5), rel=1e-8)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.15, 0.99), st.floats(0.01, 5.0), st.floats(0.01, 100.0), st.floats(1e5, 1e11))
+def test_the_damping_for_a_restitution_gives_just_that_rebound(e, speed, mass, stiffness):
+    law = HuntCrossley(stiffness, damping_for_restitution(e, speed, stiffness))
+    assert collide(law, Bodies(mass, speed)).first.restitution.newton == pytest.approx(e, abs=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.1, 0.3, 1.0, 2.0])
+def test_kelvin_voigt_parts_when_its_force_has_ended_and_before_the_surface_is_back(ratio):
+    law = KelvinVoigt(1e6, 2.0 * ratio * math.sqrt(1e6 * 2.0))
+    hit = collide(law, Bodies(2.0, 0.5)).first
+    assert hit.restitution.newton == pytest.approx(law.restitution(2.0), abs=1e-8)
+    assert hit.force[0] == pytest.approx(law.damping * 0.5)
+    assert hit.force[-1] == pytest.approx(0.0, abs=1e-6 * hit.peak_force)
+    assert hit.penetration[-1] > 0.05 * hit.greatest_penetration
+    if ratio < 1.0:
+        # The oscillator's acceleration is 0 at the angle pi - atan2(...) of its damped oscillation.
+        under = math.sqrt(1.0 - ratio**2)
+        angle = math.pi - math.atan2(2.0 * ratio * under, 1.0 - 2.0 * ratio**2)
+        assert hit.duration == pytest.approx(angle / (math.sqrt(1e6 / 2.0) * under), rel=1e-6)
+
+
+@dataclass(frozen=True)
+class Pulling:
+    """Kelvin-Voigt as 3.17 is printed, without its clamp."""
+
+    def force(self, penetration: FloatArray, rate: FloatArray) -> FloatArray:
+        return np.asarray(
+            np.where(np.less(penetration, 0.0), 0.0, 1e6 * np.asarray(penetration) + 400.0 * np.asarray(rate))
+        )
+
+
+def test_a_contact_ends_where_a_law_begins_to_pull():
+    hit = collide(Pulling(), Bodies(2.0, 0.5)).first
+    assert np.min(hit.force) >= -1e-6
+    assert np.all(np.isnan(hit.stored))
+
+
+def test_a_dent_takes_the_energy_that_its_closed_form_says_and_dissipates_it_on_the_way_in():
+    law = Hertz(1e8, permanent_indentation=1e-4)
+    hit = collide(law, Bodies(1.0, 0.5)).first
+    assert hit.restitution.newton == pytest.approx(law.restitution(1.0, 0.5), abs=1e-8)
+    assert hit.penetration[-1] == pytest.approx(1e-4, rel=1e-9)
+    assert hit.dissipated[-1] == pytest.approx(hit.dissipated[hit.turn], rel=1e-7)
+    assert np.all(np.diff(hit.dissipated) >= -1e-8 * hit.kinetic[0])
+
+
+def test_a_dent_deeper_than_the_impact_stops_the_body():
+    hit = collide(Hertz(1e8, permanent_indentation=1e-2), Bodies(1.0, 0.1)).first
+    assert hit.separated
+    assert (hit.restitution.newton, hit.restitution.poisson, hit.restitution.stronge) == (0.0, 0.0, 0.0)
+    assert not collide(Hertz(1e8, permanent_indentation=1e-2), Bodies(1.0, 0.1, push=1.0)).first.separated
+
+
+def test_a_ball_in_its_own_dent_bounces_without_further_loss():
+    done = collide(Hertz(1e8, permanent_indentation=1e-5), Bodies(1.0, 0.1, push=9.81), contacts=4)
+    speeds = [hit.approach_speed for hit in done.impacts]
+    assert speeds[1] == pytest.approx(speeds[0] * done.first.restitution.newton, rel=1e-9)
+    assert speeds[2:] == pytest.approx(speeds[1:-1], rel=1e-7)
+    assert done.impacts[1].penetration[0] == pytest.approx(1e-5, rel=1e-6)
+
+
+def test_a_ball_that_falls_flies_as_long_as_gravity_says():
+    done = collide(HuntCrossley(1e8, 1e8), Bodies(0.5, 0.3, push=0.5 * 9.81), contacts=3)
+    for before, after in zip(done.impacts, done.impacts[1:], strict=False):
+        assert after.time[0] - before.time[-1] == pytest.approx(2.0 * -before.rate[-1] / 9.81, rel=1e-6)
+        assert after.approach_speed == pytest.approx(-before.rate[-1], rel=1e-9)
+
+
+def test_a_flight_with_friction_meets_the_integrated_motion():
+    time, speed = EXAMPLE.flight(-0.2181, 0.0) or (math.nan, math.nan)
+    at = np.linspace(0.0, time, 200_001)
+    settling, final = EXAMPLE.mass_1 / EXAMPLE.friction, EXAMPLE.push / EXAMPLE.friction
+    speeds = final + (-0.2181 - final) * np.exp(-at / settling)
+    assert np.trapezoid(speeds, at) == pytest.approx(0.0, abs=1e-10)
+    assert speed == pytest.approx(speeds[-1], rel=1e-12)
+
+
+def test_bodies_that_nothing_pushes_touch_once():
+    law = HuntCrossley(1e8, 1e8)
+    assert len(collide(law, Bodies(1.0, 0.3), contacts=5).impacts) == 1
+    # Body 2 leaves faster than the push, against the friction, can ever drive body 1.
+    assert len(collide(law, Bodies(1.0, 0.3, 1.0, 0.0, push=0.01, friction=1.0), contacts=5).impacts) == 1
+    caught = collide(law, Bodies(1.0, 0.3, 1.0, 0.0, push=0.01), contacts=2)
+    assert len(caught.impacts) == 2
+    assert caught.impacts[1].approach_speed == pytest.approx(-caught.first.rate[-1], rel=1e-9)
+
+
+def test_a_damper_that_is_pressed_for_good_stays_in_contact():
+    # Ten times critical damping, at the speed to which push and damper settle: it creeps to its rest and never turns.
+    law = KelvinVoigt(1e5, 20.0 * math.sqrt(1e5))
+    done = collide(law, Bodies(1.0, 0.01, push=100.0), contacts=5)
+    assert done.stays and len(done.impacts) == 1
+    assert done.first.penetration[-1] == pytest.approx(1e-3, rel=0.05)
+    assert math.isnan(done.last_separation)
+
+
+def test_the_longest_duration_cuts_a_contact_off():
+    hit = collide(Hertz(1e8), Bodies(1.0, 0.5), longest=1e-4).first
+    assert not hit.separated and hit.duration == pytest.approx(1e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(laws(), st.floats(0.05, 50.0), st.floats(0.05, 50.0), st.floats(0.02, 3.0), st.floats(-2.0, 2.0))
+def test_a_passive_contact_never_makes_energy_never_pulls_and_keeps_the_momentum(law, mass_1, mass_2, approach, drift):
+    hit = collide(law, Bodies(mass_1, drift + approach, mass_2, drift)).first
+    whole = hit.kinetic[0]
+    assert np.min(hit.force) >= 0.0
+    # What is not in the motion is in the contact, and what the contact has dissipated never comes back.
+    assert hit.kinetic + hit.contact_work == pytest.approx(whole, rel=1e-7)
+    assert np.all(np.diff(hit.dissipated) >= -1e-7 * whole)
+    assert np.all(hit.dissipated >= -1e-7 * whole)
+    for e in vars(hit.restitution).values():
+        assert 0.0 <= e <= 1.0 + 1e-7
+    momentum = hit.speeds @ np.array([mass_1, mass_2])
+    assert momentum == pytest.approx(momentum[0], abs=1e-8 * (mass_1 + mass_2) * (approach + abs(drift)))
+    assert hit.impulse[-1] == pytest.approx(mass_1 * (hit.speeds[0, 0] - hit.speeds[-1, 0]), rel=1e-6)
+    e = hit.restitution
+    assert (e.poisson, e.stronge) == pytest.approx((e.newton, e.newton), abs=1e-5)
+
+
+@settings(max_examples=15, deadline=None)
+@given(laws(), st.floats(0.1, 10.0), st.floats(0.05, 1.0), st.floats(0.0, 200.0), st.floats(0.0, 50.0))
+def test_the_energies_of_a_pushed_impact_add_up(law, mass, speed, push, friction):
+    hit = collide(law, Bodies(mass, speed, push=push, friction=friction)).first
+    total = hit.kinetic + hit.contact_work + hit.friction_loss - hit.push_work
+    assert total == pytest.approx(hit.kinetic[0], rel=1e-6)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.1, 10.0), st.floats(0.05, 2.0), st.floats(1e5, 1e10), st.floats(1.5, 20.0))
+def test_a_simulated_contact_of_hertz_scales_as_its_closed_form(mass, speed, stiffness, factor):
+    law = Hertz(stiffness)
+    first, second = (collide(law, Bodies(mass, v)).first for v in (speed, factor * speed))
+    assert first.duration == pytest.approx(2.9432752 * first.greatest_penetration / speed, rel=1e-6)
+    assert second.duration / first.duration == pytest.approx(factor**-0.2, rel=1e-6)
+    assert second.peak_force / first.peak_force == pytest.approx(factor**1.2, rel=1e-6)
+
+
+def test_two_bodies_hit_as_one_of_their_effective_mass():
+    law = HuntCrossley(1e8, 5e7)
+    both = collide(law, Bodies(2.0, 0.6, 3.0, 0.1)).first
+    one = collide(law, Bodies(effective_mass(2.0, 3.0), 0.5)).first
+    assert effective_mass(2.0, 3.0) == pytest.approx(1.2)
+    assert effective_mass(2.0) == 2.0
+    assert (both.duration, both.peak_force) == pytest.approx((one.duration, one.peak_force), rel=1e-8)
+
+
+def test_the_coefficients_from_the_curves_are_those_of_the_integration():
+    hit = collide(HuntCrossley(1e8, 1e8), Bodies(1.0, 0.5)).first
+    found = coefficients(hit.time, hit.rate, hit.force)
+    assert (found.newton, found.poisson, found.stronge) == pytest.approx([hit.restitution.newton] * 3, abs=1e-5)
+
+
+def test_a_result_cannot_be_changed():
+    hit = collide(Hertz(1e8), Bodies(1.0, 0.5)).first
+    with pytest.raises(ValueError, match="read-only"):
+        hit.force[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"mass_1": 0.0}, "mass 1"),
+        ({"mass_1": math.inf}, "mass 1"),
+        ({"mass_2": -1.0}, "mass 2"),
+        ({"speed_2": 0.5}, "nearer"),
+        ({"push": -1.0}, "push"),
+        ({"friction": math.nan}, "friction"),
+    ],
+)
+def test_bodies_without_meaning_are_refused(changed, said):
+    with pytest.raises(UsageError, match=said):
+        Bodies(**({"mass_1": 1.0, "speed_1": 0.5} | changed))
+
+
+def test_a_law_that_stops_nothing_and_counts_without_meaning_are_refused():
+    class Nothing:
+        def force(self, penetration: FloatArray, rate: FloatArray) -> FloatArray:
+            return np.zeros_like(penetration) * rate
+
+    with pytest.raises(UsageError, match="stop"):
+        collide(Nothing(), Bodies(1.0, 0.5))
+    with pytest.raises(UsageError, match="contacts"):
+        collide(Hertz(1e8), Bodies(1.0, 0.5), contacts=0)
+    with pytest.raises(UsageError, match="longest"):
+        collide(Hertz(1e8), Bodies(1.0, 0.5), longest=0.0)
