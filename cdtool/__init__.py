@@ -7,9 +7,11 @@ What a command does, a notebook does in one line:
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
+    cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
     cdtool.plan(missed_at_most="5%")                                    -> Plan
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
+    cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
     cdtool.simulate_arm(folder, {"free": 14, "stiff": 30}, seed=1, trial=2)  -> the same
 """
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from cdtool.workflows.learning import learn_signature
     from cdtool.workflows.planning import plan
     from cdtool.workflows.runs import read_log as read
+    from cdtool.workflows.score_triggers import score
+    from cdtool.workflows.study import study_sensors
 
 _API = {
     "__version__": "cdtool.version:__version__",
@@ -39,9 +43,11 @@ _API = {
     "detect": "cdtool.workflows.detection:detect",
     "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
+    "score": "cdtool.workflows.score_triggers:score",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
+    "study_sensors": "cdtool.workflows.study:study_sensors",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }
@@ -56,8 +62,10 @@ __all__ = [
     "learn_signature",
     "plan",
     "read",
+    "score",
     "simulate_arm",
     "simulate_gate",
+    "study_sensors",
 ]
 
 

@@ -46,3 +46,13 @@ def test_every_module_says_what_it_is_and_stays_readable():
         text = path.read_text(encoding="utf-8")
         assert text.startswith('"""'), path
         assert text.count("\n") <= 300, path
+
+
+def test_the_python_api_names_functions_that_exist_and_every_command_has_one():
+    import cdtool
+    from cdtool.cli.app import app
+
+    assert all(callable(getattr(cdtool, name)) for name in cdtool.__all__ if name != "__version__")
+    commands = {(item.name or "").replace("-", "_") for item in app.registered_commands}
+    # `report` writes files of what `benchmark` gave; `list` shows the registries.
+    assert commands - {"report", "list"} <= set(cdtool.__all__)

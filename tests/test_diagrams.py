@@ -20,6 +20,10 @@ NAMES = [
     "direct",
     "energy_observer",
     "friction_ekf",
+    "impact_control",
+    "impact_elastic",
+    "impact_momentum",
+    "impact_rigid",
     "inertial_momentum",
     "kalman_momentum",
     "momentum_observer",
@@ -30,13 +34,13 @@ NAMES = [
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """docs/make_diagrams.py as a module; docs is no package."""
-    spec = importlib.util.spec_from_file_location("make_diagrams", DOCS / "make_diagrams.py")
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is no package."""
+    for name in ("make_diagrams", "make_impact_diagrams"):
+        spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+        assert spec and spec.loader
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules["make_diagrams"]
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +57,7 @@ def content(path: Path) -> tuple[list[str], list[str]]:
     return words, re.findall(r"<!-- (\$.*?\$) -->", text)
 
 
-def test_the_script_makes_exactly_the_diagrams_of_the_docs(made):
+def test_the_scripts_make_exactly_the_diagrams_of_the_docs(made):
     for folder in (made, DOCS / "images"):
         assert sorted(path.stem for path in folder.glob("*.svg")) == NAMES, folder
 

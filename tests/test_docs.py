@@ -46,12 +46,14 @@ COMMANDS = {
     "docs/ci.md": 3,
     "docs/own-detector.md": 1,
     "docs/comparing.md": 7,
+    "docs/study.md": 2,
 }
 EXAMPLES = {
     "docs/python.md": 10,
     "docs/own-detector.md": 2,
     "docs/comparing.md": 1,
     "docs/impact.md": 6,
+    "docs/transmission.md": 3,
     "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }

@@ -22,6 +22,7 @@ from cdtool.cli.plan import plan
 from cdtool.cli.report import report
 from cdtool.cli.score import score
 from cdtool.cli.simulate import simulate
+from cdtool.cli.study import study
 from cdtool.errors import CdtoolError, ExitStatus
 
 app = typer.Typer(
@@ -41,6 +42,7 @@ app.command("score")(score)
 app.command("compare")(compare)
 app.command("plan")(plan)
 app.add_typer(simulate, name="simulate")
+app.add_typer(study, name="study")
 app.command("list")(list_known)
 
 

@@ -1,0 +1,102 @@
+"""The driven load as transfer functions: free, in contact behind a rigid, and behind an elastic transmission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.errors import UsageError
+from cdtool.impact.checks import require_not_negative, require_positive
+from cdtool.impact.contact_laws.base import ContactLaw
+from cdtool.impact.transfer import Transfer
+from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
+
+
+@dataclass(frozen=True)
+class ContactStiffness:
+    """A contact about one state: K_c = dF/d(delta) [N/m] and D_c = dF/d(delta') [N s/m] at the load."""
+
+    stiffness: float
+    damping: float
+
+
+def linearised_contact(law: ContactLaw, penetration: float, rate: float) -> ContactStiffness:
+    """K_c and D_c of a law about a penetration [m] and its rate [m/s]; r^2 times them is 4.17.
+
+    Central differences, good to about 1e-8 of the value, so any law will do. Raises UsageError outside the contact.
+    Both change with the state: see `docs/transmission.md` for how far one may go from it.
+    """
+    require_positive("penetration", penetration, "m")
+    depth, change = 1e-4 * penetration, 1e-4 * max(abs(rate), 1e-3)
+    if law.force(penetration - depth, rate) <= 0.0:
+        raise UsageError(f"no contact force at {penetration:g} m and {rate:g} m/s", "a state within the contact")
+    return ContactStiffness(
+        float(law.force(penetration + depth, rate) - law.force(penetration - depth, rate)) / (2.0 * depth),
+        float(law.force(penetration, rate + change) - law.force(penetration, rate - change)) / (2.0 * change),
+    )
+
+
+def free_rigid(transmission: RigidTransmission) -> Transfer:
+    """Theta/tau_m = 1 / (J_t s^2 + d_t s) [rad/(N m)] (4.8): poles 0 and -d_t/J_t, gain 1/d_t."""
+    return Transfer((1.0,), (transmission.inertia, transmission.friction, 0.0), "rad/(N m)")
+
+
+def rigid_in_contact(transmission: RigidTransmission, law: ContactLaw, penetration: float, rate: float) -> Transfer:
+    """Theta/tau_m = 1 / (J_t s^2 + (d_t + D) s + K) [rad/(N m)] about a state of the contact (4.18, 4.16, 4.17).
+
+    K = r^2 K_c and D = r^2 D_c. `transfer.second_order` gives wn, xi and 1/K. It is the answer to a small change of the
+    torque while the contact stays about that state; an impact of a stiff contact leaves it within its first ms.
+    """
+    contact, square = linearised_contact(law, penetration, rate), transmission.ratio**2
+    damping = transmission.friction + square * contact.damping
+    return Transfer((1.0,), (transmission.inertia, damping, square * contact.stiffness), "rad/(N m)")
+
+
+def penetration_by_momentum(
+    transmission: ElasticTransmission, contact_stiffness: float, contact_damping: float = 0.0
+) -> Transfer:
+    """G_cd: penetration a unit of the load's initial momentum [m/(N s)] (4.27, 4.29 and 4.30 corrected, d_l added).
+
+        (J_m s^2 + d_t s + k_el) / (a4 s^4 + a3 s^3 + a2 s^2 + a1 s + a0),  d_t = d_m + d_el
+
+    `contact_stiffness` K_c [N/m] and `contact_damping` D_c [N s/m] belong to a linear contact (4.25 corrected); gain
+    1/K_c. The friction of the load adds to D_c. Valid until the bodies part.
+    """
+    require_positive("contact stiffness", contact_stiffness, "N/m")
+    require_not_negative("contact damping", contact_damping, "N s/m")
+    t, square = transmission, transmission.ratio**2
+    friction, k_c, d_c = t.motor_friction + t.damping, contact_stiffness, contact_damping + t.load_friction
+    a1 = friction * k_c + d_c * t.stiffness + t.motor_friction * t.stiffness / square
+    a2 = t.motor_inertia * k_c + d_c * friction + t.stiffness * t.load_mass
+    a2 += (t.motor_inertia * t.stiffness + t.motor_friction * t.damping) / square
+    a3 = t.motor_inertia * d_c + friction * t.load_mass + t.motor_inertia * t.damping / square
+    a4, a0 = t.motor_inertia * t.load_mass, k_c * t.stiffness
+    return Transfer((t.motor_inertia, friction, t.stiffness), (a4, a3, a2, a1, a0), "m/(N s)")
+
+
+def motor_by_penetration(transmission: ElasticTransmission) -> Transfer:
+    """G_dt: Theta/delta = (1/r) (d_el s + k_el) / (J_m s^2 + d_t s + k_el) [rad/m] (4.28 corrected): gain 1/r."""
+    t = transmission
+    friction = t.motor_friction + t.damping
+    numerator = (t.damping / t.ratio, t.stiffness / t.ratio) if t.damping else (t.stiffness / t.ratio,)
+    return Transfer(numerator, (t.motor_inertia, friction, t.stiffness), "rad/m")
+
+
+def undamped(transmission: ElasticTransmission) -> ElasticTransmission:
+    """The same without friction and damping, as 4.31 to 4.35 take it."""
+    t = transmission
+    return ElasticTransmission(t.motor_inertia, t.load_mass, t.ratio, t.stiffness)
+
+
+def resonances(transmission: ElasticTransmission, contact_stiffness: float) -> tuple[float, float]:
+    """w1 < w2 [rad/s] of the undamped motion in contact (4.33, 4.34 corrected).
+
+    A w^4 - B w^2 + C = 0, A = J_m M_l, B = J_m K_c + k_el M_l + J_m k_el/r^2, C = K_c k_el. Always
+    w1 < sqrt(k_el/J_m) < w2.
+    """
+    denominator = penetration_by_momentum(undamped(transmission), contact_stiffness).denominator
+    a, b, c = denominator[0], denominator[2], denominator[4]
+    # Without cancellation: the larger root first, the smaller from their product.
+    upper = (b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    return float(np.sqrt(c / (a * upper))), float(np.sqrt(upper))

@@ -1,0 +1,189 @@
+"""Which sensor sees an impact first, and at which force: figure 4.10 of the thesis, computed for one machine.
+
+Conventions: the machine moves at steady speed under speed control and touches the obstacle at time 0. What a sensor
+sees is its deviation from the steady motion; it has seen the impact when that exceeds k sigma of its noise and its
+resolution. The machine's own scatter (friction along the path, ripple) counts only where it is put into the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.errors import UsageError, nearest
+from cdtool.impact.checks import require_positive
+from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.drives import SpeedController
+from cdtool.impact.rigidity import Rigidity, rigidity
+from cdtool.impact.sensors import QUANTITIES, Sensor
+from cdtool.impact.transmission import ElasticTransmission
+from cdtool.impact.transmission_simulation import Motion, simulate_impact
+from cdtool.recording import FloatArray
+
+_SAMPLES = 10_000
+# A change that saves less than this share of the time is no remedy.
+_WORTH = 0.02
+ITSELF = "the impact itself"
+
+
+@dataclass(frozen=True)
+class ImpactCase:
+    """A machine that meets an obstacle at steady `speed` [m/s]; watched for `window` [s] from the touch on.
+
+    The controller's reference is speed/r, whatever its own says. Raises UsageError for values without meaning.
+    """
+
+    transmission: ElasticTransmission
+    controller: SpeedController
+    obstacle: HuntCrossley
+    speed: float
+    window: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_positive("speed", self.speed, "m/s")
+        require_positive("window", self.window, "s")
+        if self.obstacle.exponent != 1.0:
+            raise UsageError(
+                f"the obstacle's exponent is {self.obstacle.exponent:g}", "a ranking takes a linear one: 1"
+            )
+
+    def simulate(self) -> Motion:
+        """The impact, simulated from the touch on."""
+        reference = self.speed / self.transmission.ratio
+        controller = replace(self.controller, reference=reference)
+        return simulate_impact(
+            self.transmission,
+            controller,
+            self.obstacle,
+            gap=0.0,
+            load_speed=self.speed,
+            duration=self.window,
+            samples=_SAMPLES,
+        )
+
+
+@dataclass(frozen=True)
+class Sight:
+    """When a sensor has seen the impact [s], the contact force at that moment [N], and what would help most.
+
+    `peak_so_far` is the largest force up to that moment [N]: a load that has bounced off may have no force on it then.
+    `time`, `force` and `peak_so_far` are None where it sees nothing within the window. `limited_by` is the one of its
+    causes whose improvement by a factor of two saves the most, `saving` [s]; `remedy` says the improvement. Where none
+    of them saves 2 %, it is the impact itself.
+    """
+
+    sensor: Sensor
+    threshold: float
+    time: float | None
+    force: float | None
+    peak_so_far: float | None
+    limited_by: str
+    remedy: str
+    saving: float | None
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The sensors from the first to the last that sees the impact; those that see nothing come last.
+
+    `time` (n,) and `contact_force` (n,) are the impact's course [s, N]; `factor` is the k of k sigma.
+    """
+
+    case: ImpactCase
+    factor: float
+    sights: tuple[Sight, ...]
+    time: FloatArray
+    contact_force: FloatArray
+    rigidity: Rigidity
+
+    @property
+    def peak_force(self) -> float:
+        """The largest contact force within the window [N]."""
+        return float(np.max(self.contact_force))
+
+    @property
+    def peak_time(self) -> float:
+        """When that is [s]."""
+        return float(self.time[int(np.argmax(self.contact_force))])
+
+
+def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.0) -> Ranking:
+    """Simulate the impact and say when each sensor exceeds `factor` sigma of its noise and its resolution.
+
+    Times hold for the unluckiest sampling instants. Raises UsageError for an unknown quantity and k <= 0.
+    """
+    require_positive("k", factor)
+    for sensor in sensors:
+        if sensor.quantity not in QUANTITIES:
+            raise UsageError(f"a sensor of '{sensor.quantity}'", nearest(sensor.quantity, QUANTITIES))
+    motion = case.simulate()
+    shown = deviations(case, motion)
+    stronger = {cause: deviations(other, other.simulate()) for cause, other in _stronger_machines(case).items()}
+    time = motion.time
+    sights = [_sight(sensor, factor, motion, shown, stronger) for sensor in sensors]
+    order = sorted(sights, key=lambda item: np.inf if item.time is None else item.time)
+    return Ranking(case, factor, tuple(order), time, motion.force, rigidity(case.transmission, case.obstacle.stiffness))
+
+
+def deviations(case: ImpactCase, motion: Motion) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Time (n,) and deviation (n,) from the steady motion, by quantity; on the load side."""
+    transmission = case.transmission
+    steady_drive = transmission.load_friction * case.speed
+    steady_motor = transmission.steady_torque(case.speed) / transmission.ratio
+    position = motion.motor_position - motion.motor_position[0]
+    values = {
+        "contact_force": motion.force,
+        "drive_force": motion.drive_force - steady_drive,
+        "load_acceleration": motion.load_acceleration,
+        "motor_position": position * transmission.ratio - case.speed * motion.time,
+        "motor_force": motion.motor_torque / transmission.ratio - steady_motor,
+    }
+    return {name: (motion.time, course) for name, course in values.items()}
+
+
+def _stronger_machines(case: ImpactCase) -> dict[tuple[str, str], ImpactCase]:
+    """The case with one part of the machine twice as good, by (cause, remedy)."""
+    transmission, controller = case.transmission, case.controller
+    stiffer = replace(transmission, stiffness=2.0 * transmission.stiffness)
+    quicker = replace(controller, proportional=2.0 * controller.proportional, integral=2.0 * controller.integral)
+    found = {
+        ("elastic drive", "twice the stiffness"): replace(case, transmission=stiffer),
+        ("speed controller", "twice the gains"): replace(case, controller=quicker),
+    }
+    if np.isfinite(controller.slew_limit):
+        steeper = replace(controller, slew_limit=2.0 * controller.slew_limit)
+        found["slew limit", "twice the slope"] = replace(case, controller=steeper)
+    return found
+
+
+def _sight(
+    sensor: Sensor,
+    factor: float,
+    motion: Motion,
+    shown: Mapping[str, tuple[FloatArray, FloatArray]],
+    stronger: Mapping[tuple[str, str], Mapping[str, tuple[FloatArray, FloatArray]]],
+) -> Sight:
+    time = sensor.time_to_see(*shown[sensor.quantity], factor)
+    better = {
+        ("noise", "half the noise"): sensor.half_the_noise(),
+        ("resolution", "twice the counts"): sensor.half_the_step(),
+        ("low-pass", "twice the bandwidth"): sensor.twice_the_bandwidth(),
+        ("sampling", "twice the rate"): sensor.twice_the_rate(),
+    }
+    times = {cause: other.time_to_see(*shown[sensor.quantity], factor) for cause, other in better.items()}
+    times |= {cause: sensor.time_to_see(*other[sensor.quantity], factor) for cause, other in stronger.items()}
+    window = float(motion.time[-1])
+    known = {cause: window if value is None else value for cause, value in times.items()}
+    cause = min(known, key=lambda item: known[item])
+    saving = (window if time is None else time) - known[cause]
+    force = peak = None
+    if time is not None:
+        force = float(np.interp(time, motion.time, motion.force))
+        peak = max(force, float(np.max(motion.force[motion.time <= time])))
+    threshold = sensor.threshold(factor)
+    if saving <= _WORTH * (window if time is None else time):
+        return Sight(sensor, threshold, time, force, peak, ITSELF, "", None)
+    # Where nothing was seen, how much sooner the remedy makes it is not known.
+    return Sight(sensor, threshold, time, force, peak, *cause, None if time is None else saving)

@@ -1,0 +1,168 @@
+"""Which sensor sees an impact first: closed forms of a sensor, and what a better one may never make worse."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.errors import UsageError
+from cdtool.impact import thesis_example as example
+from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.sensor_ranking import ITSELF, Ranking, deviations, rank_sensors
+from cdtool.impact.sensors import Sensor
+
+TIME = np.linspace(0.0, 0.2, 4001)
+
+
+def sensor(**changed: object) -> Sensor:
+    plain = Sensor("force", "here", "contact_force", "N", 1.0, 0.0, math.inf, 1000.0)
+    return replace(plain, **changed)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def ranking() -> Ranking:
+    return rank_sensors(example.RANKED, example.SENSORS)
+
+
+def test_a_ramp_is_seen_at_threshold_over_slope_and_up_to_one_sample_later():
+    seen = sensor(noise=2.0).time_to_see(TIME, 1000.0 * TIME, 5.0)
+    assert seen is not None and 0.010 <= seen <= 0.011 + 1e-9
+
+
+def test_the_threshold_is_k_sigma_and_a_whole_step():
+    assert sensor(noise=2.0, resolution=0.5).threshold(4.0) == pytest.approx(8.5)
+
+
+def test_a_low_pass_sees_a_step_by_its_time_constant_later():
+    corner = 10.0
+    seen = sensor(bandwidth=corner, noise=1.0, sample_rate=1e4).time_to_see(TIME, np.full(TIME.size, 10.0), 5.0)
+    assert seen == pytest.approx(math.log(2.0) / (2.0 * math.pi * corner), abs=2e-4)
+
+
+def test_a_count_that_comes_early_cannot_reach_the_step_of_a_differentiated_position():
+    count, speed = 1e-4, 0.0137
+    encoder = sensor(unit="m/s", noise=0.0, resolution=count, bandwidth=60.0, differentiated=True)
+    time = np.arange(0.0, 2.0, 1e-3)
+    keep = math.exp(-2.0 * math.pi * 60.0 / 1000.0)
+    filtered, largest = 0.0, 0.0
+    rates = np.diff(np.floor(speed * time / count) * count, prepend=0.0) * 1000.0
+    for i, rate in enumerate(rates):
+        filtered = keep * filtered + (1.0 - keep) * rate
+        largest = max(largest, abs(filtered - speed)) if i > 200 else largest
+    assert 0.4 * encoder.step < largest <= encoder.step
+
+
+def test_a_differentiated_ramp_is_its_slope():
+    encoder = sensor(noise=0.0, resolution=0.0, bandwidth=60.0, differentiated=True)
+    logged, period, _ = encoder.logged(TIME, 3.0 * TIME)
+    assert period == 1e-3
+    assert logged[:, -1] == pytest.approx(3.0, rel=1e-3)
+
+
+def test_what_never_exceeds_the_threshold_is_not_seen():
+    assert sensor(noise=1.0).time_to_see(TIME, np.full(TIME.size, 4.9), 5.0) is None
+
+
+def test_a_pulse_between_two_samples_is_not_promised():
+    pulse = np.where((TIME > 0.0102) & (TIME < 0.0106), 100.0, 0.0)
+    assert sensor(sample_rate=100.0).time_to_see(TIME, pulse, 5.0) is None
+    assert sensor(sample_rate=1e4).time_to_see(TIME, pulse, 5.0) == pytest.approx(0.0104, abs=3e-4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    noise=st.floats(0.01, 10.0),
+    less=st.floats(0.1, 1.0),
+    resolution=st.floats(0.0, 5.0),
+    bandwidth=st.sampled_from([5.0, 50.0, 500.0, math.inf]),
+    rate=st.sampled_from([200.0, 1000.0, 4000.0]),
+    swing=st.floats(1.0, 60.0),
+)
+def test_less_noise_or_finer_counts_never_see_later(noise, less, resolution, bandwidth, rate, swing):
+    deviation = 20.0 * np.sin(swing * TIME)
+    plain = sensor(noise=noise, resolution=resolution, bandwidth=bandwidth, sample_rate=rate)
+    limit = plain.time_to_see(TIME, deviation, 5.0)
+    for better in (replace(plain, noise=less * noise), replace(plain, resolution=less * resolution)):
+        seen = better.time_to_see(TIME, deviation, 5.0)
+        assert limit is None or (seen is not None and seen <= limit)
+
+
+@settings(max_examples=30, deadline=None)
+@given(slope=st.floats(100.0, 1e5), bandwidth=st.floats(5.0, 500.0))
+def test_a_quicker_low_pass_of_the_same_noise_never_sees_a_growing_force_later(slope, bandwidth):
+    slow = sensor(bandwidth=bandwidth).time_to_see(TIME, slope * TIME, 5.0)
+    quick = sensor(bandwidth=2.0 * bandwidth).time_to_see(TIME, slope * TIME, 5.0)
+    assert quick is not None and slow is not None and quick <= slow
+
+
+def test_the_order_is_that_of_figure_4_10(ranking):
+    order = [item.sensor.name for item in ranking.sights]
+    assert order[0] == "load_cell" and order[-1] == "motor_torque"
+    assert set(order[1:3]) == {"accelerometer", "torque_sensor"}
+    times = [item.time for item in ranking.sights]
+    assert times == sorted(times)
+
+
+def test_the_force_is_that_of_the_simulated_impact_at_that_moment(ranking):
+    for item in ranking.sights:
+        assert item.force == pytest.approx(np.interp(item.time, ranking.time, ranking.contact_force))
+        assert item.peak_so_far >= item.force
+    assert ranking.peak_force == pytest.approx(ranking.contact_force.max())
+
+
+def test_the_steady_motion_deviates_by_nothing_at_the_touch():
+    motion = example.RANKED.simulate()
+    for name, (_, course) in deviations(example.RANKED, motion).items():
+        assert abs(course[0]) < 1e-9 * max(1.0, np.abs(course).max()), name
+
+
+def test_what_limits_names_the_improvement_that_saves_most():
+    noisy = replace(example.SENSORS[2], noise=5.0, resolution=0.0)
+    (found,) = rank_sensors(example.RANKED, [noisy]).sights
+    assert (found.limited_by, found.remedy) == ("noise", "half the noise")
+    (better,) = rank_sensors(example.RANKED, [noisy.half_the_noise()]).sights
+    assert found.saving == pytest.approx(found.time - better.time)
+    slow = replace(example.SENSORS[0], sample_rate=100.0)
+    (found,) = rank_sensors(example.RANKED, [slow]).sights
+    assert found.limited_by == "sampling"
+
+
+def test_a_slew_limit_can_be_what_limits_the_control_action():
+    case = replace(example.RANKED, controller=replace(example.SPEED_LOOP, slew_limit=0.5))
+    (found,) = rank_sensors(case, [example.SENSORS[-1]]).sights
+    (free,) = rank_sensors(example.RANKED, [example.SENSORS[-1]]).sights
+    assert found.time > 3.0 * free.time
+    quicker = replace(case, controller=replace(case.controller, slew_limit=1.0))
+    (better,) = rank_sensors(quicker, [example.SENSORS[-1]]).sights
+    assert found.saving >= found.time - better.time > 0.0
+
+
+def test_a_sensor_that_sees_nothing_comes_last_without_a_time():
+    deaf = replace(example.SENSORS[0], noise=1e6)
+    found = rank_sensors(example.RANKED, [deaf, example.SENSORS[0]])
+    last = found.sights[-1]
+    assert (last.sensor, last.time, last.force, last.peak_so_far, last.saving) == (deaf, None, None, None, None)
+    assert last.limited_by == ITSELF
+
+
+def test_without_noise_counts_and_filter_only_sampling_is_left():
+    ideal = sensor(noise=0.0, sample_rate=1e4)
+    (found,) = rank_sensors(example.RANKED, [ideal]).sights
+    assert found.time is not None and found.time <= 1.1e-4
+
+
+def test_values_without_meaning_are_named():
+    with pytest.raises(UsageError, match="a sensor of 'force'"):
+        rank_sensors(example.RANKED, [sensor(quantity="force")])
+    with pytest.raises(UsageError, match="k is 0"):
+        rank_sensors(example.RANKED, [sensor()], 0.0)
+    with pytest.raises(UsageError, match=r"exponent is 1\.5"):
+        replace(example.RANKED, obstacle=HuntCrossley(1e8, 0.0, 1.5))
+    for name, value in (("noise", -1.0), ("sample_rate", 0.0), ("bandwidth", 0.0), ("resolution", math.nan)):
+        with pytest.raises(UsageError, match=name.replace("_", " ")):
+            sensor(**{name: value})
