@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -61,7 +62,7 @@ class Signal:
         valid: BoolArray = self.status == Status.VALID
         return valid
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Median sample period [s]; 0 below two samples."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0

@@ -16,8 +16,7 @@ from cdtool.detectors.contract import checked_signal
 from cdtool.operations import Operation
 from cdtool.recording import FloatArray
 from cdtool.thresholds.base import FittedThreshold, exceedance
-from cdtool.thresholds.fitted_signature import FittedSignature
-from cdtool.thresholds.signature import SPEED_TOLERANCE
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -140,14 +139,15 @@ def judge(
 
 
 def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:
-    """The threshold that applies to an operation, or None and why; nothing to say where nothing was learned at all."""
+    """The threshold that applies to an operation, or None and why; nothing to say where nothing was learned at all.
+
+    One with a class of motion (`motion`) serves that class alone, one without serves all.
+    """
     if not thresholds:
         return None, ""
-    learned = [item for item in thresholds if isinstance(item, FittedSignature)]
-    if len(learned) < len(thresholds):
-        return next(item for item in thresholds if not isinstance(item, FittedSignature)), ""
-    for item in learned:
-        if item.motion.matches(operation.motion, SPEED_TOLERANCE):
+    learned = [(getattr(item, "motion", None), item) for item in thresholds]
+    for motion, item in learned:
+        if motion is None or motion.matches(operation.motion, SPEED_TOLERANCE):
             return item, ""
-    known = " and ".join(item.motion.described for item in learned) or "nothing"
+    known = " and ".join(motion.described for motion, _ in learned if motion is not None)
     return None, f"no signature for its class: runs {operation.motion.described}, learned {known}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import unicodedata
+from decimal import Decimal
 
 # Control, format (direction marks), surrogate and private characters, line and paragraph separators.
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
@@ -23,6 +25,19 @@ def shorten(text: str, length: int) -> str:
         return text
     tail = (length - 1) // 2
     return f"{text[: length - 1 - tail]}…{text[len(text) - tail :]}"
+
+
+def digits(value: float, least: int = 6) -> str:
+    """A number with `least` significant digits, a whole one with all of them; never an exponent."""
+    if not math.isfinite(value) or value == 0.0:
+        return f"{value:g}"
+    before_point = math.floor(math.log10(abs(value))) + 1
+    return f"{Decimal(f'{value:.{max(least, before_point)}g}'):f}"
+
+
+def counted(count: float, thing: str) -> str:
+    """A number with its noun: "1 hour", "2.5 hours"."""
+    return f"{digits(count)} {thing}" if count == 1 else f"{digits(count)} {thing}s"
 
 
 def _is_active(character: str) -> bool:

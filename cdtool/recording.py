@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,7 +70,7 @@ class Series:
         """J, the number of joints."""
         return int(self.values.shape[1])
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Median sample period [s]; NaN below two samples."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else float("nan")

@@ -143,9 +143,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise ConfigurationError(f"{path}: no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as fault:
-        raise ConfigurationError(f"{path}: cannot be read: {fault}", "a UTF-8 text file is needed") from fault
+        why = "no UTF-8 text" if isinstance(fault, UnicodeDecodeError) else fault.strerror
+        raise ConfigurationError(f"{path}: cannot be read: {why}", "a UTF-8 text file is needed") from fault
     except tomllib.TOMLDecodeError as fault:
-        raise ConfigurationError(f"{path}: not valid TOML: {fault}", "see docs/machine-file.md") from fault
+        raise ConfigurationError(
+            f"{path}: not valid TOML: {fault}", "texts in quotes, decimals with a point"
+        ) from fault
 
 
 def _range_text(minimum: float, above: float) -> str:

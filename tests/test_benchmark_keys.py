@@ -164,3 +164,55 @@ def read_back(folder: Path, results):
     path = folder / "results.json"
     path.write_text(to_json(results), encoding="utf-8")
     return read_results(path)
+
+
+def test_each_run_of_a_budget_is_judged_by_what_others_teach(gate, monkeypatch):
+    from cdtool.workflows import calibration
+
+    taught: list[tuple[set[str], set[str]]] = []
+    judge = calibration.judge
+    fit_classes = calibration.fit_classes
+    latest: set[str] = set()
+
+    def fit(pairs, rule):
+        nonlocal latest
+        latest = {item.name for item, _ in pairs}
+        return fit_classes(pairs, rule)
+
+    def seen(operation, *others):
+        taught.append(({operation.name}, latest))
+        return judge(operation, *others)
+
+    monkeypatch.setattr(calibration, "fit_classes", fit)
+    monkeypatch.setattr(calibration, "judge", seen)
+    run(gate, 'false_alarm_budget = "1/4op"\n', HEAD, LEARN, ONSET, STIFF)
+    assert len(taught) == 24 and not any(judged & learned for judged, learned in taught)
+
+
+def test_a_budget_does_not_depend_on_the_order_of_the_files(gate):
+    names = [f"free/{number:02d}.csv" for number in range(1, 13)]
+    factors = []
+    for ordered in (names, names[::-1], names[5:] + names[:5]):
+        learn = f"[learn]\nlogs = {ordered}\n".replace("'", '"')
+        done = run(gate, 'false_alarm_budget = "1/4op"\n', HEAD, learn, ONSET, STIFF)
+        factors.append([item.safety_factor for item in done.results.calibration])
+    assert factors[0] == factors[1] == factors[2]
+
+
+def test_the_same_bytes_under_two_names_are_not_scored_twice(gate):
+    shutil.copy(gate / "stiff" / "01.csv", gate / "twice.csv")
+    with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv hold the same bytes"):
+        run(gate, HEAD, LEARN, ONSET, STIFF, '[impacts.again]\nlogs = ["twice.csv"]\n')
+
+
+def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
+    """Two labelled contacts in one log: the second one's force is none of the first's."""
+    done = run(gate, HEAD, LEARN, ONSET, STIFF)
+    first = done.results.contacts[0]
+    with (gate / "two.csv").open("w", newline="") as stream:
+        rows = [["recording", "start_s", "end_s"]]
+        rows += [[first.recording, first.onset_s - delay, first.onset_s - delay] for delay in (2.0, 0.0)]
+        csv.writer(stream).writerows(rows)
+    labelled = run(gate, HEAD, LEARN, ONSET, 'labels = "two.csv"\n', STIFF)
+    peaks = [row.peak_force_n for row in labelled.results.contacts if row.recording == first.recording][:2]
+    assert peaks[0] < 50.0 < 1000.0 < peaks[1]

@@ -237,7 +237,7 @@ def test_smaller_limits_bring_false_alarms_and_larger_ones_miss_contacts(example
         found = [example["judge"](item, name, machine, detector, limit) for name, item in recordings.items()]
         missed = sum(match.outcome == "missed" for item in found for match in item.matching.matches)
         counts.append((missed, sum(len(item.matching.false_alarms) for item in found)))
-    assert counts == [(0, 6), (0, 4), (0, 1), (3, 0)]
+    assert counts == [(0, 5), (0, 3), (0, 1), (3, 0)]
 
 
 def machine_text(urdf: Path, joints: dict[str, str], extra: str = "") -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import logging
 import sys
@@ -31,6 +32,7 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # in its default the help loses what stands in brackets, such as units
 )
 app.command("info")(info)
 app.command("learn-signature")(learn_signature)
@@ -86,6 +88,11 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
         sys.exit(ExitStatus.OK)
+    except SystemExit as end:
+        # click ends with 1 where the reader has gone; here 1 means a broken limit.
+        if isinstance(end.__context__, OSError) and end.__context__.errno == errno.EPIPE:
+            sys.exit(ExitStatus.OK)
+        raise
     except OSError as fault:
         from cdtool.cli.console import print_error
 

@@ -10,24 +10,26 @@ import typer
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import JobsOption, JsonOption, OutputOption, listed
 from cdtool.cli.summary_table import finish, show_limits, show_table
+from cdtool.errors import UsageError
 
 
 def benchmark(
     file: Annotated[Path, typer.Argument(help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE")],
     output: OutputOption = None,
     detectors: Annotated[
-        str, typer.Option("--detectors", help="Others than the file's, as gm,vo,eo; all: every one that is known.")
-    ] = "",
+        str | None,
+        typer.Option("--detectors", help="Others than the file's, as gm,vo,eo; all: every one that the logs allow."),
+    ] = None,
     false_alarm_budget: Annotated[
-        str,
+        str | None,
         typer.Option("--false-alarm-budget", help="Set each safety factor for it: 1/1000op (operations) or 0.1/h."),
-    ] = "",
+    ] = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Learn, detect and compare: latency, misses and false alarms of each detector in each group.
 
-    Ends with 1 where a figure breaks one of the file's [limits].
+    Ends with 1 where a figure breaks one of the limits that the file sets.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
@@ -40,7 +42,7 @@ def benchmark(
     with progress("benchmark") as advance:
         done = run(
             file,
-            detectors=listed(detectors),
+            detectors=_named(detectors),
             false_alarm_budget=false_alarm_budget,
             jobs=jobs,
             progress=advance,
@@ -55,3 +57,10 @@ def benchmark(
         for path in written:
             typer.echo(f"written: {plain(path)}")
     finish(done.evaluated)
+
+
+def _named(detectors: str | None) -> tuple[str, ...]:
+    names = listed(detectors or "")
+    if detectors is not None and not names:
+        raise UsageError("--detectors names none", "give names separated by commas, or leave it out")
+    return names

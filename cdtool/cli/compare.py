@@ -58,10 +58,13 @@ def compare(
 
 
 def _show(found: BuildComparison) -> None:
-    """The figures, then every row in words, what differs, and the verdict last."""
+    """What one file lacks, the figures, then every row in words, what differs, and the verdict last."""
     from cdtool.report.build_report import both, contacts_of
     from cdtool.report.figure_text import NOTHING
 
+    for which, names in (("old", found.only_old), ("new", found.only_new)):
+        for name in names:
+            _say(f"only in {which}, not compared: {name}")
     heads = ("contacts", "latency\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
     columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
     figures: tuple[Figure, ...] = ("latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n")
@@ -84,9 +87,6 @@ def _show(found: BuildComparison) -> None:
         _say(f"differs: {item.key}: {item.old}, now {item.new}")
     if len(found.changed) > _SHOWN:
         _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
-    for which, names in (("old", found.only_old), ("new", found.only_new)):
-        for name in names:
-            _say(f"only in {which}: {name}")
     for note in found.notes:
         _say(note)
     _say(found.words)

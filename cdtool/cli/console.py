@@ -75,7 +75,8 @@ def number(value: float | None, digits: int = 3) -> str:
     """A figure for a table; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "-"
-    return f"{value:.{digits}g}"
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < 1e15 else text
 
 
 @contextmanager

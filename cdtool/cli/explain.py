@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shutil
+import sys
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from cdtool.evaluation.explanation.margin import Moment
     from cdtool.workflows.explaining import Explained
 
-_WIDTH = 100
+_NARROWEST, _WIDEST = 60, 100
 # Events that are printed and drawn; --json has all.
 _SHOWN = 20
 
@@ -130,7 +132,14 @@ def _show_event(item: Explanation) -> None:
 
 
 def _print(text: str, indent: str = "") -> None:
-    typer.echo(fill(plain(text), _WIDTH, initial_indent=indent, subsequent_indent=f"{indent}  "))
+    typer.echo(fill(plain(text), columns_to_fill(), initial_indent=indent, subsequent_indent=f"{indent}  "))
+
+
+def columns_to_fill() -> int:
+    """The terminal's width, from 60 to 100; 100 where there is none, so that a file is the same everywhere."""
+    if not sys.stdout.isatty():
+        return _WIDEST
+    return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
 
 
 def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:

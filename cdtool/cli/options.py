@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -56,15 +57,20 @@ def listed(text: str) -> tuple[str, ...]:
 def limits_of(text: str) -> tuple[float, ...]:
     """The numbers of --limit; raises UsageError."""
     try:
-        return tuple(float(part) for part in text.split(",")) if text else ()
+        limits = tuple(float(part) for part in text.split(",")) if text else ()
     except ValueError:
         raise UsageError(f"--limit is '{text}'", "numbers separated by commas, inf for a joint not watched") from None
+    if limits and all(limit == math.inf for limit in limits):
+        raise UsageError(f"--limit is '{text}': no joint is watched", "a number for at least one joint")
+    return limits
 
 
 def figure_name(plot: Path) -> Path:
-    """The file of --plot; raises UsageError where its name is none of a figure."""
+    """The file of --plot; raises UsageError where its name is none of a figure, or its folder is missing."""
     from cdtool.report.plots.figures import SUFFIXES
 
     if plot.suffix.lower() not in SUFFIXES:
         raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")
+    if not plot.parent.is_dir():
+        raise UsageError(f"--plot is '{plot}': no folder {plot.parent}", "make it first")
     return plot

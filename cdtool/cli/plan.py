@@ -15,10 +15,10 @@ from cdtool.errors import UsageError
 
 def plan(
     difference_ms: Annotated[
-        float | None, typer.Option("--difference-ms", help="A difference of mean latencies that is to be seen [ms].")
+        float | None, typer.Option("--difference-ms", help="A difference of mean latencies that is to be seen, in ms.")
     ] = None,
     std_ms: Annotated[
-        float | None, typer.Option("--std-ms", help="Standard deviation of the paired differences [ms], as a guess.")
+        float | None, typer.Option("--std-ms", help="Standard deviation of the paired differences in ms, as a guess.")
     ] = None,
     source: Annotated[
         Path | None, typer.Option("--from", help="Instead: measured in results.json of an earlier test.")

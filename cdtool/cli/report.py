@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import plain
+from cdtool.cli.console import plain, print_skipped
 from cdtool.cli.options import OutputOption
 from cdtool.cli.summary_table import finish, show_limits, show_table
 
@@ -32,6 +32,7 @@ def report(
     if note:
         typer.echo(f"note: {plain(note)}", err=True)
     written = write_outputs(Report(evaluated, traces), targets)
+    print_skipped(evaluated.results.skipped, evaluated.results.findings)
     show_table(evaluated)
     show_limits(evaluated)
     for path in written:

@@ -11,7 +11,9 @@ from cdtool.cli.console import plain, print_json, progress
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
 
-simulate = typer.Typer(help="Write simulated recordings with known contacts.", no_args_is_help=True)
+simulate = typer.Typer(
+    help="Write simulated recordings with known contacts.", no_args_is_help=True, rich_markup_mode="markdown"
+)
 
 _FORMATS = ("csv", "mcap", "mixed")
 

@@ -14,7 +14,9 @@ from cdtool.errors import UsageError
 if TYPE_CHECKING:
     from cdtool.workflows.study import SensorStudy
 
-study = typer.Typer(help="Study an impact before the machine is built.", no_args_is_help=True)
+study = typer.Typer(
+    help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode="markdown"
+)
 
 NOT_SEEN = "not seen"
 

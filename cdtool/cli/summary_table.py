@@ -13,6 +13,7 @@ from cdtool.errors import ExitStatus
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
+    from cdtool.evaluation.results import CalibrationResult
     from cdtool.evaluation.statistics.interval import Interval
     from cdtool.evaluation.summary import Summary
 
@@ -43,7 +44,7 @@ def show_table(evaluated: Evaluated) -> None:
     for item in evaluated.results.calibration:
         typer.echo(
             f"{plain(item.detector)}: safety factor {item.safety_factor:.3g} for a budget of {plain(item.budget)}: "
-            f"{item.alarms} false alarms in {item.operations} operations ({item.hours:.3g} h) that it was set on"
+            f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) that it was set on"
         )
     _show_bounds(evaluated)
     _show_forces(evaluated.results)
@@ -59,7 +60,7 @@ def show_limits(evaluated: Evaluated) -> None:
         name = f"{item.detector}.{item.group}.{item.figure}"
         typer.echo(f"limit {item.outcome}: {plain(name)}: {plain(item.reason)} (limit {plain(item.limit)})")
     if len(failed) > _SHOWN:
-        typer.echo(f"limit broken: and {len(failed) - _SHOWN} more")
+        typer.echo(f"limits not kept: and {len(failed) - _SHOWN} more")
     typer.echo(f"limits: {len(limits) - len(failed)} of {len(limits)} kept")
 
 
@@ -72,7 +73,7 @@ def finish(evaluated: Evaluated) -> None:
 
 def _row(item: Summary) -> tuple[Any, ...]:
     if not item.contacts:
-        return item.group, item.detector, *(("-",) * 7), item.false_alarms, item.operations
+        return item.group, item.detector, *(("-",) * 7), _false_alarms(item), item.operations
     return (
         item.group,
         item.detector,
@@ -81,11 +82,20 @@ def _row(item: Summary) -> tuple[Any, ...]:
         quantile(item.median.value),
         quantile(item.p95.value),
         item.detected,
-        item.missed,
+        item.missed if item.assessable else "-",
         item.not_assessable,
-        item.false_alarms,
+        _false_alarms(item),
         item.operations,
     )
+
+
+def _what(item: CalibrationResult) -> str:
+    return "false alarms in" if item.budget.endswith("h") else "alarming of"
+
+
+def _false_alarms(item: Summary) -> int | str:
+    """A dash where the detector could judge nothing."""
+    return item.false_alarms if item.watched else "-"
 
 
 def interval(item: Interval) -> str:
@@ -111,7 +121,7 @@ def _show_bounds(evaluated: Evaluated) -> None:
         if clean:
             least = max(item.missed_at_most for item in clean)
             typer.echo(f"{plain(group)}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
-        quiet = [item for item in items if not item.contacts and not item.false_alarms and item.operations]
+        quiet = [item for item in items if not item.contacts and not item.false_alarms and item.watched]
         if quiet:
             rate = max(item.at_most_per_operation for item in quiet)
             who = _named(quiet, items)

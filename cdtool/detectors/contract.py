@@ -39,8 +39,14 @@ def _breach(signal: Any, recording: Recording) -> str:
     shape = (len(time), len(signal.joints or recording.joints))
     if values.shape != shape or status.shape != shape:
         return f"gives values {values.shape} and status {status.shape}: {shape} are needed, samples by joints"
-    if values.dtype != np.float64 or status.dtype != np.uint8:
-        return f"gives values as {values.dtype} and status as {status.dtype}: float64 and uint8 are needed"
+    wanted = time.dtype == np.float64 and values.dtype == np.float64 and status.dtype == np.uint8
+    if not wanted or time.ndim != 1:
+        kinds = f"times as {time.ndim}-dimensional {time.dtype}, values as {values.dtype}, status as {status.dtype}"
+        return f"gives {kinds}: a row of float64, float64 and uint8 are needed"
+    if np.any(status > max(Status)):
+        return f"gives a status of {int(status.max())}: 0 to {max(Status):d} are known"
+    if len(set(signal.joints)) < len(signal.joints):
+        return f"names a joint twice: {', '.join(signal.joints)}"
     if len(time) > 1 and not np.all(np.diff(time) > 0.0):
         return "gives times that do not strictly increase"
     blind = int(np.count_nonzero(~np.isfinite(values) & (status == Status.VALID)))

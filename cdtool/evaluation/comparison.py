@@ -7,14 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from cdtool.errors import UsageError
 from cdtool.evaluation.results import ContactResult, Results
 from cdtool.evaluation.statistics.paired import Difference, holm, mcnemar_p, paired_difference
 from cdtool.evaluation.summary import campaigns
 
 # A difference counts as shown below this, after correction.
 SIGNIFICANT = 0.05
+# Below this the confidence, 1 less it, loses the digits that tell it from 1.
+_LEAST_LEVEL = 1e-9
 
 Key = tuple[str, int]
+
+
+def check_significance(level: float) -> None:
+    """Raise UsageError where a significance level is not between 1e-9 and 0.5."""
+    if not _LEAST_LEVEL <= level < 0.5:
+        hint = "a share of at least 0.000000001 and below 0.5, such as 0.05"
+        raise UsageError(f"significance level is {level:g}", hint)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from cdtool.activation import Activation
 from cdtool.errors import UsageError
 from cdtool.evaluation.sweep import critical_factor, sweep
 from cdtool.pipeline import Detection
+from cdtool.plain_text import counted, digits
 
 _FORM = re.compile(r"\s*([0-9.eE+-]+)\s*/\s*([0-9.eE+-]*)\s*(op|operation|operations|h|hour|hours)\s*")
 # Where a count has to be looked for, factors are tried that many to an octave.
@@ -35,13 +36,14 @@ class Budget:
             count, exposure = float(found[1]), float(found[2] or 1.0)  # type: ignore[index]
         except (TypeError, ValueError):
             count = exposure = math.nan
-        if found is None or not (0.0 < count < math.inf and 0.0 < exposure < math.inf):
+        rate = count / exposure if exposure else math.nan
+        if found is None or not (0.0 < count < math.inf and 0.0 < exposure < math.inf and 1e-12 < rate < 1e12):
             raise UsageError(f"false-alarm budget is '{text}'", "write 1/1000op (operations) or 0.1/h (hours)")
         return cls(count / exposure, "hour" if found[3].startswith("h") else "operation")
 
     def __str__(self) -> str:
         short = "op" if self.per == "operation" else "h"
-        return f"1/{1.0 / self.rate:g}{short}" if self.rate < 1.0 else f"{self.rate:g}/{short}"
+        return f"1/{digits(1.0 / self.rate)}{short}" if self.rate < 1.0 else f"{digits(self.rate)}/{short}"
 
     @property
     def needed(self) -> float:
@@ -52,9 +54,9 @@ class Budget:
         """Raise UsageError, telling what is missing, where the exposure is too small to set it on."""
         if exposure * self.rate < 1.0 - 1e-9:
             raise UsageError(
-                f"{detector}: false-alarm budget {self} needs {self.needed:g} impact-free {self.per}s to be set, "
-                f"{exposure:.4g} could be judged",
-                f"add {self.needed - exposure:.4g} to [learn], or choose a larger budget",
+                f"{detector}: false-alarm budget {self} needs {counted(self.needed, f'impact-free {self.per}')} "
+                f"to be set, {digits(exposure, 4)} could be judged",
+                f"add {digits(self.needed - exposure, 4)} to [learn], or choose a larger budget",
             )
 
 

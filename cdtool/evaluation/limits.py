@@ -58,6 +58,8 @@ def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tu
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
         ]
         meant = [item for item in named if item.contacts or rule.figure in COUNTED_ALWAYS]
+        # A group of which no log could be scored has no figure either, but it should have had one.
+        meant = meant or [item for item in named if not item.operations]
         if not meant:
             raise ConfigurationError(
                 f"[limits] {rule.key}: there is no such figure in these results",
@@ -85,7 +87,7 @@ def _check(rule: LimitRule, summary: Summary) -> LimitResult:
         detector=summary.detector,
         group=summary.group,
         figure=rule.figure,
-        value=value if math.isfinite(value) else None,
+        value=float(value) if math.isfinite(value) else None,
         least=rule.least if math.isfinite(rule.least) else None,
         largest=rule.largest if math.isfinite(rule.largest) else None,
         outcome=outcome,

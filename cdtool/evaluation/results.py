@@ -147,7 +147,7 @@ class SweepResult:
     missed: int = meant("contacts")
     not_assessable: int = meant("contacts")
     mean_ms: float | None = meant("latency of the detected contacts")
-    median_ms: float | None = meant("of the latency, missed contacts taken as censored; null where it is not reached")
+    median_ms: float | None = meant("of the latency, missed contacts taken as later than all; null where not reached")
     in_use: bool = meant("the benchmark's own limits", default=False)
 
 
@@ -160,7 +160,7 @@ class CalibrationResult:
     safety_factor: float = meant("the factor set")
     operations: int = meant("impact-free operations, each judged with a threshold that was not learned from it")
     hours: float = meant("watched in them")
-    alarms: int = meant("alarms in them with that factor")
+    alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import types
 from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
+from cdtool.evaluation.results_schema import WORDS
 from cdtool.strict_json import strict_json
 
 Row = TypeVar("Row")
+# Rows of a detector, of a group or of both.
+_TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
+_PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
 
 def to_json(results: Results) -> str:
@@ -26,7 +30,18 @@ def read_results(path: Path) -> Results:
     """Read results.json; raises RecordingError where it is none, or of another version."""
     try:
         values = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
-    except (OSError, ValueError) as fault:
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file", "check the path") from None
+    except OSError as fault:
+        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the path") from fault
+    except UnicodeDecodeError as fault:
+        raise _no_results(path, "no UTF-8 text") from fault
+    except json.JSONDecodeError as fault:
+        why = f"cut off or damaged at line {fault.lineno}" if fault.doc.strip() else "it is empty"
+        raise _no_results(path, why) from fault
+    except RecursionError as fault:
+        raise _no_results(path, "nested too deeply") from fault
+    except ValueError as fault:
         raise _no_results(path, str(fault)) from fault
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "no schema_version in it")
@@ -36,9 +51,11 @@ def read_results(path: Path) -> Results:
             "run cdtool benchmark again with this version",
         )
     try:
-        return build(Results, values, "results")
-    except (KeyError, TypeError, ValueError) as fault:
+        results = build(Results, values, "results")
+        _refuse_strangers(results)
+    except ValueError as fault:
         raise _no_results(path, str(fault)) from fault
+    return results
 
 
 def build(kind: type[Row], values: Any, where: str) -> Row:
@@ -49,11 +66,26 @@ def build(kind: type[Row], values: Any, where: str) -> Row:
     for name in values:
         if name not in known:
             raise ValueError(f"{where} has an unknown field '{name}'")
+    missing = [name for name in _required(kind) if name not in values]  # type: ignore[arg-type]
+    if missing:
+        raise ValueError(f"{where} lacks {', '.join(missing)}")
     made = {name: _value(known[name], value, f"{where}.{name}") for name, value in values.items()}
-    try:
-        return kind(**made)
-    except TypeError as fault:
-        raise ValueError(f"{where}: {fault}") from fault
+    for name, value in made.items():
+        words = WORDS.get((kind, name)) or WORDS.get(name)
+        if words and value is not None and value not in words:
+            raise ValueError(f"{where}.{name} is '{value}', none of {', '.join(words)}")
+    return kind(**made)
+
+
+def _refuse_strangers(results: Results) -> None:
+    """Raise ValueError for a row of a detector or group that the results do not list."""
+    for table in _TABLES:
+        for i, row in enumerate(getattr(results, table)):
+            for name, listed in (("detector", "detectors"), ("group", "groups")):
+                value = getattr(row, name, None)
+                if value is not None and value not in getattr(results, listed):
+                    where = f"results.{table}[{i}].{name}"
+                    raise ValueError(f"{where} is '{value}', which results.{listed} does not list")
 
 
 def _value(kind: Any, value: Any, where: str) -> Any:
@@ -77,7 +109,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if kind is not Any and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
-        raise ValueError(f"{where} is {value!r}, no {kind.__name__}")
+        raise ValueError(f"{where} is {json.dumps(value, ensure_ascii=False)}, no {_PLAIN[kind]}")
     return value
 
 
@@ -85,6 +117,11 @@ def _value(kind: Any, value: Any, where: str) -> Any:
 def _field_types(kind: Any) -> Mapping[str, Any]:
     hints = get_type_hints(kind)
     return {item.name: hints[item.name] for item in fields(kind)}
+
+
+@cache
+def _required(kind: Any) -> tuple[str, ...]:
+    return tuple(item.name for item in fields(kind) if item.default is MISSING and item.default_factory is MISSING)
 
 
 def _no_results(path: Path, why: str) -> RecordingError:

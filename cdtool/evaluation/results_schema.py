@@ -16,7 +16,7 @@ from cdtool.evaluation.results import SCHEMA_VERSION, ContactResult, LimitResult
 
 _NAMES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 # What text may be, where it is one of a few words: for one class, or for every one that has the field.
-_WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
+WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
     (ContactResult, "outcome"): ("detected", "missed", "not_assessable"),
     (LimitResult, "outcome"): ("kept", "broken", "not assessable"),
     "verdict": ("pass", "fail", "not assessable"),
@@ -42,7 +42,7 @@ def _object(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     properties = {}
     for item in fields(kind):
         made = _schema(hints[item.name], parts)
-        words = _WORDS.get((kind, item.name)) or _WORDS.get(item.name)
+        words = WORDS.get((kind, item.name)) or WORDS.get(item.name)
         if words:
             made["enum"] = [*words, None] if "null" in made["type"] else list(words)
         properties[item.name] = {"description": item.metadata["meaning"], **made}

@@ -25,7 +25,8 @@ class Summary:
 
     `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. `missed_share`
     is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
-    `peak_force` [N] are medians of the detected contacts.
+    `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
+    alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
     """
 
     detector: str
@@ -43,6 +44,7 @@ class Summary:
     missed_at_most: float
     false_alarms: int
     operations: int
+    judged_operations: int
     hours: float
     false_alarms_per_hour: Interval
     false_alarms_per_operation: Interval
@@ -51,7 +53,17 @@ class Summary:
     force_at_alarm: float
     force_at_alarm_max: float
     peak_force: float
-    force_failed: int
+    force_failed: float
+
+    @property
+    def watched(self) -> bool:
+        """Whether anything could be judged: without it no false alarm means nothing."""
+        return self.hours > 0.0
+
+    @property
+    def assessable(self) -> int:
+        """Contacts that could be assessed."""
+        return self.contacts - self.not_assessable
 
     @property
     def mean_ms(self) -> float:
@@ -72,8 +84,12 @@ class Summary:
         """Why a figure of this summary is NaN."""
         if figure in COUNTED_ALWAYS:
             return "nothing was watched"
+        if not self.contacts:
+            return "no recording of the group was scored"
         if self.contacts == self.not_assessable:
             return f"none of {self.contacts} contacts could be assessed"
+        if figure == "force_failed":
+            return "no contact was held against a force profile, or not all of them could be assessed"
         if "force" in figure:
             return "no load-cell force at an alarm"
         return f"{self.detected} of {self.contacts} contacts detected: too few for it"
@@ -90,17 +106,17 @@ FIGURES: Mapping[str, Callable[[Summary], float]] = {
     "p95_ms_upper": lambda item: item.p95.high,
     "max_ms": lambda item: item.max_ms,
     "contacts": lambda item: item.contacts,
-    "detected": lambda item: item.detected,
-    "missed": lambda item: item.missed,
+    "detected": lambda item: item.detected if item.assessable else math.nan,
+    "missed": lambda item: item.missed if item.assessable else math.nan,
     "missed_share": lambda item: item.missed_share.value,
     "missed_share_at_most": lambda item: item.missed_at_most,
     "not_assessable": lambda item: item.not_assessable,
-    "false_alarms": lambda item: item.false_alarms,
+    "false_alarms": lambda item: item.false_alarms if item.watched else math.nan,
     "false_alarms_per_hour": lambda item: item.false_alarms_per_hour.value,
     "false_alarms_per_hour_at_most": lambda item: item.at_most_per_hour,
     "false_alarms_per_operation": lambda item: item.false_alarms_per_operation.value,
     "false_alarms_per_operation_at_most": lambda item: item.at_most_per_operation,
-    "operations": lambda item: item.operations,
+    "operations": lambda item: item.judged_operations,
     "hours": lambda item: item.hours,
     "force_at_alarm_n": lambda item: item.force_at_alarm,
     "force_at_alarm_max_n": lambda item: item.force_at_alarm_max,
@@ -165,8 +181,9 @@ def _summary(
     latency, censored = latencies(contacts)
     missed = int(censored.sum())
     operations, hours = (exposure.operations, exposure.hours) if exposure else (0, 0.0)
+    judged = operations - exposure.not_assessable if exposure else 0
     at_alarm = [item.force_at_alarm_n for item in detected if item.force_at_alarm_n is not None]
-    peaks = [item.peak_force_n for item in detected if item.peak_force_n is not None]
+    peaks = [item.peak_force_n for item in contacts if item.peak_force_n is not None]
     return Summary(
         detector=detector,
         group=group,
@@ -183,13 +200,21 @@ def _summary(
         missed_at_most=binomial_at_most(missed, len(latency)) if len(latency) else math.nan,
         false_alarms=false_alarms,
         operations=operations,
+        judged_operations=judged,
         hours=hours,
         false_alarms_per_hour=poisson_rate(false_alarms, hours),
-        false_alarms_per_operation=poisson_rate(false_alarms, float(operations)),
+        false_alarms_per_operation=poisson_rate(false_alarms, float(judged)),
         at_most_per_hour=poisson_at_most(false_alarms, hours) if hours else math.nan,
-        at_most_per_operation=poisson_at_most(false_alarms, float(operations)) if operations else math.nan,
+        at_most_per_operation=poisson_at_most(false_alarms, float(judged)) if judged else math.nan,
         force_at_alarm=float(np.median(at_alarm)) if at_alarm else math.nan,
-        force_at_alarm_max=max(at_alarm, default=math.nan),
+        force_at_alarm_max=math.inf if at_alarm and missed else max(at_alarm, default=math.nan),
         peak_force=float(np.median(peaks)) if peaks else math.nan,
-        force_failed=sum(item.verdict == "fail" for item in forces),
+        force_failed=_failed(forces),
     )
+
+
+def _failed(forces: Sequence[ForceResult]) -> float:
+    """Contacts above their force limits; NaN where none was judged, or none failed and one could not be assessed."""
+    failed = sum(item.verdict == "fail" for item in forces)
+    unknown = any(item.verdict == "not assessable" for item in forces)
+    return math.nan if not forces or (unknown and not failed) else float(failed)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from cdtool.activation import Activation, crossings_of
 from cdtool.detection import Status
-from cdtool.evaluation.truth.matching import belongs, windows
+from cdtool.evaluation.truth.matching import belongs, one_an_event, windows
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, FloatArray
 
@@ -39,7 +39,7 @@ def sweep(
     statistic, met_at = detection.statistic, detection.exceedance()
     spans = windows(contacts, window)
     order = np.argsort([contact.start for contact in contacts], kind="stable")
-    false_alarms = np.zeros(len(factors), dtype=np.int64)
+    alone: list[list[float]] = [[] for _ in factors]
     latency = np.full((len(factors), len(contacts)), np.nan)
     debounce = activation.samples(statistic.period)
     for joint in range(met_at.shape[1]):
@@ -50,13 +50,14 @@ def sweep(
         for i in np.flatnonzero(factors < highest):
             at, armed = crossings_of(statistic.time, met > factors[i], status, debounce, activation.rearm)
             times = statistic.time[at]
-            false_alarms[i] += sum(not belongs(time, spans) for time in times[armed])
+            alone[i] += [float(time) for time in times[armed] if not belongs(time, spans)]
             for column, (contact, opens, closes) in zip(order, spans, strict=True):
                 inside = times[(times >= opens) & (times <= closes)]
                 if len(inside):
                     late = max(float(inside[0]) - contact.start, 0.0)
                     latency[i, column] = np.fmin(latency[i, column], late)
-    return Swept(false_alarms, latency)
+    counts = [len(one_an_event(times, activation.rearm)) for times in alone]
+    return Swept(np.array(counts, dtype=np.int64), latency)
 
 
 def critical_factor(detection: Detection, activation: Activation) -> float:

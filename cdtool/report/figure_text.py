@@ -11,6 +11,11 @@ from cdtool.evaluation.statistics.interval import Interval
 
 NOTHING = "–"
 NOT_REACHED = "not reached"
+NOT_ASSESSABLE = "not assessable"
+
+# What rounding leaves of equal numbers is no figure of its own: below this, or this share of the interval's width.
+_ZERO_BELOW = 1e-12
+_ZERO_SHARE = 1e-9
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -22,8 +27,11 @@ def with_interval(figure: Interval) -> str:
     """A figure with its interval; "(–)" where there is too little data for one."""
     if not figure.known:
         return NOTHING
-    leading = next((item for item in (figure.value, figure.high, figure.low) if item and math.isfinite(item)), 0.0)
-    value, low, high = (_written(item, _decimals(leading)) for item in (figure.value, figure.low, figure.high))
+    width = figure.high - figure.low
+    least = max(_ZERO_BELOW, _ZERO_SHARE * width if math.isfinite(width) else 0.0)
+    parts = [0.0 if abs(item) < least else item for item in (figure.value, figure.low, figure.high)]
+    leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
+    value, low, high = (_written(item, _decimals(leading)) for item in parts)
     if low == high == NOT_REACHED:
         return NOT_REACHED
     return f"{value} ({NOTHING})" if low == high == NOTHING else f"{value} ({low} to {high})"
@@ -54,7 +62,7 @@ def counted(count: int, thing: str) -> str:
 def _written(value: float, decimals: int) -> str:
     if math.isnan(value):
         return NOTHING
-    return f"{value:.{decimals}f}" if math.isfinite(value) else NOT_REACHED
+    return f"{value:z.{decimals}f}" if math.isfinite(value) else NOT_REACHED
 
 
 def _decimals(value: float, digits: int = 3) -> int:

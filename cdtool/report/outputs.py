@@ -6,13 +6,13 @@ import os
 import re
 import unicodedata
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results_file import to_json
-from cdtool.evaluation.traces.file import encode_traces, traces_path
+from cdtool.evaluation.traces.file import as_read, encode_traces, traces_path
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.report.files import write_text, write_whole
@@ -31,8 +31,9 @@ class Report:
 
 def _write_json(report: Report, target: Path) -> None:
     """results.json, and the traces beside it."""
-    write_text(target, to_json(report.evaluated.results))
-    write_whole(traces_path(target), lambda stream: stream.write(encode_traces(report.traces)))
+    text = to_json(report.evaluated.results)
+    write_text(target, text)
+    write_whole(traces_path(target), lambda stream: stream.write(encode_traces(report.traces, text)))
 
 
 def _write_markdown(report: Report, target: Path) -> None:
@@ -78,6 +79,8 @@ _WRITERS: dict[str, Callable[[Report, Path], None]] = {
 def check_outputs(targets: Sequence[Path]) -> None:
     """Raise UsageError where a target cannot be written: unknown suffix, no such folder, no permission."""
     for target in targets:
+        if target == Path():
+            raise UsageError("--output names no file or folder", "give a name, such as report or results.json")
         if target.is_dir():
             _check_writable(target, target)
             continue
@@ -94,6 +97,8 @@ def check_outputs(targets: Sequence[Path]) -> None:
 def write_outputs(report: Report, targets: Sequence[Path]) -> list[Path]:
     """Write every target; returns what to show: the files, and of a folder its report. Raises CdtoolError."""
     check_outputs(targets)
+    if targets:
+        report = replace(report, traces=as_read(report.traces))
     written = []
     for target in targets:
         if _is_folder(target):

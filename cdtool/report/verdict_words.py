@@ -5,7 +5,7 @@ from __future__ import annotations
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import broken
 from cdtool.evaluation.results import LimitResult
-from cdtool.report.figure_text import NOT_REACHED, NOTHING, counted
+from cdtool.report.figure_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, counted
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
 
@@ -36,7 +36,9 @@ def counts_words(evaluated: Evaluated) -> str:
         ("not assessable", sum(item.not_assessable for item in summaries)),
     )
     became = ", ".join(f"{count} {what}" for what, count in counts)
-    alarms = counted(sum(item.false_alarms for item in summaries), "false alarm")
+    watched = any(item.watched and item.judged_operations for item in summaries)
+    count = counted(sum(item.false_alarms for item in summaries), "false alarm")
+    alarms = count if watched else f"false alarms {NOT_ASSESSABLE}"
     return f"{counted(contacts, 'contact')} with {counted(len(results.detectors), 'detector')}: {became}; {alarms}"
 
 

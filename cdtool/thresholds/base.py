@@ -43,7 +43,12 @@ class FittedThreshold(Protocol):
 
 
 class Threshold(Protocol):
-    """The contract: a frozen dataclass of the rule's settings, the channels it needs, and `fit`."""
+    """The contract: a frozen dataclass of the rule's settings, the channels it needs, and `fit`.
+
+    A rule may have more: `by_class`, True where it learns each class of motion apart; what it fits then has `motion`,
+    the class it serves. A field `sides` that is None becomes the machine's, a field `signature` that is None the
+    benchmark file's [signature].
+    """
 
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]]

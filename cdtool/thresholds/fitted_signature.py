@@ -11,7 +11,7 @@ import numpy as np
 from cdtool.detection import Band, Signal
 from cdtool.errors import SignatureError, UsageError, nearest
 from cdtool.motion import MotionClass
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.signature_curve import Curve, resample
@@ -91,6 +91,14 @@ class FittedSignature:
     def runs(self) -> int:
         """The largest number of runs at any grid point."""
         return int(max(self.by_time.count.max(initial=0), self.by_position.count.max(initial=0)))
+
+    def changes_curve(self, recording: Recording, clock: FloatArray) -> BoolArray:
+        """True (n,) at the sample from which on travel counts instead of time: mean and spread may jump there."""
+        changes = np.zeros(len(clock), dtype=bool)
+        if self.alignment == "time_then_position":
+            running = self._progress(recording, clock).running
+            changes[1:] = running[1:] & ~running[:-1]
+        return changes
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.errors import NothingValidError, SignatureError, UsageError
-from cdtool.motion import MotionClass, motion_class
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
+from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     RULES,
     RUNNING_SHARE,
@@ -25,8 +25,8 @@ from cdtool.thresholds.fitted_signature import (
 from cdtool.thresholds.signature_curve import Curve, resample
 
 ENOUGH_RUNS = 10
-# Speeds of one class differ by at most this share.
-SPEED_TOLERANCE = 0.05
+# Not even a forced signature has a spread below these.
+LEAST_RUNS = 2
 
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
@@ -53,6 +53,7 @@ class Signature:
 
     name: ClassVar[str] = "signature"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    by_class: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         known("rule", self.rule, RULES)
@@ -78,7 +79,7 @@ class Signature:
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
         self._check_number(len(pairs))
-        motion = self._common_class([recording for recording, _ in pairs])
+        motion = common_class([recording for recording, _ in pairs])
         wheres = [
             progress(
                 recording,
@@ -121,26 +122,14 @@ class Signature:
         return fitted
 
     def _check_number(self, runs: int) -> None:
-        if runs < 2 or (runs < ENOUGH_RUNS and not self.force):
+        enough = LEAST_RUNS if self.force else ENOUGH_RUNS
+        if runs < enough:
             many = "run" if runs == 1 else "runs"
+            more = f"{enough - runs} more {'is' if enough - runs == 1 else 'are'} needed to have {enough}"
+            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: --force, or force = true in [signature]"
             raise SignatureError(
-                f"{runs} impact-free {many} of one class: {ENOUGH_RUNS - runs} more are needed",
-                f"add runs to have {ENOUGH_RUNS}, or --force to learn from fewer, but never from fewer than 2",
+                f"{runs} impact-free {many} of one class: {more}", "add runs" if self.force else f"add runs; {fewer}"
             )
-
-    def _common_class(self, recordings: Sequence[Recording]) -> MotionClass:
-        classes = [motion_class(recording) for recording in recordings]
-        nominal = float(np.median([item.nominal_speed for item in classes]))
-        common = MotionClass(classes[0].direction, nominal, classes[0].joint)
-        if common.direction == 0:
-            raise SignatureError(f"{recordings[0].name}: the axis does not move", "learn from runs with motion")
-        for recording, item in zip(recordings, classes, strict=True):
-            if not item.matches(common, SPEED_TOLERANCE):
-                raise SignatureError(
-                    f"{recording.name}: runs {item.described}, the others {common.described}",
-                    "a signature belongs to one direction and speed; leave the run out",
-                )
-        return common
 
     def _longest_time(self, wheres: Sequence[Progress]) -> float:
         lasting = []

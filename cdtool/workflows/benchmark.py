@@ -48,7 +48,7 @@ def benchmark(
     file: str | Path | BenchmarkFile,
     *,
     detectors: Sequence[str] = (),
-    false_alarm_budget: str = "",
+    false_alarm_budget: str | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Benchmark:
@@ -65,7 +65,7 @@ def benchmark(
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
     limits = len(setup.limits)
     setup = with_detectors(setup, detectors) if detectors else setup
-    setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget else setup
+    setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup
     machine_file = setup.machine_file
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
@@ -125,7 +125,11 @@ def _provenance(
         "machine_sha256": setup.machine_file.digest,
         "gains": {detector.name: asdict(detector) for detector in detectors},
         "threshold": setup.threshold,
-        "signature_rule": {**asdict(setup.signature), "safety_factor": setup.signature.factor},
+        "threshold_rule": asdict(setup.rule),
+        "signature_rule": {
+            **asdict(setup.signature),
+            "safety_factor": None if setup.budget else setup.signature.factor,
+        },
         "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
         "learned_runs": [operation.name for operation in learned],
         "debounce_samples": setup.debounce,

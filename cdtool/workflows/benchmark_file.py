@@ -14,17 +14,16 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
-from cdtool.evaluation.truth.labels import Labels, read_labels
-from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.evaluation.truth.labels import LABEL_FILE, Labels
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml
-from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.alignment import ALIGNMENTS
 from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import find_logs, shown_path
+from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
+from cdtool.workflows.threshold_settings import read_threshold
 
 HOLDOUT = "holdout"
 
@@ -42,6 +41,7 @@ class Group:
 class BenchmarkFile:
     """A validated benchmark file with its globs resolved; `impacts` are the groups that are scored, hold-out last.
 
+    `rule` is the threshold's, with its settings.
     `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg].
     """
 
@@ -53,6 +53,7 @@ class BenchmarkFile:
     threshold: str
     budget: Budget | None
     signature: Signature
+    rule: Any
     debounce: int | None
     onset: OnsetRule
     labels: Labels | None
@@ -74,7 +75,7 @@ class BenchmarkFile:
     def scoring(self) -> dict[str, Any]:
         """How figures come about, for provenance: results can be compared only where all this is the same."""
         return {
-            "onset": self.onset.described,
+            "onset": self.onset.described + (f"{LABEL_FILE}{Path(self.labels.source).name}" if self.labels else ""),
             "separation_s": self.onset.separation,
             "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
             "operations": self.operations,
@@ -106,7 +107,8 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
     signature, debounce = _signature(root.table("signature"), machine_file.machine.default_sides)
-    learn = _logs(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    threshold, rule = read_threshold(root, signature)
+    learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
     force = root.table("force")
     impacts = _groups(root, base, root.number("window_s", 1.0, above=0.0), force)
     onset = root.table("onset")
@@ -116,18 +118,19 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         detectors=names,
         watched=_watched(root, machine_file.machine.joints),
         operations=root.choice("operations", HOW_TO_CUT, "whole"),
-        threshold=root.choice("threshold", THRESHOLDS.names(plugins=True), "signature"),
+        threshold=threshold,
         budget=_budget(root),
         signature=signature,
+        rule=rule,
         debounce=debounce,
-        labels=_labels(onset, base, impacts),
+        labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=_onset(onset),
         mass_before_cell=force.number("mass_before_cell_kg", 0.0, minimum=0.0),
         learn=learn,
         impacts=impacts,
-        campaigns=_named(root.table("campaigns"), base),
-        points=_named(root.table("points"), base),
+        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
+        points=named_logs(root.table("points"), base, _scored(impacts)),
         limits=read_limits(
             root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
         ),
@@ -135,6 +138,8 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     )
     force.finish()
     root.finish()
+    if benchmark.points and not any(group.force for group in impacts.values()):
+        raise root.fault("points", "there is no force profile that they are held against", "set [force] profile")
     _refuse_overlap(benchmark)
     return benchmark
 
@@ -166,32 +171,24 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
     profile = force.text("profile", "")
     groups = {}
     for name in tables.values:
+        if name.strip() in ("", ALL):
+            raise tables.fault(name, "is no name of a group", f"a name is needed; {ALL} stands for every group")
         table = tables.table(name)
         wanted = table.text("force_profile", profile)
         own = table.number("window_s", window, above=0.0)
-        groups[name] = Group(_logs(table, base), own, profile_of(profiles, wanted) if wanted else None)
+        groups[name] = Group(logs_of(table, base), own, profile_of(profiles, wanted) if wanted else None)
     if HOLDOUT in root:
-        groups[HOLDOUT] = Group(_logs(root.table(HOLDOUT), base), window)
+        groups[HOLDOUT] = Group(logs_of(root.table(HOLDOUT), base), window)
+    if "limits" in force and not any(group.force for group in groups.values()):
+        raise force.fault("limits", "holds limits, but no profile is chosen", f"profile = one of {', '.join(profiles)}")
     if not groups:
         raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
     return groups
 
 
-def _logs(table: Table, base: Path) -> tuple[Path, ...]:
-    logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
-    table.finish()
-    return logs
-
-
-def _named(table: Table, base: Path) -> dict[Path, str]:
-    """Which campaign or test point each log belongs to."""
-    found: dict[Path, str] = {}
-    for name in table.values:
-        for path in _logs(table.table(name), base):
-            if path in found:
-                raise table.fault(name, f"names {path}, which '{found[path]}' does too", "a log belongs to one")
-            found[path] = name
-    return found
+def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:
+    """The logs of all groups of impacts, and of the hold-out where it is among `more`."""
+    return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
 
 
 def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[str, str]]:
@@ -204,16 +201,6 @@ def _budget(table: Table) -> Budget | None:
         return Budget.parse(text) if text else None
     except UsageError as fault:
         raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
-
-
-def _labels(onset: Table, base: Path, groups: Mapping[str, Group]) -> Labels | None:
-    """The label file; a file's name alone may not fit several of the recordings that are scored."""
-    if "labels" not in onset:
-        return None
-    path = base / onset.text("labels")
-    labels = read_labels(path)
-    by_recording(path, labels.contacts, {shown_path(log, base) for group in groups.values() for log in group.logs})
-    return labels
 
 
 def _watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
@@ -260,10 +247,17 @@ def _onset(table: Table) -> OnsetRule:
 
 def _refuse_overlap(benchmark: BenchmarkFile) -> None:
     learned = {path.resolve() for path in benchmark.learn}
-    scored = [path for group in benchmark.impacts.values() for path in group.logs]
-    for path in scored:
-        if path.resolve() in learned:
+    scored: dict[Path, str] = {}
+    for name, path in ((name, path) for name, group in benchmark.impacts.items() for path in group.logs):
+        true = path.resolve()
+        if true in learned:
             raise ConfigurationError(
                 f"{benchmark.path}: {path} is learned from and scored",
                 "a recording may be in [learn] or scored, not both",
             )
+        if true in scored:
+            where = f"in {scored[true]} and in {name}" if scored[true] != name else f"twice in {name}"
+            raise ConfigurationError(
+                f"{benchmark.path}: {path} is scored {where}", "a recording belongs to one group, under one path"
+            )
+        scored[true] = name

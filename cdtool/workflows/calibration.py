@@ -13,7 +13,6 @@ from cdtool.evaluation.false_alarm_budget import Budget, set_factor
 from cdtool.evaluation.results import CalibrationResult, Skipped
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import BenchmarkFile
 from cdtool.workflows.learning import fit_classes, signals_of
@@ -43,7 +42,9 @@ def learn_thresholds(
     Raises SignatureError where nothing can be learned, UsageError where the runs are too few for the budget.
     """
     learned = LearnedThresholds({}, [], [], [])
-    fit = _fit_signatures(setup) if setup.threshold == "signature" else _fit_one(setup)
+    # The order of the files must not decide which runs judge which.
+    operations = sorted(operations, key=lambda item: (item.recording.digest, item.number, item.name))
+    fit = _fit_by_class(setup.rule) if getattr(setup.rule, "by_class", False) else _fit_one(setup.rule)
     for detector in detectors:
         try:
             pairs, left_out = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
@@ -54,16 +55,16 @@ def learn_thresholds(
             continue
         learned.skipped.extend([*left_out, *refused])
         if setup.budget:
-            row = _calibrate(setup.budget, detector.name, pairs, fit, Activation(setup.debounce))
+            used = {item.recording for item in refused}
+            kept = [pair for pair in pairs if pair[0].name not in used]
+            row = _calibrate(setup.budget, detector.name, kept, fit, Activation(setup.debounce))
             learned.calibration.append(row)
             fitted = tuple(item.with_safety_factor(row.safety_factor) for item in fitted)
         learned.thresholds[detector.name] = fitted
     return learned
 
 
-def _fit_signatures(setup: BenchmarkFile) -> Fit:
-    rule = setup.signature.for_machine(setup.machine_file.machine.default_sides)
-
+def _fit_by_class(rule: Any) -> Fit:
     def fit(pairs: Sequence[Pair]) -> tuple[tuple[FittedThreshold, ...], list[Skipped]]:
         fitted, _, refused = fit_classes(pairs, rule)
         return fitted, refused
@@ -71,11 +72,9 @@ def _fit_signatures(setup: BenchmarkFile) -> Fit:
     return fit
 
 
-def _fit_one(setup: BenchmarkFile) -> Fit:
-    threshold = THRESHOLDS.load(setup.threshold)(safety_factor=setup.signature.factor)
-
+def _fit_one(rule: Any) -> Fit:
     def fit(pairs: Sequence[Pair]) -> tuple[tuple[FittedThreshold, ...], list[Skipped]]:
-        return (threshold.fit([(item.recording.without_ground_truth(), signal) for item, signal in pairs]),), []
+        return (rule.fit([(item.recording.without_ground_truth(), signal) for item, signal in pairs]),), []
 
     return fit
 
@@ -90,16 +89,22 @@ def _calibrate(
     for fold in range(FOLDS):
         others = [pair for i, pair in enumerate(pairs) if i % FOLDS != fold]
         try:
-            fitted, _ = fit(others)
+            fitted, refused = fit(others)
         except SignatureError as fault:
-            raise UsageError(
-                f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {fault.message}",
-                "add runs to [learn], or do without a budget",
-            ) from fault
+            raise _too_few(budget, detector, fault.message) from fault
+        if refused:
+            raise _too_few(budget, detector, refused[0].reason)
         held_out = [pair for i, pair in enumerate(pairs) if i % FOLDS == fold]
         detections += [judge(operation, detector, signal, fitted, activation) for operation, signal in held_out]
     made = set_factor(budget, detector, detections, activation)
     return CalibrationResult(detector, str(budget), made.factor, made.operations, made.hours, made.alarms)
+
+
+def _too_few(budget: Budget, detector: str, why: str) -> UsageError:
+    return UsageError(
+        f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {why}",
+        "add runs to [learn] (of each class of motion), or do without a budget",
+    )
 
 
 def that_can_run(

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from cdtool.evaluation.results import ExposureResult, SweepResult
 from cdtool.evaluation.sweep import Swept
+from cdtool.evaluation.truth.matching import Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
-from cdtool.workflows.judged import Judged
 
 
 @dataclass
@@ -55,17 +55,18 @@ class SweepRows:
     _latency: dict[tuple[str, str], list[FloatArray]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    def add(self, group: str, detection: Detection, swept: Swept, judged: Judged) -> None:
+    def add(self, group: str, detection: Detection, swept: Swept | None, matching: Matching) -> None:
         """Count one operation of one detector."""
         name = detection.detector
-        if name not in self.factors:
+        if swept is None:
             return
         if group == self.impact_free:
+            if detection.assessed_seconds <= 0.0:
+                return  # an operation that could be judged nowhere is no exposure
             self._false_alarms[name] = self._false_alarms.get(name, 0) + swept.false_alarms
             operations, seconds = self._watched.get(name, (0, 0.0))
             self._watched[name] = operations + 1, seconds + detection.assessed_seconds
             return
-        matching = judged.matchings[judged.detections.index(detection)]
         seen = np.array([match.outcome != "not_assessable" for match in matching.matches], dtype=bool)
         self._latency.setdefault((name, group), []).append(swept.latency[:, seen])
         self._blind[name, group] += int(np.count_nonzero(~seen))

@@ -42,6 +42,7 @@ class Gathering:
         self._exposure: dict[tuple[str, str], Exposure] = {}
         self._sweep = SweepRows(factors, HOLDOUT)
         self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
+        self._scored: dict[str, str] = {}
         self._logs = 0
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
 
@@ -54,9 +55,9 @@ class Gathering:
             return
         self._refuse_learned(scored.recording)
         for judged in scored.judged:
-            for detection, swept in zip(judged.detections, judged.sweeps, strict=True):
+            for detection, matching, swept in zip(judged.detections, judged.matchings, judged.sweeps, strict=True):
                 self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
-                self._sweep.add(group, detection, swept, judged)
+                self._sweep.add(group, detection, swept, matching)
             _offer(self._choice, self._logs - 1, judged, self.setup.activation)
         for name in {detection.detector for judged in scored.judged for detection in judged.detections}:
             self._exposure[group, name].recordings += 1
@@ -93,6 +94,11 @@ class Gathering:
         )
 
     def _refuse_learned(self, recording: RecordingResult) -> None:
+        before = self._scored.setdefault(recording.sha256, recording.recording) if recording.sha256 else ""
+        if before and before != recording.recording:
+            raise ConfigurationError(
+                f"{self.setup.path}: {recording.recording} and {before} hold the same bytes", "score a log once"
+            )
         if recording.sha256 and recording.sha256 in self.learned:
             raise ConfigurationError(
                 f"{self.setup.path}: {recording.recording} holds the same bytes as {self.learned[recording.sha256]}, "

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from cdtool.detection import Alarm
 from cdtool.evaluation.force.course import ForceCourse, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
@@ -25,7 +27,7 @@ class Judged:
     contacts: tuple[Contact, ...]
     detections: tuple[Detection, ...]
     matchings: tuple[Matching, ...]
-    sweeps: tuple[Swept, ...] = ()
+    sweeps: tuple[Swept | None, ...] = ()
 
 
 def contact_rows(
@@ -77,9 +79,7 @@ def _contact_row(
         found_by=contact.found_by,
         watched_ms=1e3 * found.watched,
         resolution_ms=1e3 * resolution,
-        side=alarm.side if alarm else None,
-        statistic=alarm.statistic if alarm else None,
-        limit=alarm.limit if alarm else None,
+        **_crossing(detection, alarm),
     )
 
 
@@ -92,13 +92,21 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
             detector=detection.detector,
             joint=detection.statistic.joints[alarm.joint],
             time_s=alarm.time,
-            side=alarm.side,
-            statistic=alarm.statistic,
-            limit=alarm.limit,
+            **_crossing(detection, alarm),
         )
         for detection, matching in zip(judged.detections, judged.matchings, strict=True)
         for alarm in matching.false_alarms
     ]
+
+
+def _crossing(detection: Detection, alarm: Alarm | None) -> dict[str, Any]:
+    """Which limit an alarm crossed and with which value; nothing where no threshold raised it, as with triggers."""
+    known = alarm if detection.threshold is not None else None
+    return {
+        "side": known.side if known else None,
+        "statistic": known.statistic if known else None,
+        "limit": known.limit if known else None,
+    }
 
 
 def _known(value: float) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from cdtool.activation import Activation
 from cdtool.detection import Signal
@@ -15,6 +15,7 @@ from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
+from cdtool.recording import Recording
 from cdtool.signature_store import (
     LearnedRun,
     SignatureFile,
@@ -22,9 +23,20 @@ from cdtool.signature_store import (
     update_signature,
     with_run,
 )
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
-from cdtool.thresholds.signature import SPEED_TOLERANCE, Signature
+from cdtool.thresholds.signature import Signature
 from cdtool.workflows.runs import Progress, check_joints, load_runs
+
+Fitted = TypeVar("Fitted", covariant=True)
+
+
+class RuleOf(Protocol[Fitted]):
+    """A threshold's rule, by what it makes of impact-free runs."""
+
+    def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> Fitted:
+        """Learn from impact-free runs."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -112,10 +124,10 @@ def signals_of(
 
 
 def fit_classes(
-    pairs: Sequence[tuple[Operation, Signal]], rule: Signature
-) -> tuple[tuple[FittedSignature, ...], list[Operation], list[Skipped]]:
-    """A signature for each class of motion, the runs used and those left out; raises SignatureError."""
-    fitted: list[FittedSignature] = []
+    pairs: Sequence[tuple[Operation, Signal]], rule: RuleOf[Fitted]
+) -> tuple[tuple[Fitted, ...], list[Operation], list[Skipped]]:
+    """What the rule learns of each class of motion, the runs used and those left out; raises SignatureError."""
+    fitted: list[Fitted] = []
     used: list[Operation] = []
     skipped: list[Skipped] = []
     refused: list[CdtoolError] = []

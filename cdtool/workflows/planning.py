@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from cdtool.errors import UsageError, nearest
-from cdtool.evaluation.comparison import SIGNIFICANT
+from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import ContactResult, Results
 from cdtool.evaluation.results_file import read_results
@@ -21,6 +21,7 @@ from cdtool.evaluation.statistics.sample_size import (
 )
 from cdtool.evaluation.statistics.spread import Spread, spread_of
 from cdtool.evaluation.summary import campaigns
+from cdtool.plain_text import counted, digits
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,7 @@ def plan(
     `missed_at_most` as 5% or 0.05; `false_alarms_at_most` as 1/1000op or 0.1/h. `allowed` misses or false alarms are
     answered besides none; None: one. Raises UsageError where nothing is asked, or a question lacks a part.
     """
-    if not 0.0 < significance < 0.5:
-        raise UsageError(f"significance level is {significance:g}", "a share above 0 and below 0.5, such as 0.05")
+    check_significance(significance)
     level = 1.0 - significance
     counts = (0, 1) if allowed is None else tuple(dict.fromkeys((0, allowed)))
     answers: list[Answer] = []
@@ -145,8 +145,12 @@ def _difference(difference: float, std: Measured, unpaired: bool, power: float, 
 
 def _missed(share: float, counts: Sequence[int], level: float) -> Answer:
     needs = tuple(Need(impacts_for_missed_share(share, count, level), "impacts", "show", count) for count in counts)
-    rest = "".join(f"; {item.amount:g} with {_named(item.allowed, 'miss', 'misses')} allowed" for item in needs[1:])
-    words = f"to show that at most {100.0 * share:g} % are missed: {needs[0].amount:g} impacts without a miss{rest}"
+    several = ("miss", "misses")
+    rest = "".join(f"; {digits(item.amount)} with {_named(item.allowed, *several)} allowed" for item in needs[1:])
+    words = (
+        f"to show that at most {digits(100.0 * share)} % are missed: "
+        f"{counted(needs[0].amount, 'impact')} without a miss{rest}"
+    )
     return Answer("missed", words, needs)
 
 
@@ -159,13 +163,13 @@ def _false_alarms(budget: Budget, counts: Sequence[int], level: float) -> Answer
         return float(f"{math.ceil(exposure / step - 1e-9) * step:.12g}")
 
     shown = tuple(Need(whole(exposure_for_rate(budget.rate, count, level)), unit, "show", count) for count in counts)
-    rest = "".join(
-        f"; {item.amount:g} with {_named(item.allowed, 'false alarm', 'false alarms')} allowed" for item in shown[1:]
-    )
+    several = ("false alarm", "false alarms")
+    rest = "".join(f"; {digits(item.amount)} with {_named(item.allowed, *several)} allowed" for item in shown[1:])
     needed = Need(whole(budget.needed), unit, "set")
     words = (
-        f"a budget of {budget} false alarms: to set a safety factor for it, {needed.amount:g} impact-free {unit} to "
-        f"learn from; to show that it is kept, {shown[0].amount:g} others without a false alarm{rest}"
+        f"a budget of {budget} false alarms: to set a safety factor for it, "
+        f"{counted(needed.amount, f'impact-free {budget.per}')} to learn from; "
+        f"to show that it is kept, {digits(shown[0].amount)} others without a false alarm{rest}"
     )
     return Answer("false alarms", words, (needed, *shown))
 

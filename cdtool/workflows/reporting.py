@@ -20,4 +20,4 @@ def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]
     beside = traces_path(path)
     if not beside.exists():
         return evaluated, (), f"{beside} is missing: no figures over time"
-    return evaluated, read_traces(beside), ""
+    return evaluated, read_traces(beside, path.read_text(encoding="utf-8")), ""

@@ -8,8 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
+from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.evaluation.force.course import ForceCourse, force_course
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
@@ -92,8 +91,9 @@ def score_log(
     scored.findings = told(recording)
     scored.skipped += lost(recording)
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
+    inside = _by_operation(operations, contacts)
     for contact in contacts:
-        if not any(contacts_of(item, [contact]) for item in operations):
+        if not any(contact in items for items in inside):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {setup.operations})"
             scored.skipped.append(Skipped(recording.name, text))
     courses = _courses(recording, contacts, setup, scored)
@@ -101,9 +101,14 @@ def score_log(
     if profile:
         scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
         scored.forces = force_rows(scored.recording, scored.verdicts, courses)
-    for operation in operations:
-        inside = contacts_of(operation, contacts)
-        judged = _judge(setup, group, operation, inside, detect(operation, scored), factors)
+        unseen = [f"contact {number}" for number in range(1, len(contacts) + 1) if number not in courses]
+        if unseen:
+            text = f"{', '.join(unseen)}: no load-cell force to hold against {profile.name}"
+            scored.skipped.append(Skipped(recording.name, text))
+    found = [detect(operation, scored) for operation in operations]
+    crossings = _pooled(found)
+    for operation, own, detections in zip(operations, inside, found, strict=True):
+        judged = _judge(setup, group, operation, own, detections, factors, contacts, crossings)
         scored.judged.append(judged)
         scored.contacts += contact_rows(judged, recording, contacts, courses, setup.synchronisation)
         scored.false_alarms += false_alarm_rows(judged)
@@ -111,15 +116,43 @@ def score_log(
     return scored
 
 
+def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
+    """The contacts of each operation; one on the edge of two belongs to the earlier."""
+    taken: set[Contact] = set()
+    found = []
+    for operation in operations:
+        own = tuple(contact for contact in contacts_of(operation, contacts) if contact not in taken)
+        taken.update(own)
+        found.append(own)
+    return found
+
+
+def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
+    """Every detector's crossings in all operations of a log, in order of time."""
+    pooled: dict[str, list[Alarm]] = {}
+    for detections in found:
+        for detection in detections:
+            pooled.setdefault(detection.detector, []).extend(detection.verdict.crossings)
+    return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
+
+
 def _true_contacts(recording: Recording, group: str, setup: BenchmarkFile, path: Path) -> list[Contact]:
     if group == HOLDOUT:
         return []
-    labelled = setup.labels.of(recording.name) if setup.labels else None
-    contacts = list(labelled) if labelled is not None else find_contacts(recording, setup.onset)
+    labels = setup.labels
+    name = labels.name_of(recording.name) if labels else None
+    if labels and name is not None:
+        labels.check(recording.name, recording.start, recording.end)
+        if not labels.contacts[name]:
+            raise RecordingError(
+                f"{path}: no contact found ({labels.lines[name][0]} names none)",
+                "write its start_s and end_s there, or move the log to [holdout]",
+            )
+        return list(labels.contacts[name])
+    contacts = find_contacts(recording, setup.onset)
     if not contacts:
-        rule = f"{setup.labels.source} names none" if labelled is not None and setup.labels else setup.onset.described
         raise RecordingError(
-            f"{path}: no contact found ({rule})", "lower [onset] above_n, or move the log to [holdout]"
+            f"{path}: no contact found ({setup.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
         )
     return contacts
 
@@ -162,10 +195,16 @@ def _judge(
     contacts: tuple[Contact, ...],
     detections: Sequence[Detection],
     factors: Mapping[str, FloatArray],
+    of_log: Sequence[Contact],
+    crossings: Mapping[str, Sequence[Alarm]],
 ) -> Judged:
     window = setup.impacts[group].window
-    matchings = tuple(match(item.verdict, contacts, item.statistic, window) for item in detections)
+    matchings = tuple(
+        match(item.verdict, contacts, item.statistic, window, of_log=of_log, crossings=crossings[item.detector])
+        for item in detections
+    )
     sweeps = tuple(
-        sweep(item, contacts, setup.activation, window, factors.get(item.detector, np.empty(0))) for item in detections
+        sweep(item, contacts, setup.activation, window, factors[item.detector]) if item.detector in factors else None
+        for item in detections
     )
     return Judged(group, operation, contacts, tuple(detections), matchings, sweeps)

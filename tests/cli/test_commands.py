@@ -200,8 +200,20 @@ def test_reports_are_made_again_from_the_results_alone(gate_folder, tmp_path):
     assert done.status == 0 and "friction_ekf" in done.out, done.err
     assert (tmp_path / "again.html").read_bytes() == (folder / "report.html").read_bytes()
     assert (tmp_path / "again.json").read_bytes() == (folder / "results.json").read_bytes()
+    assert cdtool("report", folder / "results.json", "-o", tmp_path / "second").status == 0
+    for path in folder.iterdir():
+        assert (tmp_path / "second" / path.name).read_bytes() == path.read_bytes(), path.name
     traces = "results.traces.json.gz"
     assert (tmp_path / "again.traces.json.gz").read_bytes() == (folder / traces).read_bytes()
+
+
+def test_traces_of_other_results_are_refused(gate_folder, tmp_path):
+    file = gate_folder / "benchmark.toml"
+    for name, detectors in (("one", "gm"), ("two", "pt")):
+        assert cdtool("benchmark", file, "--detectors", detectors, "-o", tmp_path / f"{name}.json").status == 0
+    (tmp_path / "two.traces.json.gz").write_bytes((tmp_path / "one.traces.json.gz").read_bytes())
+    done = cdtool("report", tmp_path / "two.json")
+    assert done.status == 2 and "two.traces.json.gz: belongs to other results" in done.err
 
 
 def test_a_report_without_traces_says_so_and_a_damaged_file_is_one_line(gate_folder, tmp_path):
@@ -330,3 +342,14 @@ def test_output_to_a_closed_pipe_ends_quietly():
     command = f'{sys.executable} -c "{code}" | true'
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert "Traceback" not in done.stderr
+
+
+def test_the_help_keeps_what_stands_in_brackets():
+    assert "above this [N]" in " ".join(cdtool("detect", "--help").out.replace("│", " ").split())
+
+
+def test_an_option_with_an_empty_value_is_an_error(gate_folder, tmp_path):
+    file = gate_folder / "benchmark.toml"
+    for arguments in (("--false-alarm-budget", ""), ("--detectors", ""), ("-o", "")):
+        done = cdtool("benchmark", file, *arguments)
+        assert done.status == 2 and done.err.count("\n") == 1, (arguments, done.err)

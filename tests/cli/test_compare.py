@@ -63,7 +63,7 @@ def test_the_table_stands_before_the_words_and_shows_misses_beside_latencies(wri
     assert "stiff, momentum: slower by 5.0 ms (5.0 to 5.0)" in done.out
     assert "1 of 30 contacts apart: one build could not assess them" in " ".join(done.out.split())
     assert "differs: debounce_samples: 5, now 9" in done.out
-    assert "only in old: detector pure_torque" in done.out
+    assert "only in old, not compared: detector pure_torque" in done.out
 
 
 def test_the_table_fits_100_columns_with_long_names_and_many_contacts(written):
@@ -126,7 +126,7 @@ def test_names_from_files_stay_text_in_the_terminal_and_in_markdown(written, tmp
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("old.json", "absent.json"), "absent.json: not a results file"),
+        (("old.json", "absent.json"), "absent.json: no such file"),
         (("old.json", "other.json"), "onset differs: load cell above 20 N"),
         (("old.json", "old.json", "--level", "1"), "significance level is 1"),
         (("old.json", "old.json", "-o", "compare.html"), "a name that ends in .md or .json"),
@@ -154,3 +154,33 @@ def test_python_gives_what_the_command_gives(written):
     found = api.compare(old, new)
     assert found.words == cdtool("compare", old, new).out.splitlines()[-1]
     assert [row.words for row in found.rows] == [row.words for row in api.compare(build(OLD), str(new)).rows]
+
+
+def test_the_default_debounce_is_told_as_what_it_is(written):
+    old = written("old.json", build(OLD, debounce_samples=None))
+    done = cdtool("compare", old, written("new.json", build(OLD, debounce_samples=14)))
+    assert "differs: debounce_samples: default (9 ms), now 14" in done.out
+
+
+def test_misses_are_told_where_no_contact_has_a_latency_in_both(written):
+    old = written("old.json", build({("momentum", "stiff"): LATENCIES[:4]}))
+    done = cdtool("compare", old, written("new.json", build({("momentum", "stiff"): [MISSED] * 4})))
+    assert done.status == 0
+    assert "missed 4 instead of 0: not shown, too few recordings" in " ".join(done.out.split())
+
+
+def test_misses_that_could_have_been_shown_are_told_with_how_many(written):
+    old = written("old.json", build({("momentum", "stiff"): [*LATENCIES[:5], *[MISSED] * 20]}))
+    new = written("new.json", build({("momentum", "stiff"): [*[MISSED] * 5, *[MISSED] * 20]}))
+    done = cdtool("compare", old, new)
+    assert "missed 25 instead of 20: not shown" in " ".join(done.out.split())
+
+
+def test_a_detector_that_is_gone_is_said_on_top_and_with_the_verdict(written, tmp_path):
+    old = written("old.json", build(OLD))
+    new = written("new.json", build({("momentum", "stiff"): LATENCIES}))
+    done = cdtool("compare", old, new, "-o", tmp_path / "c.md")
+    assert done.status == 0 and done.out.startswith("only in old, not compared: detector pure_torque\n")
+    words = "only in old: detector pure_torque"
+    assert words in " ".join(done.out.split()).rpartition("no change shown")[2]
+    assert words in (tmp_path / "c.md").read_text(encoding="utf-8").replace("\\", "").splitlines()[0]

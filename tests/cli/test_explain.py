@@ -146,6 +146,10 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "at least 1")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
+        # The figure's folder is looked at before the log is.
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "make")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is watched")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is watched")),
         ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
     ],
 )
@@ -193,3 +197,20 @@ def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypa
             assert done.status == 0, done.err
         printed = [line.rstrip() for line in done.out.split("\nplot written")[0].rstrip().splitlines()]
         assert printed == shown.splitlines()
+
+
+@pytest.mark.parametrize(("columns", "width"), [(40, 60), (72, 72), (200, 100)])
+def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatch, columns, width):
+    from cdtool.cli import explain as module
+
+    monkeypatch.setattr(module.sys.stdout, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert module.columns_to_fill() == width
+
+
+def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
+    from cdtool.cli import explain as module
+
+    monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
+    monkeypatch.setenv("COLUMNS", "70")
+    assert module.columns_to_fill() == 100

@@ -165,7 +165,7 @@ def test_contacts_of_one_campaign_count_as_one():
         (("--missed-at-most", "five"), "missed share is 'five'"),
         (("--missed-at-most", "5%x"), "missed share is '5%x'"),
         (("--false-alarms-at-most", "often"), "false-alarm budget is 'often'"),
-        (("--difference-ms", 5, "--from", "absent.json"), "absent.json: not a results file"),
+        (("--difference-ms", 5, "--from", "absent.json"), "absent.json: no such file"),
         (("--difference-ms", 5, "--from", "results.json"), "0 detectors are named (name two detectors of momentum"),
         (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are named"),
         (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are named"),
@@ -203,3 +203,23 @@ def test_only_the_contacts_of_the_group_named_count():
     assert found == {
         group: pytest.approx(np.std(np.subtract(FIRST, second), ddof=1)) for group, second in groups.items()
     }
+
+
+def test_whole_numbers_have_all_their_digits():
+    done = cdtool("plan", "--false-alarms-at-most", "1/1000000op")
+    assert "a budget of 1/1000000op false alarms" in done.out and "1000000 impact-free operations" in done.out
+    assert "2995733 others" in done.out and "e+" not in done.out
+    assert "e+" not in cdtool("plan", "--missed-at-most", "0.000001").out
+
+
+def test_one_operation_is_no_plural():
+    done = cdtool("plan", "--false-alarms-at-most", "1/op")
+    assert "1 impact-free operation to learn from" in done.out
+    assert "1 impact-free hour to learn from" in cdtool("plan", "--false-alarms-at-most", "1/h").out
+
+
+@pytest.mark.parametrize("command", ["plan", "compare"])
+def test_a_level_that_no_computer_number_tells_from_0_is_refused(source, command):
+    asked = ("--missed-at-most", "5%") if command == "plan" else (source, source)
+    done = cdtool(command, *asked, "--level", "1e-300")
+    assert done.status == 2 and "significance level is 1e-300" in done.err and "0.000000001" in done.err

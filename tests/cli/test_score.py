@@ -265,3 +265,12 @@ def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measu
     assert sorted(item.name for item in tmp_path.iterdir()) == sorted(
         [path.name, *(target.name for target in targets), "r.traces.json.gz"]
     )
+
+
+def test_triggers_were_held_against_no_threshold_and_have_no_value_and_no_limit(logs, measured, tmp_path):
+    report = tmp_path / "score.html"
+    values, _ = scored(logs, after(measured, 0.05) + "holdout/01.csv,2.0,plc,\n", "-o", report)
+    rows = [*values["contacts"], *values["false_alarms"]]
+    assert len(rows) == 5 and {row["outcome"] for row in values["contacts"]} == {"detected"}
+    assert {(row["side"], row["statistic"], row["limit"]) for row in rows} == {(None, None, None)}
+    assert "above" not in report.read_text(encoding="utf-8").partition("holdout/01.csv")[2][:600]

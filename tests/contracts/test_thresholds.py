@@ -26,7 +26,17 @@ def pairs(gate, simulated):
 
 def test_every_file_of_the_folder_with_a_threshold_is_registered():
     folder = Path(cdtool.thresholds.__file__).parent
-    helpers = {"__init__", "base", "alignment", "signature_curve", "fitted_signature"}
+    helpers = {"__init__", "base", "alignment", "signature_curve", "fitted_signature"} | {
+        "common_class",
+        "settings",
+        "stretches",
+        "first_order",
+        "statistic_limit",
+        "trend_table",
+        "autoregression",
+        "whitening",
+        "sequential",
+    }
     assert {path.stem for path in folder.glob("*.py")} - helpers == set(THRESHOLDS.table)
 
 
@@ -79,6 +89,31 @@ def test_shapes_fit_and_a_missing_value_is_never_valid(name, pairs, gate, simula
     assert not statistic.valid[3000:3100].any()
     assert not np.isnan(band.upper[statistic.valid]).any() and not np.isnan(band.lower[statistic.valid]).any()
     assert statistic.valid[4000:5000].all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_flaky_signal_is_judged_where_it_is_there_and_only_there(name, pairs, gate, simulated):
+    fitted = THRESHOLDS.load(name)().fit(pairs)
+    recording = simulated("none", 4)
+    signal = Momentum().signal(recording, gate)
+    whole, _ = fitted.evaluate(recording, signal)
+    lost = np.random.default_rng(0).random(signal.values.shape) < 0.2
+    values, status = np.where(lost, np.nan, signal.values), np.where(lost, 3, signal.status).astype(np.uint8)
+    status[4000:4200] = 2
+    statistic, band = fitted.evaluate(recording, replace(signal, values=values, status=status))
+    assert not statistic.valid[lost].any() and not statistic.valid[4000:4200].any()
+    assert np.isfinite(statistic.values[statistic.valid]).all()
+    assert statistic.valid[4700:5500][~lost[4700:5500] & whole.valid[4700:5500]].all()
+    assert not (statistic.valid & ((statistic.values > band.upper) | (statistic.values < band.lower))).any()
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if hasattr(THRESHOLDS.load(name), "sides")])
+def test_with_one_side_watched_only_the_limit_that_an_obstacle_would_break_is_there(name, pairs, simulated):
+    rule = replace(THRESHOLDS.load(name)(), sides="one")
+    recording, signal = pairs[0]
+    statistic, band = rule.fit(pairs).evaluate(recording, signal)
+    running = statistic.valid & (statistic.time > 2.0)[:, np.newaxis]
+    assert running.any() and np.isneginf(band.lower[running]).all() and np.isfinite(band.upper[running]).all()
 
 
 @pytest.mark.parametrize("name", NAMES)

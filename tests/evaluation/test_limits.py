@@ -11,6 +11,7 @@ import pytest
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.limits import broken, check_limits, read_limits
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
+from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.summary import FIGURES, summarise
 from cdtool.tables import Table
 
@@ -74,7 +75,7 @@ def test_a_star_stands_for_every_detector_and_every_group_with_contacts():
     assert [(item.detector, item.group, item.outcome) for item in limits] == [
         ("momentum", "stiff", "kept"),
         ("friction_ekf", "stiff", "broken"),
-        ("momentum", "soft.2", "kept"),
+        ("momentum", "soft.2", "not assessable"),
         ("friction_ekf", "soft.2", "kept"),
     ]
 
@@ -133,6 +134,36 @@ def test_a_detector_that_was_not_run_is_an_error():
         check_limits(
             rules('"gm.stiff.p95_ms" = { max = 1 }'), [item for item in SUMMARIES if item.detector != "momentum"]
         )
+
+
+def test_what_was_watched_nowhere_has_no_false_alarms_and_does_not_pass():
+    blind = replace(results(), exposure=(ExposureResult("holdout", "friction_ekf", 4, 50, 0.0, 50),))
+    summaries = [item for item in summarise(blind) if item.detector == "friction_ekf" and item.group == "holdout"]
+    for figure in ("false_alarms", "false_alarms_per_operation_at_most", "false_alarms_per_hour"):
+        (limit,) = check_limits(rules(f'"feekf.holdout.{figure}" = {{ max = 9 }}'), summaries)
+        assert limit.outcome == "not assessable" and limit.reason == "nothing was watched"
+    assert FIGURES["operations"](summaries[0]) == 0
+
+
+def test_the_bound_of_a_rate_counts_its_alarms():
+    (limit,) = check('"gm.holdout.false_alarms_per_operation_at_most" = { max = 9 }')
+    assert limit.value == pytest.approx(poisson_at_most(1, 4.0)) and limit.value > poisson_at_most(0, 4.0)
+
+
+def test_force_limits_do_not_pass_without_a_verdict():
+    (limit,) = check('"gm.stiff.force_failed" = { max = 0 }')
+    assert limit.outcome == "not assessable" and "force profile" in limit.reason
+
+
+def test_a_group_of_which_no_log_could_be_scored_does_not_pass():
+    empty = replace(results(), contacts=(), exposure=(), false_alarms=())
+    (limit,) = check_limits(rules('"gm.stiff.p95_ms" = { max = 50 }'), summarise(empty))
+    assert limit.outcome == "not assessable" and limit.reason == "no recording of the group was scored"
+
+
+def test_a_missed_contact_makes_the_largest_force_at_the_alarm_infinite():
+    (limit,) = check('"feekf.stiff.force_at_alarm_max_n" = { max = 1e9 }')
+    assert limit.outcome == "broken"
 
 
 @pytest.mark.parametrize("figure", FIGURES)

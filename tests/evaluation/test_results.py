@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -126,13 +127,29 @@ def test_another_version_is_named_with_the_way_out(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"latency_ms": 10.0', '"latency_ms": "10"', r"results\.contacts\[0\]\.latency_ms is '10', no float"),
-        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is True, no int"),
-        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, no int"),
+        ('"latency_ms": 10.0', '"latency_ms": "10"', r'results\.contacts\[0\]\.latency_ms is "10", no number$'),
+        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is true, no whole number$"),
+        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, no whole number$"),
         ('"clipped": false', '"cliped": false', r"unknown field 'cliped'"),
-        ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: .*onset_s"),
-        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is None"),
+        ('"onset_s": 5.0,', "", r"results\.contacts\[0\] lacks onset_s$"),
+        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is null, no number$"),
         ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is no list"),
+        (
+            '"outcome": "missed"',
+            '"outcome": "mised"',
+            r"contacts\[3\]\.outcome is .mised., none of detected, missed, not_assessable$",
+        ),
+        (
+            '"outcome": "broken"',
+            '"outcome": "brokn"',
+            r"limits\[0\]\.outcome is .brokn., none of kept, broken",
+        ),
+        (
+            '"detector": "momentum"',
+            '"detector": "m"',
+            r"contacts\[0\]\.detector is 'm', which .*detectors does not",
+        ),
+        ('"group": "stiff"', '"group": "stif"', r"contacts\[0\]\.group is 'stif', which .*groups does not list$"),
     ],
 )
 def test_a_wrong_field_is_named(tmp_path, old, new, words):
@@ -140,5 +157,28 @@ def test_a_wrong_field_is_named(tmp_path, old, new, words):
     text = to_json(FULL)
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(RecordingError, match=words):
+    with pytest.raises(RecordingError) as fault:
         read_results(path)
+    assert re.search(words, fault.value.message)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, r"results\.json: no such file$"),
+        ("", r"results\.json: not a results file: it is empty$"),
+        ('{"schema_version": 2, "detec', r"results\.json: not a results file: cut off or damaged at line 1$"),
+        (b"\xff\xfe\x00", r"results\.json: not a results file: no UTF-8 text$"),
+        (
+            '{"schema_version": 2}',
+            r"results lacks provenance, detectors, groups, contacts, false_alarms, exposure$",
+        ),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_plain_words(tmp_path, content, words):
+    path = tmp_path / "results.json"
+    if content is not None:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(RecordingError) as fault:
+        read_results(path)
+    assert re.search(words, fault.value.message)

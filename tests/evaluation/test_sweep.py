@@ -48,7 +48,7 @@ def test_each_step_is_what_matching_says_with_those_limits(seed):
     assert swept.false_alarms[0] > 0 and swept.false_alarms[-1] == 0
     for i, factor in enumerate(factors):
         moved = detection(seed, float(factor))
-        matching = match(moved.verdict, contacts, moved.statistic, 1.0)
+        matching = match(moved.verdict, contacts, moved.statistic, 1.0, rearm=ACTIVATION.rearm)
         assert len(matching.false_alarms) == swept.false_alarms[i]
         np.testing.assert_allclose([item.latency for item in matching.matches], swept.latency[i])
 
@@ -145,3 +145,19 @@ def test_a_detection_without_a_threshold_never_alarms():
     blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not assessable"))
     swept = sweep(blind, [Contact(3.0, 3.1, 0.0)], ACTIVATION, 1.0, MULTIPLES)
     assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
+
+
+def test_a_budget_tells_what_is_missing_with_all_digits():
+    with pytest.raises(
+        UsageError, match=r"budget 1/2000000op needs 2000000 impact-free operations .* 12 could be"
+    ) as at:
+        Budget.parse("1/2000000op").check(12.0, "gm")
+    assert "add 1999988 to [learn]" in at.value.hint
+    with pytest.raises(UsageError, match=r"needs 1 impact-free operation to be set, 0 could be"):
+        Budget.parse("1/op").check(0.0, "gm")
+    assert [str(Budget.parse(text)) for text in ("1/3op", "0.002/op", "1/8h", "2500000/h")] == [
+        "1/3op",
+        "1/500op",
+        "1/8h",
+        "2500000/h",
+    ]

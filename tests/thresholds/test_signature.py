@@ -166,3 +166,17 @@ def test_the_spread_has_a_floor_where_a_quantised_signal_does_not_vary():
     samples[:, 40:45] = 3.0
     _, spread = Curve.empty(1.0, 1.0, 100.0, 1).learned(samples).band(pooled=False)
     assert spread[42, 0] == pytest.approx(0.1 * np.median(spread), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("force", "runs", "said"),
+    [
+        (False, 9, "9 impact-free runs of one class: 1 more is needed to have 10"),
+        (False, 1, "1 impact-free run of one class: 9 more are needed to have 10"),
+        (True, 1, "1 impact-free run of one class: 1 more is needed to have 2"),
+    ],
+)
+def test_too_few_runs_are_told_with_how_many_are_missing(force, runs, said):
+    with pytest.raises(SignatureError, match=said) as fault:
+        Signature(force=force).fit([(None, None)] * runs)
+    assert ("--force" in fault.value.hint and "force = true in [signature]" in fault.value.hint) is not force

@@ -15,8 +15,8 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.builds.configuration import Changed, changed_settings, refuse_other_rules
 from cdtool.evaluation.builds.pairs import pair_recordings
 from cdtool.evaluation.builds.rows import NOTHING_SHOWN, Build, BuildRow, answer, ask
-from cdtool.evaluation.builds.words import overall_words, pairing_words, row_words
-from cdtool.evaluation.comparison import SIGNIFICANT
+from cdtool.evaluation.builds.words import gone_words, overall_words, pairing_words, row_words
+from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
 
 Verdict = Literal["worse", "better", "mixed", "no change shown"]
@@ -49,8 +49,7 @@ def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT
     Raises ConfigurationError, naming the key, where something differs that decides how figures come about; UsageError
     where nothing is common.
     """
-    if not 0.0 < significance < 0.5:
-        raise UsageError(f"significance level is {significance:g}", "a share above 0 and below 0.5, such as 0.05")
+    check_significance(significance)
     groups = [group for group in old.groups if group in new.groups]
     detectors = [name for name in old.detectors if name in new.detectors]
     builds = (Build(old), Build(new))
@@ -64,14 +63,15 @@ def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT
     answered, count = answer(asked, significance)
     rows = tuple(replace(row, words=row_words(row, count)) for row in answered)
     verdict = _verdict(rows)
+    only_old = tuple(_alone(old, new, builds))
     return BuildComparison(
         verdict=verdict,
-        words=overall_words(verdict, rows, count, significance),
+        words=overall_words(verdict, rows, count, significance) + gone_words(only_old),
         significance=significance,
         asked=count,
         rows=rows,
         changed=tuple(changed_settings(old.provenance, new.provenance, detectors)),
-        only_old=tuple(_alone(old, new, builds)),
+        only_old=only_old,
         only_new=tuple(_alone(new, old, builds[::-1])),
         notes=tuple(pairing_words(pairings)),
     )

@@ -8,7 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cdtool.activation import DEBOUNCE_TIME
 from cdtool.errors import ConfigurationError
+from cdtool.evaluation.truth.labels import LABEL_FILE
 from cdtool.plain_text import shorten
 
 # Provenance keys that decide how figures come about, and where the benchmark file sets them.
@@ -30,6 +32,7 @@ _UNDER_TEST = (
     "machine_sha256",
     "gains",
     "threshold",
+    "threshold_rule",
     "signature_rule",
     "debounce_samples",
     "false_alarm_budget",
@@ -38,6 +41,7 @@ _UNDER_TEST = (
 )
 _BY_DETECTOR = ("gains", "signature_sha256")
 _LONGEST = 80
+_DEFAULT_DEBOUNCE = f"default ({1e3 * DEBOUNCE_TIME:g} ms)"
 _HASH = re.compile(r"[0-9a-f]{64}")
 
 Leaf = tuple[str, Any, Any]
@@ -61,11 +65,17 @@ def refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: S
         if key == "label_file":
             # Other recordings have other labels; the same ones with other onsets are refused where they are paired.
             before, after = before is not None, after is not None
+        if key == "onset":
+            before, after = (_without_label_file(rule) for rule in (before, after))
         for name, one, other in _leaves(key, before, after):
             raise ConfigurationError(
                 f"{name} differs: {_shown(one)} in old, {_shown(other)} in new",
                 f"such figures cannot be compared: set {where} of the benchmark file alike and run one of them again",
             )
+
+
+def _without_label_file(rule: Any) -> Any:
+    return rule.partition(LABEL_FILE)[0] if isinstance(rule, str) else rule
 
 
 def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any], detectors: Sequence[str]) -> list[Changed]:
@@ -75,6 +85,10 @@ def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any], detectors: 
         before, after = old.get(key), new.get(key)
         if key in _BY_DETECTOR:
             before, after = _only(before, detectors), _only(after, detectors)
+        if key == "debounce_samples":
+            before, after = (
+                _DEFAULT_DEBOUNCE if key in side and side[key] is None else side.get(key) for side in (old, new)
+            )
         found += [Changed(name, _shown(one), _shown(other)) for name, one, other in _leaves(key, before, after)]
     return found + _other_runs(old, new)
 

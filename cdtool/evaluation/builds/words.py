@@ -9,6 +9,10 @@ from cdtool.evaluation.builds.pairs import Pairing
 from cdtool.evaluation.builds.questions import Figure
 from cdtool.evaluation.builds.rows import NOTHING_SHOWN, BuildRow, Question
 from cdtool.evaluation.statistics.interval import Interval
+from cdtool.plain_text import shorten
+
+# As many are named in the line of the verdict; all stand in `only_old`.
+_NAMED = 3
 
 
 def row_words(row: BuildRow, asked: int) -> str:
@@ -35,6 +39,12 @@ def overall_words(verdict: str, rows: Sequence[BuildRow], asked: int, significan
         return f"no change shown ({how})"
     ways = [f"{count} {way}" for count, way in zip(counts, ("worse", "better"), strict=True) if count]
     return f"{verdict}: {' and '.join(ways)} {how}"
+
+
+def gone_words(only_old: Sequence[str]) -> str:
+    """What is gone from the new results, to stand after the verdict: nothing is shown of it."""
+    more = f" and {len(only_old) - _NAMED} more" if len(only_old) > _NAMED else ""
+    return f"; only in old: {', '.join(shorten(name, 40) for name in only_old[:_NAMED])}{more}" if only_old else ""
 
 
 def pairing_words(pairings: Mapping[str, Pairing]) -> list[str]:
@@ -91,12 +101,20 @@ def _would_have_been(row: BuildRow, asked: int) -> str:
     if latency is None:
         return _least_alarms(alarms) if alarms else "nothing could be tested"
     if latency.outcome == "not asked":
-        return f"latency: {latency.reason}"
+        return f"latency: {latency.reason}{_missed_unseen(row.question('missed'))}"
     if latency.detectable == math.inf:
         return f"none could have been in latency: too few recordings for {asked} questions"
     if latency.detectable == 0.0:
         return "every latency is the same"
     return f"a change of {figure(latency.detectable)} ms would have been"
+
+
+def _missed_unseen(item: Question | None) -> str:
+    """Misses that differ without being shown to."""
+    if item is None or item.old == item.new:
+        return ""
+    why = "too few recordings" if item.detectable == math.inf else f"{item.detectable:g} would have been"
+    return f"; missed {item.new:g} instead of {item.old:g}: not shown, {why}"
 
 
 def _least_alarms(item: Question) -> str:

@@ -1,7 +1,7 @@
 """Force limits: how much force a contact may have, as a staircase over the time since it began. Data, not code.
 
 Conventions: time counts from the contact's onset [s]; a step holds from its `from_s` to the next step's, the last one
-to the end of the record. The shipped file is force_limits.toml beside this module; a user's file replaces it.
+to the end of the record. The shipped file is limits.toml beside this module; a user's file replaces it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class ForceProfile:
 def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     """The profiles of a file by name, None: the shipped ones; raises ConfigurationError with file, key and reason."""
     file = _SHIPPED if path is None else path
-    where = str(file) if path else "the shipped force_limits.toml"
+    where = str(file) if path else "the shipped limits.toml"
     root = Table(read_toml(file), where)
     profiles = {name: _profile(name, root.table(name)) for name in root.values}
     if not profiles:

@@ -7,6 +7,7 @@ without a limit. A panel's value and limits share one step, so that what is abov
 from __future__ import annotations
 
 import gzip
+import hashlib
 import json
 import math
 import zlib
@@ -22,7 +23,7 @@ from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
 from cdtool.recording import Contact, FloatArray
 from cdtool.strict_json import finite, strict_json
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 NO_LIMIT = 1_000_000_000
 
 # Steps over the range of a panel; a plot has fewer pixels.
@@ -35,14 +36,22 @@ def traces_path(results: Path) -> Path:
     return results.with_name(f"{results.stem}.traces.json.gz")
 
 
-def encode_traces(traces: Sequence[Trace]) -> bytes:
-    """All traces as gzipped JSON; the same bytes for the same traces."""
-    values = {"schema_version": SCHEMA_VERSION, "traces": [trace_values(trace) for trace in traces]}
+def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
+    """All traces as gzipped JSON; the same bytes for the same traces. `results`: the text of the file beside them."""
+    values = {
+        "schema_version": SCHEMA_VERSION,
+        "results_sha256": _digest(results),
+        "traces": [trace_values(trace) for trace in traces],
+    }
     return gzip.compress(strict_json(values, compact=True).encode("utf-8"), compresslevel=6, mtime=0)
 
 
-def read_traces(path: Path) -> tuple[Trace, ...]:
-    """The traces of a file; raises RecordingError where it is none."""
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
+
+
+def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
+    """The traces of a file; raises RecordingError where it is none, or belongs to other `results` (the file's text)."""
     try:
         values = json.loads(gzip.decompress(path.read_bytes()))
         if values["schema_version"] != SCHEMA_VERSION:
@@ -50,9 +59,16 @@ def read_traces(path: Path) -> tuple[Trace, ...]:
                 f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
                 "run cdtool benchmark again",
             )
+        if results is not None and values["results_sha256"] != _digest(results):
+            raise RecordingError(f"{path}: belongs to other results", "put the two files of one benchmark together")
         return tuple(_trace(item) for item in values["traces"])
     except (OSError, EOFError, ValueError, KeyError, TypeError, zlib.error) as fault:
-        raise RecordingError(f"{path}: not a file of traces: {fault}", "run cdtool benchmark again") from fault
+        raise RecordingError(f"{path}: damaged, or no file of traces", "run cdtool benchmark again") from fault
+
+
+def as_read(traces: Sequence[Trace]) -> tuple[Trace, ...]:
+    """The traces as their file gives them back: what is drawn of them is the same before and after."""
+    return tuple(_trace(trace_values(trace)) for trace in traces)
 
 
 def trace_values(trace: Trace) -> dict[str, Any]:

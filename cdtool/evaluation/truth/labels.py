@@ -10,37 +10,63 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.named_rows import NamedRow, read_named_rows
 from cdtool.recording import Contact
 
 _REQUIRED = ("recording", "start_s", "end_s")
 _OPTIONAL = ("kind", "uncertainty_s")
+# Between the onset rule and the label file's name, where reports state the rule.
+LABEL_FILE = "; label file "
 
 
 @dataclass(frozen=True)
 class Labels:
-    """The contacts of each recording that a label file names."""
+    """The contacts of each recording that a label file names.
+
+    `lines`: where each contact stands, as "FILE line N", in the order of `contacts`; where there is none, its one row.
+    """
 
     source: str
     contacts: Mapping[str, tuple[Contact, ...]]
+    lines: Mapping[str, tuple[str, ...]]
 
-    def of(self, recording: str) -> tuple[Contact, ...] | None:
-        """The contacts of a recording, by its path or its file's name; None where the file does not name it."""
-        if recording in self.contacts:
-            return self.contacts[recording]
-        return self.contacts.get(PurePosixPath(recording).name)
+    def name_of(self, recording: str) -> str | None:
+        """What the file calls a recording: its path, or its file's name; None where the file does not name it."""
+        short = PurePosixPath(recording).name
+        return recording if recording in self.contacts else short if short in self.contacts else None
+
+    def check(self, recording: str, start: float, end: float) -> None:
+        """Raise RecordingError, naming the row, where a contact begins outside a recording of `start` to `end` [s]."""
+        name = self.name_of(recording)
+        if name is None:
+            return
+        for contact, line in zip(self.contacts[name], self.lines[name], strict=False):
+            if not start <= contact.start <= end:
+                raise RecordingError(
+                    f"{line}: the contact begins at {contact.start:.10g} s, "
+                    f"{recording} is recorded from {start:.3f} to {end:.3f} s",
+                    "seconds on the recording's own clock, as cdtool shows them",
+                )
 
 
 def read_labels(path: Path) -> Labels:
     """Read and check a label file; raises ConfigurationError with the line."""
-    found: dict[str, list[Contact]] = {}
+    first: dict[str, str] = {}
+    found: dict[str, list[tuple[Contact, str]]] = {}
     for row in read_named_rows(path, _REQUIRED, _OPTIONAL, "label"):
+        first.setdefault(row.recording, row.where)
         contacts = found.setdefault(row.recording, [])
         start = row.seconds("start_s")
         if start is not None:
-            contacts.append(_contact(row, start))
-    ordered = {name: tuple(sorted(items, key=lambda item: item.start)) for name, items in found.items()}
-    return Labels(str(path), ordered)
+            contacts.append((_contact(row, start), row.where))
+    for contacts in found.values():
+        contacts.sort(key=lambda item: item[0].start)
+    return Labels(
+        str(path),
+        {name: tuple(contact for contact, _ in items) for name, items in found.items()},
+        {name: tuple(where for _, where in items) or (first[name],) for name, items in found.items()},
+    )
 
 
 def _contact(row: NamedRow, start: float) -> Contact:

@@ -17,6 +17,9 @@ import numpy as np
 from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.recording import Contact
 
+# What raises an alarm again within this time [s] is the same event.
+REARM = 0.5
+
 Outcome = Literal["detected", "missed", "not_assessable"]
 
 
@@ -55,18 +58,33 @@ def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, f
     return list(zip(ordered, opens, closes, strict=True))
 
 
-def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, window: float = 1.0) -> Matching:
+def match(
+    verdict: Verdict,
+    contacts: Sequence[Contact],
+    statistic: Signal,
+    window: float = 1.0,
+    *,
+    of_log: Sequence[Contact] = (),
+    crossings: Sequence[Alarm] = (),
+    rearm: float = REARM,
+) -> Matching:
     """Match in order of time: each contact takes the first crossing in its window that no earlier contact took.
 
     An alarm outside every window, and not while the load cell still feels a contact, is false. One before a contact is
-    counted as false and does not hide the contact's own detection: any new crossing detects, armed again or not.
+    counted as false and does not hide the contact's own detection: any new crossing detects, armed again or not. Alarms
+    of several joints within `rearm` [s] are one false alarm. Where a log is cut into operations, `of_log` are all its
+    contacts and `crossings` those of all its operations: an alarm belongs to its contact whatever the cut lies between.
     """
     taken: set[Alarm] = set()
     matches = []
-    spans = windows(contacts, window)
+    spans = windows(of_log or contacts, window)
+    known = list(contacts)
     for contact, opens, closes in spans:
+        if contact not in known:
+            continue
         watched = max(min(closes, _end(statistic)) - contact.start, 0.0)
-        inside = (alarm for alarm in verdict.crossings if opens <= alarm.time <= closes and alarm not in taken)
+        candidates = crossings or verdict.crossings
+        inside = (alarm for alarm in candidates if opens <= alarm.time <= closes and alarm not in taken)
         found = next(inside, None)
         if found is None:
             if _assessable(statistic, contact.start, closes):
@@ -78,9 +96,17 @@ def match(verdict: Verdict, contacts: Sequence[Contact], statistic: Signal, wind
         taken.add(found)
         latency = found.time - contact.start
         matches.append(Match(contact, "detected", found, max(latency, 0.0), latency < 0.0, watched))
-    alone = (alarm for alarm in verdict.alarms if alarm not in taken)
-    false = tuple(alarm for alarm in alone if not belongs(alarm.time, spans))
-    return Matching(tuple(matches), false)
+    alone = [alarm for alarm in verdict.alarms if alarm not in taken and not belongs(alarm.time, spans)]
+    return Matching(tuple(matches), tuple(alone[i] for i in one_an_event([alarm.time for alarm in alone], rearm)))
+
+
+def one_an_event(times: Sequence[float], rearm: float) -> list[int]:
+    """Which alarms count where several joints raise one: those later than `rearm` [s] after the last that counts."""
+    counted: list[int] = []
+    for i in sorted(range(len(times)), key=lambda i: times[i]):
+        if not counted or times[i] - times[counted[-1]] > rearm:
+            counted.append(i)
+    return counted
 
 
 def belongs(time: float, spans: Sequence[tuple[Contact, float, float]]) -> bool:

@@ -54,8 +54,16 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
         header = [name.strip() for name in next(reader, [])]
         _check_header(path, header, required, [*required, *optional])
         return [_row(path, reader.line_num, header, cells) for cells in reader if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise ConfigurationError(f"{path}: no {what} file: {fault}", "a UTF-8 CSV file is needed") from fault
+    except FileNotFoundError:
+        raise ConfigurationError(f"{path}: no such file", "check the path") from None
+    except OSError as fault:
+        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror}", "check the path") from fault
+    except UnicodeDecodeError as fault:
+        raise ConfigurationError(f"{path}: no {what} file: no UTF-8 text", "a UTF-8 CSV file is needed") from fault
+    except csv.Error as fault:
+        raise ConfigurationError(
+            f"{path}: no {what} file: damaged at line {reader.line_num}", "a CSV file is needed, its quotes in pairs"
+        ) from fault
 
 
 def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:

@@ -87,6 +87,7 @@ def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
         run[:-lag] &= high[lag:]
         run[-lag:] = False
     contacts: list[Contact] = []
+    half_sample = 0.5 * float(np.median(np.diff(time)))
     starts = np.flatnonzero(run)
     low = np.flatnonzero(over <= back_to)
     searched = -np.inf
@@ -96,12 +97,13 @@ def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
         before = low[np.searchsorted(low, k) - 1] if len(low) and low[0] < k else -1
         onset = before + 1
         end = _end_of_contact(time, over, int(k), back_to, rule.separation)
-        half_sample = 0.5 * float(np.median(np.diff(time)))
+        # Where samples are missing before the onset, it may have come at any time in the hole.
+        earlier = max(half_sample, float(time[onset] - time[before]) - half_sample) if before >= 0 else half_sample
         contacts.append(
             Contact(
                 start=float(time[onset]),
                 end=float(time[end]),
-                uncertainty=half_sample + float(time[k] - time[onset]),
+                uncertainty=earlier + float(time[k] - time[onset]),
                 peak_force=float(np.max(over[onset : end + 1])),
                 found_by="load cell",
             )
@@ -119,11 +121,12 @@ def _end_of_contact(time: FloatArray, over: FloatArray, start: int, back_to: flo
 
 def _from_label(recording: Recording, _: OnsetRule) -> list[Contact]:
     series = recording["label"]
-    touched = (np.nan_to_num(series.values[:, 0]) > 0.5).astype(int)
+    present = np.isfinite(series.values[:, 0])  # a missing sample does not end a contact
+    time, touched = series.time[present], (series.values[present, 0] > 0.5).astype(int)
     edges = np.diff(np.concatenate(([0], touched, [0])))
-    half_sample = 0.5 * series.period
+    half_sample = 0.5 * series.period if len(series) > 1 else 0.0
     return [
-        Contact(float(series.time[a]), float(series.time[b - 1]), half_sample, found_by="label")
+        Contact(float(time[a]), float(time[b - 1]), half_sample, found_by="label")
         for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     ]
 

@@ -63,8 +63,10 @@ def read_triggers(path: Path) -> TriggerFile:
 def _take(row: NamedRow, said: Triggered) -> None:
     time, until = row.seconds("time_s"), row.seconds("blind_until_s")
     if until is not None:
-        if time is None or until < time:
-            raise row.fault(f"blind from {time} until {until}", "time_s is the begin, and comes first")
+        if time is None:
+            raise row.fault(f"blind_until_s is {until:g}, time_s is missing", "time_s: from when on it could not judge")
+        if until < time:
+            raise row.fault(f"blind from {time:g} until {until:g}", "time_s is the begin, and comes first")
         said.blind.append((time, until))
     elif time is not None:
         said.alarms.append(time)

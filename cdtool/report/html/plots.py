@@ -114,9 +114,10 @@ def _amoc(results: Results) -> list[dict[str, Any]]:
         rows = []
         for i, name in enumerate(results.detectors):
             points = detectors.get(name, [])
-            if points:
+            if points and points[0].hours and points[0].operations:
                 rows.append({"detector": i, **_curve(points)})
-        found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT + 20})
+        if rows:
+            found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT + 20})
     return found
 
 
@@ -135,8 +136,8 @@ def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
         "operations": first.operations,
         "hours": short(first.hours),
         "none": {
-            "operation": number(poisson_at_most(0, float(first.operations))) if first.operations else "",
-            "hour": number(poisson_at_most(0, first.hours)) if first.hours else "",
+            "operation": number(poisson_at_most(0, float(first.operations))),
+            "hour": number(poisson_at_most(0, first.hours)),
         },
     }
 

@@ -43,6 +43,11 @@ def recordings_table(results: Results, opens: Mapping[Log, Sequence[int]]) -> Ta
     """A row a log with a column a detector; `opens`: the numbers of its traces."""
     seen = _seen(results)
     forces = _force_verdicts(results)
+    blind = {
+        (item.group, item.detector)
+        for item in results.exposure
+        if not item.hours or item.not_assessable >= item.operations
+    }
     columns = [Column("recording"), Column("group", choice=True), Column("contacts", numeric=True)]
     columns += [Column(f"{shown(name)} [ms]", numeric=True) for name in results.detectors]
     columns += [Column("peak [N]", numeric=True)]
@@ -56,7 +61,10 @@ def recordings_table(results: Results, opens: Mapping[Log, Sequence[int]]) -> Ta
         log = (item.group, item.recording)
         parts = [seen.get((*log, name), _Seen()) for name in results.detectors]
         row = [Cell(shown(item.recording)), Cell(shown(item.group)), count_cell(item.contacts)]
-        row += [_seen_cell(part, item) for part in parts]
+        row += [
+            _seen_cell(part, item, (item.group, name) in blind)
+            for part, name in zip(parts, results.detectors, strict=True)
+        ]
         row += [figure_cell(_peak(parts))]
         row += [outcome_cell(forces.get(log, NOTHING))] if forces else []
         row += [figure_cell(item.seconds)]
@@ -138,10 +146,15 @@ def _peak(parts: Sequence[_Seen]) -> float | None:
     return max(peaks, default=None)
 
 
-def _seen_cell(seen: _Seen, recording: RecordingResult) -> Cell:
-    """Latencies, misses and false alarms in words; sorted by the slowest contact, a missed one after all others."""
+def _seen_cell(seen: _Seen, recording: RecordingResult, blind: bool) -> Cell:
+    """Latencies, misses and false alarms in words; sorted by the slowest contact, a missed one after all others.
+
+    `blind`: the detector judged nothing in the whole group, so that no false alarm says nothing.
+    """
     outcomes = [item.outcome for item in seen.contacts]
     words = _contact_words(seen.contacts)
+    if blind and not seen.contacts and not seen.false_alarms:
+        return Cell(_NOT_SEEN, key=key_of(None), tone="unknown")
     if seen.false_alarms or not (words or recording.contacts):
         words.append(counted(seen.false_alarms, "false alarm"))
     late = [item.latency_ms for item in seen.contacts if item.latency_ms is not None]

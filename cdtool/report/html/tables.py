@@ -12,11 +12,22 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
-from cdtool.report.figure_text import NOTHING, counted, missed, number, rate, with_interval
+from cdtool.report.comparison_words import without_finding
+from cdtool.report.figure_text import (
+    NOT_ASSESSABLE,
+    NOT_REACHED,
+    NOTHING,
+    counted,
+    missed,
+    number,
+    rate,
+    with_interval,
+)
 from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, nothing, shown
 from cdtool.report.verdict_words import allowed, value_of
 
 _TONES = {"kept": "good", "pass": "good", "broken": "bad", "fail": "bad", "not assessable": "unknown"}
+_OPEN_END = f" to {NOT_REACHED}"
 _WORST_FIRST = ("broken", "not assessable", "kept")
 
 
@@ -82,7 +93,8 @@ def summary_table(evaluated: Evaluated) -> Table:
         Column("contacts detected", numeric=True),
         Column("missed", numeric=True),
         Column("not assessable", numeric=True),
-        *(Column(f"false alarms{per}", numeric=True) for per in ("", " per hour", " per operation")),
+        Column("false alarms", numeric=True),
+        Column("false alarms per operation, per hour", numeric=True),
         Column("force at alarm [N]", numeric=True),
         Column("peak force [N]", numeric=True),
     ]
@@ -106,7 +118,8 @@ def comparisons_table(evaluated: Evaluated) -> Table:
         Column("missed by second only", numeric=True),
         Column("p of misses", numeric=True),
     )
-    rows = [_comparison_row(item) for item in evaluated.comparisons]
+    found = without_finding(evaluated.comparisons)
+    rows = [_comparison_row(item, none) for item, none in zip(evaluated.comparisons, found, strict=True)]
     return Table("comparisons-table", "Pairs of detectors on the same contacts", columns, rows)
 
 
@@ -130,11 +143,7 @@ def calibration_table(results: Results) -> Table:
 
 def interval_cell(interval: Interval) -> Cell:
     """A figure with its interval in small print."""
-    # What rounding leaves of equal numbers is no figure of its own.
-    widest = max(abs(interval.low), abs(interval.high))
-    nothing_left = math.isfinite(widest) and abs(interval.value) < 1e-9 * widest
-    figure = replace(interval, value=0.0) if nothing_left else interval
-    return _split(with_interval(figure), figure.value)
+    return _split(with_interval(interval), interval.value)
 
 
 def _summary_row(results: Results, item: Summary) -> Row:
@@ -153,37 +162,52 @@ def _summary_row(results: Results, item: Summary) -> Row:
         Cell(str(item.not_assessable), key=item.not_assessable, tone="unknown" if item.not_assessable else "")
         if hit
         else nothing(),
-        Cell(
-            str(item.false_alarms),
-            (f"in {counted(item.operations, 'operation')}", f"{number(item.hours)} h"),
-            item.false_alarms,
-            "bad" if item.false_alarms else "",
-        ),
-        _split(
-            rate(item.false_alarms, item.false_alarms_per_hour, item.at_most_per_hour), item.false_alarms_per_hour.value
-        ),
-        _split(
-            rate(item.false_alarms, item.false_alarms_per_operation, item.at_most_per_operation),
-            item.false_alarms_per_operation.value,
-        ),
+        *_false_alarm_cells(item),
         Cell(number(item.force_at_alarm), (f"largest {number(item.force_at_alarm_max)}",), key_of(item.force_at_alarm))
         if not math.isnan(item.force_at_alarm)
         else nothing(),
         figure_cell(item.peak_force),
-        Cell(str(item.force_failed), key=item.force_failed, tone="bad" if item.force_failed else "")
-        if hit
-        else nothing(),
+        nothing() if math.isnan(item.force_failed) else _failed_cell(int(item.force_failed)),
     )
 
 
-def _comparison_row(item: Comparison) -> Row:
+def _false_alarm_cells(item: Summary) -> tuple[Cell, Cell]:
+    """The count with its exposure, and both rates; without any exposure no figure but a word."""
+    if not (item.watched and item.judged_operations):
+        if not item.operations:
+            return nothing(), nothing()
+        none = ("judged in none", f"of {counted(item.operations, 'operation')}")
+        return Cell(NOT_ASSESSABLE, none, key_of(None), "unknown"), nothing()
+    operations = counted(item.operations, "operation")
+    some = item.judged_operations < item.operations
+    exposure = (
+        *((f"in {item.judged_operations} of", operations) if some else (f"in {operations}",)),
+        f"{number(item.hours)} h",
+    )
+    tone = "bad" if item.false_alarms else ""
+    per_operation = _split(
+        rate(item.false_alarms, item.false_alarms_per_operation, item.at_most_per_operation),
+        item.false_alarms_per_operation.value,
+    )
+    per_hour = _split(
+        rate(item.false_alarms, item.false_alarms_per_hour, item.at_most_per_hour), item.false_alarms_per_hour.value
+    )
+    both = replace(per_operation, rest=(*per_operation.rest, f"per hour: {per_hour.text}", *per_hour.rest))
+    return Cell(str(item.false_alarms), exposure, item.false_alarms, tone), both
+
+
+def _failed_cell(count: int) -> Cell:
+    return Cell(str(count), key=count, tone="bad" if count else "")
+
+
+def _comparison_row(item: Comparison, none: str) -> Row:
     words = [f"{shown(item.faster)} is faster"] if item.faster else []
     words += [f"{shown(item.misses_less)} misses less"] if item.misses_less else []
     return (
         Cell(shown(item.group)),
         Cell(shown(item.first)),
         Cell(shown(item.second)),
-        Cell("; ".join(words) or "no difference shown", tone="" if words else "unknown"),
+        Cell("; ".join(words) or none, tone="" if words else "unknown"),
         count_cell(item.contacts),
         interval_cell(item.latency.mean),
         _p(item.latency_p),
@@ -201,5 +225,8 @@ def _split(words: str, value: float, tone: str = "") -> Cell:
     """Words such as "84.3 (17.4 to 246): at most 218": what follows the figure goes into lines of small print."""
     figures, _, bound = words.partition(": ")
     text, bracket, interval = figures.partition(" (")
-    rest = ((f"({interval}",) if bracket else ()) + ((bound,) if bound else ())
+    # The column would be as wide as both ends together.
+    low, _, _ = interval.partition(_OPEN_END)
+    ends = (f"({low}", _OPEN_END.strip() + ")") if interval.endswith(_OPEN_END + ")") else (f"({interval}",)
+    rest = (ends if bracket else ()) + ((bound,) if bound else ())
     return Cell(text, rest, key_of(value), tone)

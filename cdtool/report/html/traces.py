@@ -22,7 +22,7 @@ MISSING, ABOVE_ALL, BELOW_ALL = "!", "^", "_"
 
 _BYTES = np.frombuffer(ALPHABET.encode(), dtype=np.uint8)
 # Heights [px] of the parts of a trigger plot: load cell, a detector's row, and the time axis.
-HEIGHTS = {"force": 130, "row": 112, "axis": 44}
+HEIGHTS = {"force": 138, "row": 120, "axis": 44}
 
 
 def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:

@@ -12,7 +12,16 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import ForceResult, ForceStepResult, LimitResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
-from cdtool.report.figure_text import NOTHING, counted, missed, number, rate, with_interval
+from cdtool.report.comparison_words import TOO_FEW, without_finding
+from cdtool.report.figure_text import (
+    NOT_ASSESSABLE,
+    NOTHING,
+    counted,
+    missed,
+    number,
+    rate,
+    with_interval,
+)
 from cdtool.report.markdown.text import Section, Table, escape
 from cdtool.report.verdict_words import allowed, value_of
 
@@ -75,9 +84,7 @@ def group_section(evaluated: Evaluated, group: str, tail: str) -> Section:
         (
             named(evaluated.results, item.detector),
             *(_latency_cells(item) if hit else ()),
-            f"{item.false_alarms} in {counted(item.operations, 'operation')}",
-            rate(item.false_alarms, item.false_alarms_per_hour, item.at_most_per_hour),
-            rate(item.false_alarms, item.false_alarms_per_operation, item.at_most_per_operation),
+            *_false_alarm_cells(item),
             *((_force_cell(item),) if felt else ()),
         )
         for item in rows
@@ -93,10 +100,14 @@ def comparison_section(evaluated: Evaluated) -> list[Section]:
     rows = [row for item in evaluated.comparisons for row in _shown(evaluated.results, item)]
     asked = f"{counted(len(evaluated.comparisons), 'pair')} of detectors on the same contacts"
     how = f"p corrected by Holm over a group's questions; shown: p below {SIGNIFICANT:g}"
+    few = without_finding(evaluated.comparisons).count(TOO_FEW)
+    of = "" if few == len(evaluated.comparisons) else f" in {few} of them"
+    too_few = f" There are {TOO_FEW}{of}; those of one campaign count as one." if few else ""
     if not rows:
-        return [Section("Comparisons", f"{asked}: no difference is shown ({how}). That is not a proof of none.")]
+        words = f"{asked}: no difference is shown ({how}). That is not a proof of none.{too_few}"
+        return [Section("Comparisons", words)]
     table = Table(("group", "shown", "by", "contacts", "p"), rows)
-    return [Section("Comparisons", f"{asked}; {how}.", table, source="contacts")]
+    return [Section("Comparisons", f"{asked}; {how}.{too_few}", table, source="contacts")]
 
 
 def force_sections(results: Results) -> list[Section]:
@@ -150,6 +161,17 @@ def _latency_cells(item: Summary) -> tuple[object, ...]:
         item.detected,
         missed(item.missed, item.detected + item.missed, item.missed_at_most),
         item.not_assessable,
+    )
+
+
+def _false_alarm_cells(item: Summary) -> tuple[str, ...]:
+    if not (item.watched and item.judged_operations):
+        return (NOT_ASSESSABLE if item.operations else NOTHING, NOTHING, NOTHING)
+    judged = f"{item.judged_operations} of " if item.judged_operations < item.operations else ""
+    return (
+        f"{item.false_alarms} in {judged}{counted(item.operations, 'operation')}",
+        rate(item.false_alarms, item.false_alarms_per_hour, item.at_most_per_hour),
+        rate(item.false_alarms, item.false_alarms_per_operation, item.at_most_per_operation),
     )
 
 

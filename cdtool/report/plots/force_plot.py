@@ -18,6 +18,7 @@ from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save
+from cdtool.report.plots.limit_labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
 
 if TYPE_CHECKING:
@@ -101,6 +102,9 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
         title_fontsize=7,
         alignment="left",
     )
+    figure.draw_without_rendering()
+    for axes, curves in zip(rows, ranked, strict=True):
+        _name_limits(axes, curves, profile, nodes)
     return figure
 
 
@@ -157,16 +161,17 @@ def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> N
     times, heights = [*begins, nodes[-1]], [*forces, forces[-1]]
     axes.fill_between(times, heights, step="post", color=BAND, linewidth=0, zorder=0.4)
     axes.step(times, heights, where="post", color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=2)
-    for step in profile.steps:
-        axes.annotate(
-            f"{label(step.name, 22) if step.from_s < nodes[1] else ''} ≤ {step.at_most_n:g} N".lstrip(),
-            (step.from_s, step.at_most_n),
-            xytext=(4, 2),
-            textcoords="offset points",
-            fontsize=7,
-            color=LIMIT,
-            zorder=5,
-        )
+
+
+def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile, nodes: Sequence[float]) -> None:
+    """Each step's limit; its name too where there is room for it, in the first part of the time axis."""
+    ends = [*(step.from_s for step in profile.steps[1:]), nodes[-1]]
+    names = [label(step.name, 22) if step.from_s < nodes[1] else "" for step in profile.steps]
+    labels = [
+        LineLabel(f"{name} ≤ {step.at_most_n:g} N".lstrip(), step.from_s, end, step.at_most_n)
+        for step, end, name in zip(profile.steps, ends, names, strict=True)
+    ]
+    place_labels(axes, labels, [(curve.time, curve.force) for curve in curves[:_MOST_CURVES]])
 
 
 def _draw_curves(axes: Axes, curves: Sequence[ForceCurve]) -> None:

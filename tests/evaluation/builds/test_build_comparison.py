@@ -374,7 +374,7 @@ def test_what_is_under_test_may_differ_and_is_listed():
     assert listed == {
         ("tool_version", "1.0", "2.0"),
         ("gains.momentum.bandwidth", "10.0", "12.0"),
-        ("debounce_samples", "9", "none"),
+        ("debounce_samples", "9", "default (9 ms)"),
         ("learned_runs", "10 runs", "9 runs, 8 of them the same"),
         ("machine_sha256", "none", "abababababab"),
     }

@@ -68,7 +68,13 @@ def test_what_is_above_a_limit_stays_above_it_and_no_limit_stays_none(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"not gzip", gzip.compress(b"{}"), gzip.compress(b'{"schema_version": 7, "traces": []}')]
+    "content",
+    [
+        b"",
+        b"not gzip",
+        gzip.compress(b"{}", mtime=0),
+        gzip.compress(b'{"schema_version": 7, "traces": []}', mtime=0),
+    ],
 )
 def test_what_is_no_traces_file_is_one_clear_error(tmp_path, content):
     path = tmp_path / "t.json.gz"

@@ -18,15 +18,22 @@ def test_contacts_are_found_by_path_or_by_file_name(tmp_path):
     labels = read_labels(
         write(tmp_path, "recording,start_s,end_s,kind\nsoft/01.csv,1.5,2.0,head\n02.csv,3,3.5,\nfree.csv,,,\n")
     )
-    (contact,) = labels.of("soft/01.csv")
+    (contact,) = labels.contacts["soft/01.csv"]
     assert (contact.start, contact.end, contact.kind, contact.found_by) == (1.5, 2.0, "head", "label file")
-    assert labels.of("deep/below/02.csv")[0].start == 3.0
-    assert labels.of("free.csv") == () and labels.of("03.csv") is None
+    assert labels.name_of("soft/01.csv") == "soft/01.csv" and labels.name_of("deep/below/02.csv") == "02.csv"
+    assert labels.contacts["02.csv"][0].start == 3.0
+    assert labels.contacts[labels.name_of("free.csv")] == () and labels.name_of("03.csv") is None
+
+
+def test_every_contact_has_its_line_in_the_order_of_time(tmp_path):
+    labels = read_labels(write(tmp_path, "recording,start_s,end_s\na.csv,3,4\nfree.csv,,\na.csv,1,2\n"))
+    assert [line.rpartition("/")[2] for line in labels.lines["a.csv"]] == ["labels.csv line 4", "labels.csv line 2"]
+    assert labels.lines["free.csv"][0].endswith("line 3")
 
 
 def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
     labels = read_labels(write(tmp_path, "\ufeffrecording, start_s, end_s\na.csv,1,2\n"))
-    assert labels.of("a.csv")[0].start == 1.0
+    assert labels.contacts["a.csv"][0].start == 1.0
 
 
 @pytest.mark.parametrize(

@@ -121,3 +121,18 @@ def test_every_alarm_is_counted_at_most_once_and_every_contact_once(alarm_times,
 def test_windows_never_overlap(onsets):
     spans = windows([Contact(onset, onset, 0.05) for onset in onsets], 1.0)
     assert all(before[2] <= after[1] for before, after in pairwise(spans))
+
+
+def test_one_event_on_several_joints_is_one_false_alarm():
+    alarms = [Alarm(2.0 + 0.01 * joint, joint, "above", 2.0, 1.0) for joint in range(6)] + [alarm(4.0)]
+    assert [item.time for item in match(alarms, [CONTACT], statistic()).false_alarms] == [2.0, 4.0]
+
+
+def test_an_alarm_in_the_next_operation_of_a_log_belongs_to_its_contact_and_is_not_false():
+    late = alarm(5.6)
+    first = match_verdict(Verdict("no alarm"), [CONTACT], statistic(), of_log=[CONTACT], crossings=[late])
+    assert first.matches[0].alarm == late
+    second = match_verdict(
+        Verdict("alarm", (late,), crossings=(late,)), [], statistic(), of_log=[CONTACT], crossings=[late]
+    )
+    assert second.matches == () and second.false_alarms == ()

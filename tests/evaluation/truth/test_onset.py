@@ -86,3 +86,16 @@ def test_missing_load_cell_samples_are_skipped():
     force[1000:1500] = np.nan
     (contact,) = find_contacts(recording(force), GATE_RULE)
     assert contact.start == pytest.approx(2.0085, abs=6e-4)
+
+
+def test_a_hole_in_the_load_cell_before_the_onset_is_in_its_uncertainty():
+    force = ramp(2.0, 5000.0)
+    force[(TIME > 1.99) & (TIME < 2.05)] = np.nan
+    (contact,) = find_contacts(recording(force), GATE_RULE)
+    assert contact.start - contact.uncertainty <= 2.0 < contact.start
+
+
+def test_a_missing_label_does_not_split_a_contact():
+    label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
+    label[1200] = np.nan
+    assert len(find_contacts(recording(label, "label"), GATE_RULE)) == 1

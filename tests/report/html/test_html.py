@@ -199,18 +199,52 @@ def test_every_figure_of_the_summaries_is_in_the_table(made, page):
             assert row[6] == f"{item.detected} of {item.contacts}"
             assert row[7] == f"{item.missed} of {item.detected + item.missed} at most {percent(item.missed_at_most)}"
             assert row[8] == str(item.not_assessable)
-            assert row[12].startswith(number(item.force_at_alarm)) and row[12].endswith(number(item.force_at_alarm_max))
-            assert row[13] == number(item.peak_force)
+            assert row[11].startswith(number(item.force_at_alarm)) and row[11].endswith(number(item.force_at_alarm_max))
+            assert row[12] == number(item.peak_force)
         else:
             assert set(row[2:9]) == {"–"}
-        assert row[9] == f"{item.false_alarms} in {item.operations} operations {number(item.hours)} h"
-        assert row[10].endswith(f"at most {number(item.at_most_per_hour)}")
-        assert row[11].endswith(f"at most {number(item.at_most_per_operation)}")
+        judged = f"in {item.judged_operations} of {item.operations} operations"
+        assert row[9] == f"{item.false_alarms} {judged} {number(item.hours)} h"
+        per_operation, per_hour = row[10].split(" per hour: ")
+        assert per_operation.endswith(f"at most {number(item.at_most_per_operation)}")
+        assert per_hour.endswith(f"at most {number(item.at_most_per_hour)}")
 
 
-def test_what_rounding_leaves_of_a_difference_is_written_as_zero():
-    assert interval_cell(Interval(-9.9e-14, -4.2222222, 6.3333333)).lines == "0.00\n(-4.22 to 6.33)"
-    assert interval_cell(Interval(0.002, math.nan, math.nan)).lines.startswith("0.00200")
+def test_an_interval_without_an_upper_end_takes_two_lines():
+    assert interval_cell(Interval(33.5, 31.0, 40.0)).lines == "33.5\n(31.0 to 40.0)"
+    assert interval_cell(Interval(33.5, 31.0, math.inf)).lines == "33.5\n(31.0\nto not reached)"
+
+
+def test_a_detector_that_judged_nothing_has_no_false_alarms_to_speak_of():
+    evaluated, _ = case(limits=False)
+    quick, *others = evaluated.results.detectors
+    exposure = tuple(
+        replace(item, not_assessable=item.operations, hours=0.0) if item.detector == quick else item
+        for item in evaluated.results.exposure
+    )
+    found = parsed(to_html(evaluate(replace(evaluated.results, exposure=exposure)), ()))
+    rows = found.tables["figures-table"][1:]
+    assert {tuple(row[9:11]) for row in rows if row[0].startswith(quick)} == {
+        ("not assessable judged in none of 12 operations", "–")
+    }
+    assert all("at most" in row[10] for row in rows if row[0] == others[0])
+    assert found.tables["recordings-table"][-1][3:5] == ["not assessable", "1 false alarm"]
+    blind = tuple(replace(item, not_assessable=item.operations, hours=0.0) for item in exposure)
+    text = parsed(to_html(evaluate(replace(evaluated.results, exposure=blind, false_alarms=())), ())).text
+    assert "false alarms not assessable" in text
+    assert "0 false alarms" not in text
+
+
+def test_pairs_without_a_difference_say_whether_there_were_enough_recordings_for_one():
+    for contacts, words in ((4, "too few recordings to show one"), (12, "no difference shown")):
+        evaluated, _ = case(contacts=contacts, limits=False)
+        same = tuple(
+            replace(item, latency_ms=40.0 + (-1) ** (i // 2 + i), outcome="detected", reason=None)
+            for i, item in enumerate(evaluated.results.contacts)
+        )
+        recordings = tuple(replace(item, campaign="") for item in evaluated.results.recordings)
+        found = parsed(to_html(evaluate(replace(evaluated.results, contacts=same, recordings=recordings)), ()))
+        assert {row[3] for row in found.tables["comparisons-table"][1:]} == {words}
 
 
 def test_misses_and_what_could_not_be_assessed_stand_beside_the_latencies(page):

@@ -227,6 +227,30 @@ def test_nothing_makes_the_page_scroll_sideways(shown, width):
         assert browser.execute_script("return document.documentElement.scrollWidth") <= width
 
 
+def test_the_table_of_figures_fits_a_wide_screen_with_all_its_columns(shown):
+    browser = shown(to_html(*case(lambda name: f"{name}_observer")), 1400)
+    widths = (
+        "const box = document.getElementById('figures-table').parentNode; return [box.scrollWidth, box.clientWidth]"
+    )
+    wanted, given = browser.execute_script(widths)
+    assert wanted <= given
+    assert "force limit" in texts(browser, "#figures-table th:last-child")[0]
+
+
+def test_no_tick_of_a_trigger_plot_touches_the_name_of_its_row(shown):
+    browser = shown(to_html(*case()))
+    boxes = (
+        "return [...document.querySelectorAll('#viewer-plot text')].map((item) => { const box = item."
+        "getBoundingClientRect(); return [item.getAttribute('class'), box.left, box.right, box.top, box.bottom]; })"
+    )
+    found = browser.execute_script(boxes)
+    names = [item[1:] for item in found if item[0] == "strong"]
+    ticks = [item[1:] for item in found if item[0] == "small"]
+    assert names and ticks
+    for left, right, top, bottom in names:
+        assert not [item for item in ticks if item[0] < right and item[1] > left and item[2] < bottom and item[3] > top]
+
+
 def test_nothing_moves_while_the_page_is_built(shown, browser):
     watch = (
         "window.moved = []; new PerformanceObserver((list) => window.moved.push(...list.getEntries()"

@@ -98,9 +98,9 @@ def test_the_table_holds_the_figures_of_each_group(evaluated):
         "3",
         "0 of 3: at most 63 %",
         "1",
-        "0 in 4 operations",
+        "0 in 3 of 4 operations",
         "0: at most 300",
-        "0: at most 0.749",
+        "0: at most 0.999",
     ]
     momentum = next(row for row in rows(text) if row[0] == "momentum" and len(row) > 10)
     assert momentum[1] == "65.0 (–)"
@@ -122,6 +122,14 @@ def test_false_alarms_stand_with_their_exposure_and_bounds(evaluated):
         "10.0 (0.3 to 55.7): at most 47.4",
         "0.0250 (0.0006 to 0.1393): at most 0.119",
     ] in rows(text)
+
+
+def test_a_detector_that_judged_nothing_has_no_rate_and_no_bound(results):
+    blind = replace(results, exposure=(ExposureResult("holdout", "momentum", 40, 40, 0.0, 40),), false_alarms=())
+    text = to_markdown(evaluate(blind))
+    assert ["momentum", "not assessable", "–", "–"] in rows(text)
+    assert "0 in 40" not in text
+    assert "false alarms not assessable" in text
 
 
 def test_force_at_the_alarm_has_a_column_only_where_there_is_one(results):
@@ -169,6 +177,7 @@ def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
 def test_comparisons_that_are_shown_are_said_and_others_are_no_proof(results):
     text = to_markdown(evaluate(results))
     assert "1 pair of detectors on the same contacts: no difference is shown" in text
+    assert "There are too few recordings to show one; those of one campaign" in text
     fast, slow = [30.0 + i % 3 for i in range(12)], [60.0 + i % 5 for i in range(12)]
     contacts = [*contacts_of("friction_ekf", "stiff", fast), *contacts_of("momentum", "stiff", slow)]
     contacts += contacts_of("friction_ekf", "soft", fast) + contacts_of("momentum", "soft", [None] * 12)

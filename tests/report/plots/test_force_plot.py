@@ -207,6 +207,22 @@ def test_nothing_is_clipped_at_the_edge_and_nothing_is_read_as_mathematics():
             assert not any(text.get_parse_math() for text in figure.findobj(Text))
 
 
+def test_no_curve_crosses_the_name_of_a_limit():
+    slow = replace(STIFF.curves[0], force=np.where(TIME > 0.3, 170.0, STIFF.curves[0].force))
+    with drawing():
+        figure = force_plot._figure([STIFF, ForcePanel("pressed", (slow,))], GAP)
+        figure.draw_without_rendering()
+        for axes, curves in zip(figure.axes, (STIFF.curves, (slow,)), strict=True):
+            boxes = [item.get_window_extent() for item in axes.texts if "≤" in item.get_text()]
+            assert len(boxes) == 3
+            for time, force in ((item.time, item.force) for item in curves):
+                x, y = axes.transData.transform(np.column_stack((time, force))).T
+                for box in boxes:
+                    at = np.linspace(box.x0, box.x1, 50)
+                    heights = np.interp(at, x, y)
+                    assert not np.any((heights > box.y0) & (heights < box.y1))
+
+
 def test_a_name_that_is_no_figure_is_refused(tmp_path):
     with pytest.raises(UsageError, match=r"a\.gif"):
         plot_forces([STIFF], GAP, tmp_path / "a.gif")

@@ -1,6 +1,6 @@
 // One recording: the load cell on top, below it a row a detector with signal, band, limits and alarm.
 
-const HEAD = 18,
+const HEAD = 26,
   GAP = 10;
 const HEADROOM = 1.5;
 const REASONS = { 1: "start-up", 2: "not applicable", 3: "missing samples", 4: "no limit known here" };
@@ -380,10 +380,10 @@ function makeTraceLegend(host) {
     draw(svg, "path", { class: kind, d });
     make(entry, "span", {}, words);
   }
-  make(
-    host,
-    "span",
-    {},
-    "coloured line: signal; upright line: alarm, dashed where it is false; shaded from there on: trigger on",
-  );
+  for (const words of [
+    "coloured line: signal",
+    "coloured upright line: alarm, dashed where it is false",
+    "shaded from an alarm on: trigger on",
+  ])
+    make(host, "span", {}, words);
 }

@@ -1,0 +1,141 @@
+"""Several thresholds as one: an alarm where any of them is left, or where all are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from cdtool.detection import Band, Signal, Status
+from cdtool.errors import UsageError
+from cdtool.motion import MotionClass
+from cdtool.recording import Recording
+from cdtool.thresholds.adaptive import Adaptive, FittedAdaptive
+from cdtool.thresholds.base import FittedThreshold, exceedance
+from cdtool.thresholds.cusum import Cusum
+from cdtool.thresholds.fitted_signature import FittedSignature, known
+from cdtool.thresholds.glr import Glr
+from cdtool.thresholds.innovation import Innovation
+from cdtool.thresholds.limit import FittedLimit, Limit
+from cdtool.thresholds.limit_and_trend import LimitAndTrend
+from cdtool.thresholds.predicted_limit import PredictedLimit
+from cdtool.thresholds.sequential import FittedSequential
+from cdtool.thresholds.settings import check_sides, with_context
+from cdtool.thresholds.signature import Signature
+from cdtool.thresholds.statistic_limit import FittedStatisticLimit
+from cdtool.thresholds.trend import Trend
+from cdtool.thresholds.trend_table import FittedTrendTable
+
+ACTIVATIONS = ("any", "all")
+_RULES = {
+    rule.name: rule
+    for rule in (Signature, Limit, PredictedLimit, Trend, LimitAndTrend, Innovation, Adaptive, Cusum, Glr)
+}
+_FITTED: dict[str, Any] = {
+    fitted.__name__: fitted
+    for fitted in (
+        FittedSignature,
+        FittedLimit,
+        FittedStatisticLimit,
+        FittedTrendTable,
+        FittedSequential,
+        FittedAdaptive,
+    )
+}
+# Shares of a limit are cut here: a side without a limit is infinitely far away.
+_FAR = 1e3
+
+
+@dataclass(frozen=True)
+class FittedCombined:
+    """Members with their own safety factors; the statistic is the share of their limits that is met."""
+
+    members: tuple[FittedThreshold, ...]
+    activation: str
+    safety_factor: float
+
+    @property
+    def motion(self) -> MotionClass | None:
+        """The class of motion of the members that have one."""
+        classes = (getattr(item, "motion", None) for item in self.members)
+        return next((item for item in classes if item is not None), None)
+
+    def with_safety_factor(self, factor: float) -> FittedCombined:
+        """The same with every member's safety factor times `factor`."""
+        return replace(self, safety_factor=factor)
+
+    def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+        """The share and its band (-inf, k); valid where any member is, or all are."""
+        shares, states = [], []
+        for member in self.members:
+            statistic, met_at = exceedance(member, recording, signal)
+            shares.append(np.clip(met_at / member.safety_factor, -_FAR, _FAR))
+            states.append(statistic.status)
+        share, status = np.array(shares), np.array(states)
+        valid = status == Status.VALID
+        if self.activation == "any":
+            values = np.max(np.where(valid, share, -_FAR), axis=0)
+            judged = valid.any(axis=0)
+        else:
+            values = np.min(share, axis=0)
+            judged = valid.all(axis=0)
+        # Codes rise from start-up to no limit: of several reasons not to judge the highest is told.
+        status = np.where(judged, Status.VALID, status.max(axis=0)).astype(np.uint8)
+        values = np.where(judged, values, np.nan)
+        limit = np.full(values.shape, self.safety_factor)
+        return replace(signal, values=values, status=status, unit="1"), Band(np.full(values.shape, -np.inf), limit)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        members = [{"fitted": type(item).__name__, **item.to_dict()} for item in self.members]
+        return {"members": members, "activation": self.activation, "safety_factor": self.safety_factor}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`."""
+        members = tuple(_FITTED[item["fitted"]].from_dict(item) for item in values["members"])
+        return cls(members, known("activation", values["activation"], ACTIVATIONS), float(values["safety_factor"]))
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Several thresholds as one: an alarm where "any" of the `members` is left, or where "all" are (`activation`).
+
+    Each member has its own default settings and safety factor k_m. statistic = the largest (any) or smallest (all)
+    share k*/k_m, k* the safety factor at which a member's limit would be met; limit `safety_factor`, without unit: 1
+    leaves the members as they are, 2 moves all their limits to twice their k. `sides` and `signature` are handed to the
+    members that have them. Fails as its members fail: "any" with each false alarm of each, "all" with each contact that
+    one of them does not see, and where members answer at different times.
+    """
+
+    safety_factor: float = 1.0
+    sides: str | None = None
+    members: tuple[str, ...] = ("limit", "trend")
+    activation: str = "any"
+    signature: Signature | None = None
+
+    name: ClassVar[str] = "combined"
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        check_sides(self.safety_factor, self.sides)
+        known("activation", self.activation, ACTIVATIONS)
+        if len(self.members) < 2:
+            raise UsageError(f"members are {list(self.members)}", "two or more thresholds are needed")
+        for name in self.members:
+            known("member", name, tuple(_RULES))
+
+    @property
+    def by_class(self) -> bool:
+        """Whether a member belongs to a class of motion."""
+        return any(getattr(rule, "by_class", False) for rule in self._rules())
+
+    def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedCombined:
+        """Fit every member to the runs; raises what they raise."""
+        members = tuple(rule.fit(pairs) for rule in self._rules())
+        return FittedCombined(members, self.activation, self.safety_factor)
+
+    def _rules(self) -> list[Any]:
+        return [with_context(_RULES[name](), self.sides, self.signature) for name in self.members]

@@ -1,0 +1,68 @@
+"""Page's cumulative sum of the innovations: the quickest test for a shift of known size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.detection import Signal
+from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.innovation import check_order
+from cdtool.thresholds.sequential import FittedSequential, fit_sequential
+from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.signature import Signature
+from cdtool.thresholds.stretches import filtered, stretch_bounds
+
+
+@dataclass(frozen=True)
+class Cusum:
+    """Limits -+ `safety_factor` on the cumulative sum of the innovations beyond a drift (Page 1954).
+
+    g+_k = max(0, g+_{k-1} + nu_k - `drift`), g-_k = max(0, g-_{k-1} - nu_k - `drift`); statistic = g+, or -g- where
+    that is larger; with one side watched, that side's sum alone. nu is the innovation of `innovation`, all in its
+    standard deviations; `drift` is half the shift to be found. The sum holds over a gap of up to 20 samples and starts
+    anew behind a longer one. A steady contact force moves innovations by (1 - sum a_i) of itself. Fails where the
+    normal mean has moved (payload, temperature): the sum grows without end; and it clears slowly after an alarm.
+    """
+
+    safety_factor: float = 15.0
+    sides: str | None = None
+    order: int = 4
+    drift: float = 1.0
+    signature: Signature | None = None
+
+    name: ClassVar[str] = "cusum"
+    needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    by_class: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_sides(self.safety_factor, self.sides)
+        check_order(self.order)
+        check_above(self.drift, 0.0, "drift")
+
+    def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
+        """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
+        return fit_sequential(self, pairs)
+
+    def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
+        """The sum on the watched side, or the larger of both with its sign, in standard deviations."""
+
+        def test(values: FloatArray, step: FloatArray) -> FloatArray:
+            result = np.zeros(len(values))
+            for first, last in stretch_bounds(step):
+                above = _sum(values[first:last] - self.drift) if side >= 0 else np.zeros(last - first)
+                below = _sum(-values[first:last] - self.drift) if side <= 0 else np.zeros(last - first)
+                result[first:last] = np.where(above >= below, above, -below)
+            return result
+
+        return filtered(innovations, test, longest_gap, 0.0, "1")
+
+
+def _sum(values: FloatArray) -> FloatArray:
+    """max(0, g + values), sample by sample, from g = 0: the sum less the lowest that it has been."""
+    total = np.cumsum(values)
+    result: FloatArray = total - np.minimum.accumulate(np.minimum(total, 0.0))
+    return result

@@ -1,0 +1,45 @@
+"""First-order filters for any sampling: the trend of a signal, and a low-pass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recording import FloatArray
+
+
+def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:
+    """s / (1 + s tau) of `values` (m,): their trend, per s; `step` (m,) s, infinite where the filter starts from rest.
+
+    y_k = a y_{k-1} + (1 - a) (i_k - i_{k-1}) / T_k, a = exp(-T_k / tau): exact for a signal that runs straight between
+    two samples, for any T_k. Times tau it is the high-pass s tau / (1 + s tau).
+    """
+    going = np.isfinite(step)
+    forget = np.where(going, np.exp(-step / time_constant), 0.0)
+    slope = np.zeros(len(values))
+    slope[1:] = np.where(going[1:], np.diff(values) / step[1:], 0.0)
+    return recursion(forget, (1.0 - forget) * slope)
+
+
+def low_passed(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:
+    """1 / (1 + s tau) of `values` (m,): y_k = a y_{k-1} + (1 - a) (u_k + u_{k-1}) / 2; starts at the first value."""
+    going = np.isfinite(step)
+    forget = np.where(going, np.exp(-step / time_constant), 0.0)
+    mean = values.copy()
+    mean[1:] = np.where(going[1:], 0.5 * (values[1:] + values[:-1]), values[1:])
+    return recursion(forget, (1.0 - forget) * mean)
+
+
+def recursion(forget: FloatArray, drive: FloatArray) -> FloatArray:
+    """y_k = forget_k y_{k-1} + drive_k (m,), from y = 0."""
+    result = np.empty(len(drive))
+    _recursion(np.ascontiguousarray(forget), np.ascontiguousarray(drive), result)
+    return result
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64[::1])")
+def _recursion(forget: FloatArray, drive: FloatArray, result: FloatArray) -> None:
+    y = 0.0
+    for k in range(len(drive)):
+        y = forget[k] * y + drive[k]
+        result[k] = y

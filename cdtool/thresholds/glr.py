@@ -1,0 +1,73 @@
+"""Generalised likelihood ratio of the innovations: a test for a shift of unknown size and time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cdtool.detection import Signal
+from cdtool.errors import UsageError
+from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.innovation import check_order
+from cdtool.thresholds.sequential import FittedSequential, fit_sequential
+from cdtool.thresholds.settings import check_sides
+from cdtool.thresholds.signature import Signature
+from cdtool.thresholds.stretches import filtered, stretch_bounds
+
+
+@dataclass(frozen=True)
+class Glr:
+    """Limits -+ `safety_factor` on the window-limited likelihood ratio for a shift of the innovations (Willsky 1976).
+
+    Z = sum of the last L innovations / sqrt(L), the largest in size over the `windows` L (samples); Z^2 / 2 is the
+    log-likelihood ratio of a mean shift that began L samples ago. With one side watched, the largest on that side. In
+    standard deviations. A window holds over a gap of up to 20 samples and never reaches back over a longer one. Fails
+    where the normal mean has moved (payload, temperature), and against a shift slower than the longest window.
+    """
+
+    safety_factor: float = 9.0
+    sides: str | None = None
+    order: int = 4
+    windows: tuple[int, ...] = (4, 8, 16, 32, 64, 128)
+    signature: Signature | None = None
+
+    name: ClassVar[str] = "glr"
+    needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    by_class: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_sides(self.safety_factor, self.sides)
+        check_order(self.order)
+        if not self.windows or min(self.windows) < 1:
+            raise UsageError(f"windows are {list(self.windows)}", "numbers of samples, each at least 1")
+
+    def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
+        """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
+        return fit_sequential(self, pairs)
+
+    def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
+        """Z of the window that speaks most for a shift, in standard deviations; 0 until the shortest one is full."""
+
+        def test(values: FloatArray, step: FloatArray) -> FloatArray:
+            result = np.zeros(len(values))
+            for first, last in stretch_bounds(step):
+                result[first:last] = self._largest(values[first:last], side)
+            return result
+
+        return filtered(innovations, test, longest_gap, 0.0, "1")
+
+    def _largest(self, values: FloatArray, side: int) -> FloatArray:
+        total = np.concatenate(([0.0], np.cumsum(values)))
+        best = np.zeros(len(values))
+        for window in self.windows:
+            if window > len(values):
+                continue
+            score = (total[window:] - total[:-window]) / np.sqrt(window)
+            size = score * side if side else np.abs(score)
+            behind = best[window - 1 :]
+            larger = size > (behind * side if side else np.abs(behind))
+            best[window - 1 :] = np.where(larger, score, behind)
+        return best

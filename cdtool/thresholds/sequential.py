@@ -1,0 +1,108 @@
+"""Constant limits on a statistic of the whitened deviation: what `innovation`, `cusum` and `glr` share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
+
+from cdtool.detection import Band, Signal
+from cdtool.motion import MotionClass
+from cdtool.recording import Recording
+from cdtool.thresholds.limit import FittedLimit, Limit
+from cdtool.thresholds.settings import on_side, watched_side
+from cdtool.thresholds.signature import Signature
+from cdtool.thresholds.statistic_limit import loaded_rule
+from cdtool.thresholds.whitening import Whitening
+
+# No model of a higher order is learned from a few runs.
+LARGEST_ORDER = 20
+
+
+class SequentialRule(Protocol):
+    """A frozen dataclass of settings that makes a statistic of innovations."""
+
+    name: ClassVar[str]
+
+    @property
+    def safety_factor(self) -> float:
+        """The limit, in the statistic's unit."""
+        ...
+
+    @property
+    def sides(self) -> str | None:
+        """One or two; None is two."""
+        ...
+
+    @property
+    def order(self) -> int:
+        """Order of the autoregressive model."""
+        ...
+
+    @property
+    def signature(self) -> Signature | None:
+        """How mean and spread are learned; None: by default."""
+        ...
+
+    def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
+        """The statistic, causal; `side` +1 or -1 where one is watched; a gap above `longest_gap` [s] starts it anew."""
+        ...
+
+
+@dataclass(frozen=True)
+class FittedSequential:
+    """A rule's statistic of the innovations, held against -k and +k; it serves one class of motion."""
+
+    rule: SequentialRule
+    whitening: Whitening
+    limit: FittedLimit
+    side: int
+
+    @property
+    def motion(self) -> MotionClass:
+        """The class that it was learned for."""
+        return self.whitening.signature.motion
+
+    @property
+    def safety_factor(self) -> float:
+        """The limit k, in the statistic's unit."""
+        return self.limit.safety_factor
+
+    def with_safety_factor(self, factor: float) -> FittedSequential:
+        """The same with its limits at -+ `factor`."""
+        return replace(self, limit=self.limit.with_safety_factor(factor))
+
+    def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+        """The statistic and its band; raises SignatureError for other joints or another rate than those learned."""
+        innovations = self.whitening.innovations(recording, signal)
+        return self.limit.evaluate(recording, self.rule.statistic(innovations, self.side, self.whitening.longest_gap))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "rule": self.rule.name,
+            # The signature's own settings are in the learned one.
+            "settings": asdict(replace(self.rule, signature=None)),  # type: ignore[type-var, call-overload]
+            "whitening": self.whitening.to_dict(),
+            "limit": self.limit.to_dict(),
+            "side": self.side,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`."""
+        return cls(
+            rule=loaded_rule(values),
+            whitening=Whitening.from_dict(values["whitening"]),
+            limit=FittedLimit.from_dict(values["limit"]),
+            side=int(values["side"]),
+        )
+
+
+def fit_sequential(rule: SequentialRule, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
+    """Signature and autoregressive model of impact-free runs of one class, limits at -+ k; raises SignatureError."""
+    whitening = Whitening.learned(rule.signature or Signature(), rule.order, pairs)
+    signature = whitening.signature
+    side = watched_side(rule.sides, signature.motion, signature.signed)
+    limit = on_side(Limit.given([1.0]), side).with_safety_factor(rule.safety_factor)
+    return FittedSequential(rule, whitening, limit, side)

@@ -1,0 +1,111 @@
+"""Constant limits on a statistic that a causal filter makes of the signal, learned like `limit`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+
+from cdtool.detection import Band, Signal
+from cdtool.errors import SignatureError
+from cdtool.motion import MotionClass
+from cdtool.recording import Recording
+from cdtool.thresholds.common_class import common_class
+from cdtool.thresholds.limit import FittedLimit, Limit
+from cdtool.thresholds.settings import on_side, watched_side
+
+
+class StatisticRule(Protocol):
+    """A frozen dataclass of settings that makes a statistic of a signal."""
+
+    name: ClassVar[str]
+
+    @property
+    def safety_factor(self) -> float:
+        """Standard deviations from the runs' mean extreme to the limit."""
+        ...
+
+    @property
+    def sides(self) -> str | None:
+        """One or two; None is two."""
+        ...
+
+    def statistic(self, signal: Signal, period: float) -> Signal:
+        """The statistic, causal; `period` is the sample period of the runs learned from [s]."""
+        ...
+
+
+@dataclass(frozen=True)
+class FittedStatisticLimit:
+    """A rule's statistic and its constant limits; `motion`: the class it was learned for, None: it serves any.
+
+    `period` [s] is the sample period of the runs.
+    """
+
+    rule: StatisticRule
+    limit: FittedLimit
+    period: float
+    motion: MotionClass | None
+
+    @property
+    def safety_factor(self) -> float:
+        """Standard deviations from the runs' mean extreme to the limit."""
+        return self.limit.safety_factor
+
+    def with_safety_factor(self, factor: float) -> FittedStatisticLimit:
+        """The same with its limits at `factor` standard deviations."""
+        return replace(self, limit=self.limit.with_safety_factor(factor))
+
+    def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+        """The statistic and its band; raises UsageError where the number of joints differs."""
+        return self.limit.evaluate(recording, self.rule.statistic(signal, self.period))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "rule": self.rule.name,
+            "settings": asdict(self.rule),  # type: ignore[call-overload]
+            "limit": self.limit.to_dict(),
+            "period": self.period,
+            "motion": asdict(self.motion) if self.motion else None,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`."""
+        return cls(
+            rule=loaded_rule(values),
+            limit=FittedLimit.from_dict(values["limit"]),
+            period=float(values["period"]),
+            motion=MotionClass(**values["motion"]) if values["motion"] else None,
+        )
+
+
+def loaded_rule(values: Mapping[str, Any]) -> Any:
+    """The rule that `to_dict` has written as a name and settings; JSON's lists become tuples again."""
+    from cdtool.thresholds import THRESHOLDS
+
+    settings = {name: tuple(item) if isinstance(item, list) else item for name, item in values["settings"].items()}
+    return THRESHOLDS.load(values["rule"])(**settings)
+
+
+def fit_statistic_limit(rule: StatisticRule, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit:
+    """Mean extremes of the statistic over the runs, and their standard deviation; raises SignatureError.
+
+    A rule that watches one side belongs to a class of motion: its runs must be of one.
+    """
+    period = common_period(pairs)
+    limit = Limit(rule.safety_factor).fit([(recording, rule.statistic(signal, period)) for recording, signal in pairs])
+    motion = common_class([recording for recording, _ in pairs]) if rule.sides == "one" else None
+    side = watched_side(rule.sides, motion, pairs[0][1].signed)
+    return FittedStatisticLimit(rule, on_side(limit, side), period, motion)
+
+
+def common_period(pairs: Sequence[tuple[Recording, Signal]]) -> float:
+    """The median of the runs' sample periods [s]; raises SignatureError where no run has two samples."""
+    periods = [signal.period for _, signal in pairs if signal.period > 0.0]
+    if not periods:
+        raise SignatureError("no run has two samples", "add runs")
+    return float(np.median(periods))

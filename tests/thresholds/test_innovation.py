@@ -1,0 +1,152 @@
+"""Autoregressive models, the innovation, and the sequential tests on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from cdtool.detection import Status
+from cdtool.errors import NothingValidError, SignatureError, UsageError
+from cdtool.thresholds.autoregression import burg, forecast_spread
+from cdtool.thresholds.innovation import Innovation
+from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke
+
+# Behind the ramp, before the end of the travel that enough runs have reached.
+RUNNING = slice(1500, 3900)
+MODEL = (1.5, -0.7)  # e_k = 1.5 e_{k-1} - 0.7 e_{k-2} + nu_k
+
+
+def coloured(rng, count=N):
+    return lfilter([1.0], [1.0, -MODEL[0], -MODEL[1]], rng.normal(size=count))
+
+
+def runs(count=30, direction=1, seed=0):
+    rng = np.random.default_rng(seed)
+    return [(stroke(direction), signal(100.0 + coloured(rng))) for _ in range(count)]
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return Innovation(order=2).fit(runs())
+
+
+def test_burg_finds_the_model_from_many_short_stretches():
+    rng = np.random.default_rng(1)
+    coefficients, spread = burg([3.0 * coloured(rng, 700)[200:] for _ in range(100)], 4)
+    assert coefficients == pytest.approx((*MODEL, 0.0, 0.0), abs=0.02)
+    assert spread == pytest.approx(3.0, rel=0.02)
+
+
+def test_burg_finds_a_pure_tone_exactly():
+    coefficients, spread = burg([np.cos(0.1 * np.arange(5000))], 2)
+    assert coefficients == pytest.approx((2.0 * np.cos(0.1), -1.0), abs=1e-3)
+    assert spread < 1e-3
+
+
+def test_burg_leaves_out_stretches_that_are_too_short():
+    rng = np.random.default_rng(2)
+    long = coloured(rng)
+    assert burg([long, np.ones(2)], 2)[0] == pytest.approx(burg([long], 2)[0], rel=1e-12)
+    assert np.isnan(burg([np.ones(2)], 2)[1])
+
+
+def test_a_forecast_spreads_as_the_impulse_response_says():
+    assert forecast_spread(np.array([0.5]), 3) == pytest.approx(np.sqrt([1.0, 1.25, 1.3125]))
+    impulse = lfilter([1.0], [1.0, -MODEL[0], -MODEL[1]], np.eye(1, 20)[0])
+    assert forecast_spread(np.array(MODEL), 20) == pytest.approx(np.sqrt(np.cumsum(impulse**2)))
+
+
+def test_innovations_of_normal_runs_are_white_and_of_unit_spread(fitted):
+    recording, normal = runs(1, seed=9)[0]
+    statistic, _ = fitted.evaluate(recording, normal)
+    nu = statistic.values[RUNNING, 0]
+    assert np.std(nu) == pytest.approx(1.0, abs=0.06)
+    for lag in (1, 2, 3, 10):
+        assert abs(np.mean(nu[lag:] * nu[:-lag])) < 0.08
+    assert statistic.unit == "1"
+
+
+def test_a_jump_shows_at_once_and_a_slow_ramp_hardly_at_all(fitted):
+    recording, normal = runs(1, seed=9)[0]
+    quiet = fitted.evaluate(recording, normal)[0].values
+    jump = fitted.evaluate(recording, replace(normal, values=normal.values + 20.0 * (TIME >= 3.0)[:, None]))[0].values
+    ramp = np.maximum(TIME - 3.0, 0.0)[:, None] * 20.0
+    slow = fitted.evaluate(recording, replace(normal, values=normal.values + ramp))[0].values
+    assert jump[3000] - quiet[3000] == pytest.approx(20.0, rel=0.1)
+    # 18 N after 0.9 s: (1 - sum a) of it are left.
+    assert slow[3900] - quiet[3900] == pytest.approx(18.0 * (1.0 - sum(MODEL)), rel=0.15)
+
+
+def test_it_starts_with_as_many_samples_of_start_up_as_its_order(fitted):
+    recording, normal = runs(1, seed=9)[0]
+    statistic, _ = fitted.evaluate(recording, normal)
+    first = int(np.flatnonzero(statistic.status[:, 0] != Status.NO_LIMIT)[0])
+    assert (statistic.status[first : first + 2] == Status.START_UP).all() and statistic.valid[first + 2]
+
+
+@pytest.mark.parametrize("missing", [1, 5, 20])
+def test_behind_a_short_gap_the_innovation_is_that_of_the_forecast(fitted, missing):
+    scores = []
+    for seed in range(60):
+        recording, normal = runs(1, seed=100 + seed)[0]
+        status = normal.status.copy()
+        status[3000 : 3000 + missing] = Status.GAP
+        statistic, _ = fitted.evaluate(recording, replace(normal, status=status))
+        assert statistic.valid[3000 + missing : 3900].all()
+        scores.append(statistic.values[3000 + missing, 0])
+    assert np.std(scores) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_long_gap_starts_it_anew(fitted):
+    recording, normal = runs(1, seed=9)[0]
+    status = normal.status.copy()
+    status[3000:3021] = Status.GAP
+    statistic, _ = fitted.evaluate(recording, replace(normal, status=status))
+    assert (statistic.status[3021:3023] == Status.START_UP).all() and statistic.valid[3023:3900].all()
+
+
+def test_a_jittering_clock_does_not_matter_to_it():
+    time = jittering_clock(N, 0.3)
+    rng = np.random.default_rng(4)
+    pairs = [(stroke(time=time), signal(100.0 + coloured(rng), time)) for _ in range(20)]
+    fitted = Innovation(order=2).fit(pairs)
+    statistic, _ = fitted.evaluate(*pairs[0])
+    assert np.std(statistic.values[RUNNING]) == pytest.approx(1.0, abs=0.08)
+
+
+def test_the_change_from_time_to_position_is_no_innovation():
+    rng = np.random.default_rng(6)
+    # A mean that changes steeply where acceleration ends: in time and in position its curves do not meet.
+    bend = 100.0 + 400.0 * (TIME > 1.25)
+    pairs = [(stroke(), signal(bend + 0.01 * coloured(rng))) for _ in range(30)]
+    fitted = Innovation(order=2).fit(pairs[1:])
+    statistic, _ = fitted.evaluate(*pairs[0])
+    change = int(np.flatnonzero(stroke()["speed"].values[:, 0] >= 0.95 * 0.2)[0])
+    assert (statistic.status[change : change + 3] == Status.START_UP).all() and statistic.valid[change + 3]
+    assert np.max(np.abs(statistic.values[statistic.valid])) < 20.0
+
+
+def test_another_rate_is_refused(fitted):
+    time = TIME[::2]
+    with pytest.raises(SignatureError, match="2 ms"):
+        fitted.evaluate(stroke(time=time), signal(np.full(len(time), 100.0), time))
+
+
+def test_a_signal_that_does_not_vary_is_refused():
+    with pytest.raises(NothingValidError, match="variation"):
+        Innovation().fit([(stroke(), signal(np.full(N, 3.0)))] * 12)
+
+
+def test_it_belongs_to_the_class_of_its_runs_and_watches_the_side_that_opposes_the_motion():
+    fitted = Innovation(sides="one").fit(runs(12, direction=-1))
+    assert fitted.motion.direction == -1
+    _, band = fitted.evaluate(*runs(1, direction=-1)[0])
+    assert (band.upper[2000:] == np.inf).all() and (band.lower[2000:] == -5.5).all()
+
+
+def test_an_order_without_meaning_is_refused():
+    with pytest.raises(UsageError, match="order"):
+        Innovation(order=0)

@@ -1,0 +1,106 @@
+"""CUSUM and GLR against their definitions, their run length, and gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.detection import Status
+from cdtool.errors import UsageError
+from cdtool.thresholds.cusum import Cusum
+from cdtool.thresholds.glr import Glr
+from tests.thresholds.strokes import N, noise_runs, signal
+
+GAP = 0.0215
+
+
+def noise(seed=0):
+    return np.random.default_rng(seed).normal(size=N)
+
+
+@pytest.mark.parametrize("side", [-1, 0, 1])
+def test_cusum_is_pages_recursion(side):
+    values = noise() + np.where(np.arange(N) > 3000, -0.8, 0.0)
+    statistic = Cusum(drift=0.4).statistic(signal(values), side, GAP).values[:, 0]
+    above = below = 0.0
+    for k, value in enumerate(values):
+        above, below = max(0.0, above + value - 0.4), max(0.0, below - value - 0.4)
+        expected = above if side > 0 or (side == 0 and above >= below) else -below
+        assert statistic[k] == pytest.approx(expected, abs=1e-9)
+
+
+def test_cusum_finds_a_shift_after_the_limit_over_what_the_drift_leaves():
+    values = np.zeros(N)
+    values[1000:] = 1.5
+    statistic = Cusum(drift=0.5).statistic(signal(values), 0, GAP).values[:, 0]
+    assert int(np.flatnonzero(statistic > 20.0)[0]) == 1000 + 20
+    assert Cusum(drift=0.5).statistic(signal(-values), 0, GAP).values[-1, 0] == pytest.approx(-3000.0)
+
+
+def test_the_mean_time_to_a_false_alarm_of_cusum_is_that_of_siegmund():
+    rng = np.random.default_rng(3)
+    lengths = []
+    for _ in range(400):
+        values = rng.normal(size=N)
+        above = Cusum(drift=0.5).statistic(signal(values), 1, GAP).values[:, 0]
+        at = np.flatnonzero(above > 4.0)
+        lengths.append(at[0] + 1 if len(at) else N)
+    reach = 4.0 + 1.166
+    assert np.mean(lengths) == pytest.approx((np.exp(reach) - reach - 1.0) / 0.5, rel=0.12)
+
+
+@pytest.mark.parametrize("side", [-1, 0, 1])
+def test_glr_is_the_largest_scaled_sum_over_its_windows(side):
+    values = noise(1)
+    windows = (2, 7, 30)
+    statistic = Glr(windows=windows).statistic(signal(values), side, GAP).values[:, 0]
+    for k in (1, 5, 6, 29, 500, 3999):
+        scores = [values[k + 1 - w : k + 1].sum() / np.sqrt(w) for w in windows if w <= k + 1]
+        largest = max(scores, key=abs) if side == 0 else side * max(0.0, *(side * score for score in scores))
+        assert statistic[k] == pytest.approx(largest, abs=1e-9)
+
+
+def test_glr_finds_small_shifts_with_long_windows_and_large_ones_with_short():
+    def delay(shift, windows):
+        values = np.zeros(N)
+        values[1000:] = shift
+        statistic = Glr(windows=windows).statistic(signal(values), 1, GAP).values[:, 0]
+        at = np.flatnonzero(statistic > 6.0)
+        return at[0] - 999 if len(at) else np.inf
+
+    # Z after n samples of a shift d in a window of L: n d / sqrt(L), at most d sqrt(L).
+    assert delay(3.1, (4,)) == 4 and delay(1.0, (4,)) == np.inf
+    assert delay(1.0, (64,)) == 49
+    assert delay(3.1, (4, 64)) == 4 and delay(1.0, (4, 64)) == 49
+
+
+@pytest.mark.parametrize("rule", [Cusum(drift=0.5), Glr()])
+def test_a_short_gap_is_stepped_over_and_a_long_one_starts_anew(rule):
+    values = np.full(N, 1.0)
+    whole = rule.statistic(signal(values[:-10]), 1, GAP).values[:, 0]
+    for missing, kept in ((10, True), (21, False)):
+        status = signal(values).status.copy()
+        status[2000 : 2000 + missing] = Status.GAP
+        statistic = rule.statistic(replace(signal(values), status=status), 1, GAP)
+        assert np.isnan(statistic.values[2000 : 2000 + missing]).all() and statistic.valid[2000 + missing :].all()
+        after = statistic.values[2000 + missing, 0]
+        assert after == pytest.approx(whole[2000] if kept else whole[0])
+
+
+@pytest.mark.parametrize("rule", [Cusum, Glr])
+def test_both_have_limits_at_the_safety_factor_on_the_watched_side(rule):
+    pairs = noise_runs(12)
+    both, one = rule(safety_factor=9.0).fit(pairs), rule(safety_factor=9.0, sides="one").fit(pairs)
+    assert (both.evaluate(*pairs[0])[1].lower == -9.0).all() and (both.evaluate(*pairs[0])[1].upper == 9.0).all()
+    assert (one.evaluate(*pairs[0])[1].lower == -np.inf).all()
+
+
+@pytest.mark.parametrize(
+    ("rule", "wrong"),
+    [(Cusum, {"drift": 0.0}), (Cusum, {"order": 99}), (Glr, {"windows": ()}), (Glr, {"windows": (0,)})],
+)
+def test_settings_without_meaning_are_refused(rule, wrong):
+    with pytest.raises(UsageError):
+        rule(**wrong)
