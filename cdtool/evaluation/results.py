@@ -56,9 +56,9 @@ class ContactResult:
     found_by: str = meant("ground truth: load cell, label, event or label file", default="load cell")
     watched_ms: float | None = meant("how long after the onset an alarm would have counted", default=None)
     resolution_ms: float | None = meant("the latency is no finer than this", default=None)
-    side: str | None = meant("the limit that was crossed: above or below", default=None)
-    statistic: float | None = meant("value compared with the limit at the alarm, in the detector's unit", default=None)
-    limit: float | None = meant("limit at the alarm, in the detector's unit", default=None)
+    side: str | None = meant("the limit that was crossed: above or below; null for triggers of a program", default=None)
+    statistic: float | None = meant("value compared with the limit at the alarm; null for triggers", default=None)
+    limit: float | None = meant("limit at the alarm, in the unit of the statistic; null for triggers", default=None)
 
 
 @dataclass(frozen=True)
