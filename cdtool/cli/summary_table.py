@@ -52,10 +52,12 @@ def show_table(evaluated: Evaluated) -> None:
 
 def show_limits(evaluated: Evaluated) -> None:
     """One line for each limit that is not kept, and how many are."""
+    from cdtool.evaluation.limits import broken
+
     limits = evaluated.results.limits
     if not limits:
         return
-    failed = [item for item in limits if item.outcome != "kept"]
+    failed = broken(limits)
     for item in failed[:_SHOWN]:
         name = f"{item.detector}.{item.group}.{item.figure}"
         typer.echo(f"limit {item.outcome}: {plain(name)}: {plain(item.reason)} (limit {plain(item.limit)})")
@@ -66,7 +68,9 @@ def show_limits(evaluated: Evaluated) -> None:
 
 def finish(evaluated: Evaluated) -> None:
     """End with 1 where a limit is not kept, else with 3 where something was left out."""
-    if any(item.outcome != "kept" for item in evaluated.results.limits):
+    from cdtool.evaluation.limits import broken
+
+    if broken(evaluated.results.limits):
         raise typer.Exit(ExitStatus.LIMIT_BROKEN)
     leave(evaluated.results.skipped)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult
+from cdtool.strict_json import finite
 
 
 def force_rows(
@@ -28,15 +28,15 @@ def force_rows(
                     name=item.step.name,
                     from_s=item.step.from_s,
                     at_most_n=item.step.at_most_n,
-                    peak_n=_known(item.peak),
-                    time_budget_ms=_known(1e3 * item.time_budget),
+                    peak_n=finite(item.peak),
+                    time_budget_ms=finite(1e3 * item.time_budget),
                     verdict=item.outcome,
                     reason=item.reason or None,
                 )
                 for item in verdict.steps
             ),
             point=recording.point,
-            time_budget_ms=_known(1e3 * verdict.time_budget),
+            time_budget_ms=finite(1e3 * verdict.time_budget),
             reason=verdict.reason or None,
         )
         for number, verdict in verdicts.items()
@@ -58,7 +58,7 @@ def point_rows(
                 name=item.step.name,
                 from_s=item.step.from_s,
                 at_most_n=item.step.at_most_n,
-                peak_n=_known(item.force),
+                peak_n=finite(item.force),
                 time_budget_ms=None,
                 verdict=item.outcome,
                 reason=item.reason or None,
@@ -68,7 +68,3 @@ def point_rows(
         note, reason = verdict.note, verdict.reason or None
         rows.append(PointResult(point, group, profile.name, verdict.tests, verdict.outcome, steps, note, reason))
     return rows
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -76,6 +76,9 @@ class Gathering:
             first = self.skipped[0] if self.skipped else None
             reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
             raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", "check with cdtool info")
+        if self._choice.left_out:
+            words = f"{self._choice.left_out} more operations with a miss or a false alarm have no trigger plot"
+            self.findings.append(Skipped(str(self.setup.path), words))
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(
             provenance=provenance,

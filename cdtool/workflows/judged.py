@@ -16,6 +16,7 @@ from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
+from cdtool.strict_json import finite
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ def _contact_row(
         alarm_s=alarm.time if alarm else None,
         latency_ms=1e3 * found.latency if alarm else None,
         outcome=found.outcome,
-        force_at_alarm_n=_known(force_at(course, found.latency)) if course and alarm else None,
-        peak_force_n=_known(peak),
+        force_at_alarm_n=finite(force_at(course, found.latency)) if course and alarm else None,
+        peak_force_n=finite(peak),
         clipped=found.clipped,
         reason=found.reason or None,
         contact=number,
@@ -107,7 +108,3 @@ def _crossing(detection: Detection, alarm: Alarm | None) -> dict[str, Any]:
         "statistic": known.statistic if known else None,
         "limit": known.limit if known else None,
     }
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -105,13 +105,18 @@ def load_runs(
 
     for path, loaded in zip(paths, in_order(load, paths, jobs, progress), strict=True):
         if isinstance(loaded, CdtoolError):
-            skipped.append(Skipped(shown_path(path, base), str(loaded)))
+            skipped.append(unread(path, base, loaded))
             continue
         recording, parts = loaded
         operations.extend(parts)
         findings.extend(told(recording))
         skipped.extend(lost(recording))
     return Runs(tuple(operations), tuple(skipped), tuple(findings))
+
+
+def unread(path: Path, base: Path | None, fault: CdtoolError) -> Skipped:
+    """A log that could not be used, named as results name it; its reason does not name it again."""
+    return Skipped(shown_path(path, base), str(fault).removeprefix(f"{path}: "))
 
 
 def shown_path(path: Path, base: Path | None = None) -> str:

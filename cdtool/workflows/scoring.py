@@ -24,7 +24,7 @@ from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.detection import contacts_of
 from cdtool.workflows.force_rows import force_rows
 from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
-from cdtool.workflows.runs import load_operations, lost, shown_path, told
+from cdtool.workflows.runs import load_operations, lost, told, unread
 
 
 @dataclass
@@ -83,7 +83,7 @@ def score_log(
         recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
         contacts = _true_contacts(recording, group, setup, path)
     except CdtoolError as fault:
-        scored.skipped.append(Skipped(shown_path(path, setup.path.parent), str(fault)))
+        scored.skipped.append(unread(path, setup.path.parent, fault))
         scored.reading = perf_counter() - begin
         return scored
     scored.reading = perf_counter() - begin
