@@ -106,6 +106,11 @@ def test_a_budget_that_the_runs_cannot_set_is_refused_with_what_is_missing(gate)
         run(gate, HEAD, LEARN, ONSET, STIFF, false_alarm_budget="1/1000op")
 
 
+def test_an_empty_budget_is_an_error_and_not_none(gate):
+    with pytest.raises(ConfigurationError, match="false_alarm_budget: is ''"):
+        run(gate, 'false_alarm_budget = ""\n', HEAD, LEARN, ONSET, STIFF)
+
+
 def test_the_sweep_counts_false_alarms_in_the_hold_out_and_its_middle_is_the_benchmark_itself(gate):
     done = run(gate, HEAD, LEARN, ONSET, STIFF, HOLDOUT)
     for summary in done.evaluated.summaries:

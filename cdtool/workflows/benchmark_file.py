@@ -10,7 +10,7 @@ from typing import Any
 
 from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
-from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
@@ -19,9 +19,8 @@ from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml
-from cdtool.thresholds.alignment import ALIGNMENTS
-from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.benchmark_sections import read_budget, read_onset, read_signature, read_watched
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
 from cdtool.workflows.threshold_settings import read_threshold
 
@@ -106,7 +105,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
-    signature, debounce = _signature(root.table("signature"), machine_file.machine.default_sides)
+    signature, debounce = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
     learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
     force = root.table("force")
@@ -116,16 +115,16 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         path=file,
         machine_file=machine_file,
         detectors=names,
-        watched=_watched(root, machine_file.machine.joints),
+        watched=read_watched(root, machine_file.machine.joints),
         operations=root.choice("operations", HOW_TO_CUT, "whole"),
         threshold=threshold,
-        budget=_budget(root),
+        budget=read_budget(root),
         signature=signature,
         rule=rule,
         debounce=debounce,
         labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
-        onset=_onset(onset),
+        onset=read_onset(onset),
         mass_before_cell=force.number("mass_before_cell_kg", 0.0, minimum=0.0),
         learn=learn,
         impacts=impacts,
@@ -193,56 +192,6 @@ def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:
 
 def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[str, str]]:
     return [(name, machine_file.detector(name).short_name) for name in detectors]
-
-
-def _budget(table: Table) -> Budget | None:
-    text = table.text("false_alarm_budget", "")
-    try:
-        return Budget.parse(text) if text else None
-    except UsageError as fault:
-        raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
-
-
-def _watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    watched = table.texts("joints", ())
-    for joint in watched:
-        if joint not in joints:
-            raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
-    return watched
-
-
-def _signature(table: Table, default_sides: str) -> tuple[Signature, int | None]:
-    settings: dict[str, Any] = {
-        "rule": table.choice("rule", RULES, "pooled"),
-        "sides": table.choice("sides", SIDES, default_sides),
-        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
-        "position_step": table.number("position_step", Signature.position_step, above=0.0),
-        "position_window": table.number("position_window", Signature.position_window, above=0.0),
-        "force": table.flag("force", False),
-    }
-    if "safety_factor" in table:
-        settings["safety_factor"] = table.number("safety_factor", above=0.0)
-    debounce = None
-    if "debounce" in table:
-        debounce = table.whole("debounce", 1, minimum=1)
-    table.finish()
-    return Signature(**settings), debounce
-
-
-def _onset(table: Table) -> OnsetRule:
-    above = table.number("above_n", above=0.0) if "above_n" in table else None
-    back_to = table.number("back_to_n", above=0.0) if "back_to_n" in table else None
-    if above is not None and back_to is not None and back_to > above:
-        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "at most above_n")
-    rule = OnsetRule(
-        above=above,
-        back_to=back_to,
-        samples=table.whole("samples", OnsetRule.samples, minimum=1),
-        sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
-        separation=table.number("separation_s", OnsetRule.separation, above=0.0),
-    )
-    table.finish()
-    return rule
 
 
 def _refuse_overlap(benchmark: BenchmarkFile) -> None:

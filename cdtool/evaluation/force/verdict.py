@@ -38,13 +38,10 @@ class StepVerdict:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class ForceVerdict:
-    """One test against a profile; `end`: how long after the onset the record goes on [s]."""
+class _OfSteps:
+    """What follows from the verdicts on the steps of a profile."""
 
-    profile: str
-    steps: tuple[StepVerdict, ...]
-    end: float
+    steps: tuple[StepVerdict, ...] | tuple[PointStep, ...]
 
     @property
     def outcome(self) -> Outcome:
@@ -55,6 +52,15 @@ class ForceVerdict:
     def reason(self) -> str:
         """Why it is no pass: of the first step with that outcome."""
         return _first_reason(self.steps, self.outcome)
+
+
+@dataclass(frozen=True)
+class ForceVerdict(_OfSteps):
+    """One test against a profile; `end`: how long after the onset the record goes on [s]."""
+
+    profile: str
+    steps: tuple[StepVerdict, ...]
+    end: float
 
     @property
     def time_budget(self) -> float:
@@ -83,23 +89,13 @@ class PointStep:
 
 
 @dataclass(frozen=True)
-class PointVerdict:
+class PointVerdict(_OfSteps):
     """The tests at one point against a profile; `note` says how many were averaged."""
 
     profile: str
     tests: int
     steps: tuple[PointStep, ...]
     note: str
-
-    @property
-    def outcome(self) -> Outcome:
-        """Fail where a step fails, else not assessable where one is not, else pass."""
-        return _worst([item.outcome for item in self.steps])
-
-    @property
-    def reason(self) -> str:
-        """Why it is no pass: of the first step with that outcome."""
-        return _first_reason(self.steps, self.outcome)
 
 
 def judge(course: ForceCourse, profile: ForceProfile) -> ForceVerdict:

@@ -1,0 +1,70 @@
+"""Parts of benchmark.toml that are a few plain settings each; every error names its key."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.tables import Table
+from cdtool.thresholds.alignment import ALIGNMENTS
+from cdtool.thresholds.fitted_signature import RULES, SIDES
+from cdtool.thresholds.signature import Signature
+
+
+def read_budget(table: Table) -> Budget | None:
+    """`false_alarm_budget`; None where the file has none."""
+    if "false_alarm_budget" not in table:
+        return None
+    text = table.text("false_alarm_budget")
+    try:
+        return Budget.parse(text)
+    except UsageError as fault:
+        raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
+
+
+def read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
+    """`joints`: those to watch; empty: all of them."""
+    watched = table.texts("joints", ())
+    for joint in watched:
+        if joint not in joints:
+            raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
+    return watched
+
+
+def read_signature(table: Table, default_sides: str) -> tuple[Signature, int | None]:
+    """[signature]: the rule, and the debounce in samples if it is set."""
+    settings: dict[str, Any] = {
+        "rule": table.choice("rule", RULES, "pooled"),
+        "sides": table.choice("sides", SIDES, default_sides),
+        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
+        "position_step": table.number("position_step", Signature.position_step, above=0.0),
+        "position_window": table.number("position_window", Signature.position_window, above=0.0),
+        "force": table.flag("force", False),
+    }
+    if "safety_factor" in table:
+        settings["safety_factor"] = table.number("safety_factor", above=0.0)
+    debounce = None
+    if "debounce" in table:
+        debounce = table.whole("debounce", 1, minimum=1)
+    table.finish()
+    return Signature(**settings), debounce
+
+
+def read_onset(table: Table) -> OnsetRule:
+    """[onset]: when a contact begins."""
+    above = table.number("above_n", above=0.0) if "above_n" in table else None
+    back_to = table.number("back_to_n", above=0.0) if "back_to_n" in table else None
+    if above is not None and back_to is not None and back_to > above:
+        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "at most above_n")
+    rule = OnsetRule(
+        above=above,
+        back_to=back_to,
+        samples=table.whole("samples", OnsetRule.samples, minimum=1),
+        sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
+        separation=table.number("separation_s", OnsetRule.separation, above=0.0),
+    )
+    table.finish()
+    return rule
