@@ -13,16 +13,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import mean, stdev
 
-from cdtool.activation import Activation
 from cdtool.errors import NothingValidError
 from cdtool.evaluation.truth.matching import match
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording
-from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
-from cdtool.workflows.learning import fit_signatures
+from cdtool.workflows.fitting import fit_operations
 
 IMPACTS = ("stiff", "soft")
 HEADS = ("missed", "false", "reference", "worst seed")
@@ -91,20 +90,18 @@ def score_seed(bench: Bench, seed: int, detectors: Sequence[str]) -> dict[str, S
 
 def _score(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]], name: str) -> Score:
     machine, detector = setup.machine_file.machine, setup.machine_file.detector(name)
-    fitted: tuple[FittedSignature, ...] = ()
+    thresholds: tuple[FittedThreshold, ...] = ()
     try:
-        fitted, _, skipped = fit_signatures(
-            operations["free"], machine, detector, setup.signature, watched=setup.watched
-        )
+        fitted = fit_operations(operations["free"], machine, detector, setup.signature, watched=setup.watched)
+        if fitted.skipped:
+            sys.exit(f"error: {fitted.skipped[0].recording}: {fitted.skipped[0].reason}")
+        thresholds = fitted.thresholds
     except NothingValidError:
-        # As `cdtool benchmark` does: without a band every contact is not assessable.
-        skipped = []
-    if skipped:
-        sys.exit(f"error: {skipped[0].recording}: {skipped[0].reason}")
-    activation, score = Activation(setup.debounce), Score()
+        pass  # as `cdtool benchmark` does: without a band every contact is not assessable
+    score = Score()
     for group in (HOLDOUT, *IMPACTS):
         for operation in operations[group]:
-            detection = detect_operation(operation, machine, detector, fitted, activation, setup.watched)
+            detection = detect_operation(operation, machine, detector, thresholds, setup.activation, setup.watched)
             contacts = [] if group == HOLDOUT else find_contacts(operation.recording, setup.onset)
             if len(contacts) != (group != HOLDOUT):
                 sys.exit(f"error: {operation.name}: {len(contacts)} contacts found")

@@ -24,6 +24,7 @@ import numpy as np
 from timing import environment
 
 from cdtool import benchmark, compare, simulate_gate
+from cdtool.activation import Activation
 from cdtool.evaluation.results import Results
 from cdtool.workflows.benchmark_file import read_benchmark_file
 
@@ -42,7 +43,7 @@ def judged(seed: int, impacts: int) -> tuple[Results, Results]:
         folder = Path(name) / "gate"
         simulate_gate(folder, {"free": 14, **dict.fromkeys(GROUPS, impacts)}, seed=seed)
         setup = read_benchmark_file(folder / "benchmark.toml")
-        builds = [replace(setup, debounce=count) for count in (OLD, NEW)]
+        builds = [replace(setup, activation=Activation(count)) for count in (OLD, NEW)]
         old, new = (benchmark(build, detectors=DETECTORS, jobs=2).results for build in builds)
     return old, new
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -16,20 +18,57 @@ from cdtool.recording import BoolArray, FloatArray
 DEBOUNCE_TIME = 9e-3
 
 
+class ActivationSettings(TypedDict, total=False):
+    """Settings of an Activation that are to differ; None leaves one as it is."""
+
+    debounce: int | None
+    rearm: float | None
+    hysteresis: float | None
+    latch: bool | None
+
+
 @dataclass(frozen=True)
 class Activation:
     """`debounce` samples in succession outside the band raise an alarm; `rearm` seconds inside arm it again.
 
     A missing sample is skipped: it neither counts nor breaks the succession, so that a flaky sensor cannot hide a
     contact. A sample where the method does not apply breaks it. The alarm's time is that of the last sample counted.
+    `hysteresis` h: inside counts only within the band of (1 - h) times the safety factor, so that a signal that dwells
+    at its limit is one alarm. `latch`: a joint's alarm stands until the operation ends and is its only one.
     """
 
     debounce: int | None = None
     rearm: float = 0.5
+    hysteresis: float = 0.0
+    latch: bool = False
 
     def __post_init__(self) -> None:
         if self.debounce is not None and self.debounce < 1:
             raise UsageError(f"debounce is {self.debounce}", "a whole number of samples, at least 1")
+        if not 0.0 <= self.rearm < math.inf:
+            raise UsageError(f"rearm is {self.rearm:g}", "seconds, at least 0; latch: an alarm is never armed again")
+        if not 0.0 <= self.hysteresis < 1.0:
+            raise UsageError(f"hysteresis is {self.hysteresis:g}", "a share of the safety factor, from 0 to below 1")
+
+    @property
+    def wait(self) -> float:
+        """Seconds inside after which an alarm is armed again; infinite where it latches."""
+        return math.inf if self.latch else self.rearm
+
+    @property
+    def described(self) -> dict[str, int | float | bool | None]:
+        """The settings as they stand in results: the default debounce is None."""
+        return {
+            "debounce_samples": self.debounce,
+            "rearm_s": self.rearm,
+            "hysteresis": self.hysteresis,
+            "latch": self.latch,
+        }
+
+    def changed(self, settings: ActivationSettings) -> Activation:
+        """The same with what is given in `settings`."""
+        given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+        return replace(self, **given)
 
     def samples(self, period: float) -> int:
         """The debounce in samples for a signal of that period [s]."""
@@ -37,8 +76,13 @@ class Activation:
             return self.debounce
         return max(1, round(DEBOUNCE_TIME / period)) if period > 0.0 else 1
 
-    def alarms(self, statistic: Signal, band: Band) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints."""
+    def alarms(
+        self, statistic: Signal, band: Band, inner: Band | None = None
+    ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints.
+
+        `inner`: the band within which an alarm is armed again, where there is hysteresis.
+        """
         period = statistic.period
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
@@ -48,7 +92,10 @@ class Activation:
             upper = np.ascontiguousarray(band.upper[:, joint])
             status = np.ascontiguousarray(statistic.status[:, joint])
             outside = (value > upper) | (value < lower)
-            at, armed = crossings_of(statistic.time, outside, status, self.samples(period), self.rearm)
+            calm = ~outside
+            if inner is not None:
+                calm &= ~((value > inner.upper[:, joint]) | (value < inner.lower[:, joint]))
+            at, armed = crossings_of(statistic.time, outside, calm, status, self.samples(period), self.wait)
             for k, was_armed in zip(at, armed, strict=True):
                 above = bool(value[k] > upper[k])
                 limit = float(upper[k] if above else lower[k])
@@ -65,19 +112,24 @@ def _in_order(alarms: list[Alarm]) -> tuple[Alarm, ...]:
 
 
 def crossings_of(
-    time: FloatArray, outside: BoolArray, status: StatusArray, debounce: int, rearm: float
+    time: FloatArray, outside: BoolArray, calm: BoolArray, status: StatusArray, debounce: int, rearm: float
 ) -> tuple[npt.NDArray[np.int64], BoolArray]:
-    """The samples at which one joint's debounced exits from the band are raised, and whether each was armed."""
+    """The samples at which one joint's debounced exits from the band are raised, and whether each was armed.
+
+    `calm`: where the value is far enough inside to count towards the `rearm` seconds.
+    """
     at = np.empty(len(time) if outside.any() else 0, dtype=np.int64)
     armed = np.empty(len(at), dtype=np.bool_)
-    count = _activate(np.ascontiguousarray(time), outside, status, debounce, rearm, at, armed) if len(at) else 0
+    clock = np.ascontiguousarray(time)
+    count = _activate(clock, outside, calm, status, debounce, rearm, at, armed) if len(at) else 0
     return at[:count], armed[:count]
 
 
-@kernel(f"int64({READ_ONLY}, b1[::1], uint8[::1], int64, float64, int64[::1], b1[::1])")
+@kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64, float64, int64[::1], b1[::1])")
 def _activate(
     time: FloatArray,
     outside: BoolArray,
+    calm: BoolArray,
     status: StatusArray,
     debounce: int,
     rearm: float,
@@ -102,7 +154,10 @@ def _activate(
                 armed = False
             continue
         count = 0
-        if not inside:
+        # Where the value cannot be judged it is not known to be outside: that time counts as before.
+        if status[k] == 0 and not calm[k]:
+            inside = False
+        elif not inside:
             inside = True
             inside_since = time[k]
         elif time[k] - inside_since >= rearm:

@@ -14,9 +14,10 @@ from cdtool.detection import REASONS, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
 from cdtool.operations import Operation
-from cdtool.recording import FloatArray
+from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, exceedance
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
+from cdtool.thresholds.contract import checked_evaluation
 
 
 @dataclass(frozen=True)
@@ -127,8 +128,9 @@ def judge(
         unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
         verdict = Verdict("not assessable", reason=refused or unlearned)
         return Detection(operation, detector, statistic, Band(nothing, nothing), verdict, signal)
-    statistic, band = threshold.evaluate(operation.recording.without_ground_truth(), signal)
-    alarms, crossings = activation.alarms(statistic, band)
+    recording = operation.recording.without_ground_truth()
+    statistic, band = checked_evaluation(threshold, recording, signal)
+    alarms, crossings = activation.alarms(statistic, band, _inner_band(activation, threshold, recording, signal))
     if alarms:
         verdict = Verdict("alarm", alarms, crossings=crossings)
     elif not statistic.valid.any():
@@ -136,6 +138,16 @@ def judge(
     else:
         verdict = Verdict("no alarm")
     return Detection(operation, detector, statistic, band, verdict, signal, threshold)
+
+
+def _inner_band(
+    activation: Activation, threshold: FittedThreshold, recording: Recording, signal: Signal
+) -> Band | None:
+    """The band within which an alarm is armed again; None without hysteresis."""
+    if not activation.hysteresis:
+        return None
+    narrower = threshold.with_safety_factor((1.0 - activation.hysteresis) * threshold.safety_factor)
+    return narrower.evaluate(recording, signal)[1]
 
 
 def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:

@@ -8,14 +8,17 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from cdtool.activation import Activation
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
 from cdtool.machine_file import fingerprint
-from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.plain_text import counted, digits
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 _KIND = "cdtool signature"
 _LOCK_SECONDS = 60.0
 
@@ -30,10 +33,29 @@ class LearnedRun:
 
 
 @dataclass(frozen=True)
-class SignatureFile:
-    """Signatures of one machine and one detector with its gains: one for each class of motion.
+class FactorOrigin:
+    """Where a safety factor comes from: the rule's default, a hand, or a false-alarm budget.
 
-    `first` keeps the signatures as first learned; `current` is what counts.
+    With a budget: its text, the impact-free operations that the factor was set on, and the alarms it gives on them.
+    """
+
+    by: Literal["default", "hand", "budget"] = "default"
+    budget: str | None = None
+    operations: int = 0
+    alarms: int = 0
+
+    def __str__(self) -> str:
+        if self.by != "budget":
+            return "by default" if self.by == "default" else "set by hand"
+        return f"set for {self.budget} on {counted(self.operations, 'operation')}, {counted(self.alarms, 'alarm')}"
+
+
+@dataclass(frozen=True)
+class SignatureFile:
+    """The thresholds of one machine and one detector with its gains: of a signature, one for each class of motion.
+
+    `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
+    first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
     """
 
     machine: str
@@ -41,16 +63,26 @@ class SignatureFile:
     detector: str
     gains: Mapping[str, Gain]
     unit: str
-    debounce: int | None
-    current: tuple[FittedSignature, ...]
-    first: tuple[FittedSignature, ...]
+    joints: tuple[str, ...]
+    rule: Any
+    origin: FactorOrigin
+    activation: Activation
+    current: tuple[FittedThreshold, ...]
+    first: tuple[FittedThreshold, ...]
     runs: tuple[LearnedRun, ...]
     source: str = ""
 
     @property
-    def joints(self) -> tuple[str, ...]:
-        """The joints that are watched: the columns of the signatures."""
-        return self.current[0].joints
+    def threshold(self) -> str:
+        """The threshold's name."""
+        return str(self.rule.name)
+
+    @property
+    def described(self) -> str:
+        """The threshold with its safety factor or limits, and where those come from."""
+        if by_hand := getattr(self.rule, "limits", ()):
+            return f"{self.threshold} {', '.join(map(digits, by_hand))} {self.unit} {self.origin}"
+        return f"{self.threshold}, safety factor {self.current[0].safety_factor:.4g} {self.origin}"
 
     def check(self, machine: Any, detector: Any) -> None:
         """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
@@ -114,7 +146,9 @@ def read_signature(path: str | Path) -> SignatureFile:
         )
     try:
         return _from_json(values, str(file))
-    except (KeyError, TypeError, ValueError, UsageError) as fault:
+    except UsageError as fault:
+        raise SignatureError(f"{file}: {fault.message}", fault.hint) from fault
+    except (KeyError, IndexError, TypeError, ValueError) as fault:
         raise SignatureError(f"{file}: damaged signature file: {fault!r}", "learn it again") from fault
 
 
@@ -132,7 +166,7 @@ def update_signature(path: str | Path, change: Callable[[SignatureFile], Signatu
         raise SignatureError(f"{file}: locked by another process", f"remove {file}.lock if none runs") from fault
 
 
-def with_run(signature: SignatureFile, index: int, updated: FittedSignature, run: LearnedRun) -> SignatureFile:
+def with_run(signature: SignatureFile, index: int, updated: FittedThreshold, run: LearnedRun) -> SignatureFile:
     """The file with the class at `index` replaced and the run noted; the first signature stays."""
     current = list(signature.current)
     current[index] = updated
@@ -149,23 +183,30 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "machine": {"name": signature.machine, "fingerprint": signature.machine_fingerprint},
         "detector": {"name": signature.detector, "gains": dict(signature.gains)},
         "unit": signature.unit,
-        "debounce": signature.debounce,
+        "joints": list(signature.joints),
+        "threshold": rule_to_dict(signature.rule),
+        "safety_factor_set": asdict(signature.origin),
+        "activation": asdict(signature.activation),
         "runs": [asdict(run) for run in signature.runs],
-        "current": [item.to_dict() for item in signature.current],
-        "first": [item.to_dict() for item in signature.first],
+        "current": [fitted_to_dict(signature.rule, item) for item in signature.current],
+        "first": [fitted_to_dict(signature.rule, item) for item in signature.first],
     }
 
 
 def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
+    rule = rule_from_dict(values["threshold"])
     return SignatureFile(
         machine=str(values["machine"]["name"]),
         machine_fingerprint=str(values["machine"]["fingerprint"]),
         detector=str(values["detector"]["name"]),
         gains={str(name): _gain(value) for name, value in values["detector"]["gains"].items()},
         unit=str(values["unit"]),
-        debounce=None if values["debounce"] is None else int(values["debounce"]),
-        current=tuple(FittedSignature.from_dict(item) for item in values["current"]),
-        first=tuple(FittedSignature.from_dict(item) for item in values["first"]),
+        joints=tuple(map(str, values["joints"])),
+        rule=rule,
+        origin=FactorOrigin(**values["safety_factor_set"]),
+        activation=Activation(**values["activation"]),
+        current=tuple(fitted_from_dict(rule, item) for item in values["current"]),
+        first=tuple(fitted_from_dict(rule, item) for item in values["first"]),
         runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
         source=source,
     )

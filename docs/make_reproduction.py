@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
+from cdtool.activation import ActivationSettings
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.traces.decimation import decimate
 from cdtool.machine_file import read_machine_file
@@ -99,7 +100,7 @@ def thesis_rule(work: Path, names: Sequence[str]) -> str:
         file = work / name / "benchmark.toml"
         text = file.read_text(encoding="utf-8")
         plain = work / name / "thesis.toml"
-        settings = '[signature]\nrule = "thesis"\ndebounce = 1\n'
+        settings = '[activation]\ndebounce = 1\n\n[signature]\nrule = "thesis"\n'
         old = re.sub(r"\[impacts\.\w+\]\nlogs = .*\n", "", text)
         kept = re.search(r"\[signature\]\n((?:(?!\[|debounce).*\n)*)", old)
         old = re.sub(r"\[signature\]\n(?:(?!\[).*\n)*", "", old)
@@ -125,10 +126,12 @@ def example(work: Path, name: str, detector: str, image: str) -> None:
     """Figures 5.6 and 6.7: one detector's signal, its signature and the trigger on a stiff impact."""
     rule = Signature() if name == "gate" else Signature(sides="one", position_window=22e-3)
     joints = {"gate": (), "arm1": ("arm",), "arm2": ("forearm",)}[name]
-    debounce = None if name == "gate" else 7
+    activation: ActivationSettings = {} if name == "gate" else {"debounce": 7}
     with contextlib.chdir(work / name):  # so that the title shows a short name
         free = sorted(Path("free").iterdir())
-        learned = cdtool.learn_signature(free, "machine.toml", detector, rule=rule, joints=joints, debounce=debounce)
+        learned = cdtool.learn_signature(
+            free, "machine.toml", detector, rule=rule, joints=joints, activation=activation
+        )
         write_signature("signature.json", learned.signature)
         plot_detected(cdtool.detect("stiff/03.csv", "machine.toml", signature="signature.json"), IMAGES / image)
 

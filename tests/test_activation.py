@@ -10,6 +10,11 @@ from hypothesis import strategies as st
 from cdtool.activation import Activation
 from cdtool.detection import Band, Signal
 from cdtool.errors import UsageError
+from cdtool.motion import MotionClass
+from cdtool.operations import Operation
+from cdtool.pipeline import judge
+from cdtool.recording import Recording, Series
+from cdtool.thresholds.limit import Limit
 
 
 def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
@@ -67,9 +72,65 @@ def test_the_default_debounce_is_nine_milliseconds_of_samples():
     assert Activation(4).samples(1e-3) == 4
 
 
-def test_a_debounce_below_one_is_refused():
-    with pytest.raises(UsageError, match="debounce"):
-        Activation(0)
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"debounce": 0}, "debounce is 0"),
+        ({"rearm": -1.0}, "rearm is -1"),
+        ({"rearm": np.inf}, "rearm is inf.*latch"),
+        ({"hysteresis": 1.0}, "hysteresis is 1"),
+        ({"hysteresis": -0.1}, "hysteresis is -0.1"),
+        ({"hysteresis": np.nan}, "hysteresis is nan"),
+    ],
+)
+def test_a_wrong_setting_is_refused_by_its_name(settings, said):
+    with pytest.raises(UsageError, match=said):
+        Activation(**settings)
+
+
+def judged(values, activation):
+    """Alarms and crossings [samples] of values against -1 and 1, through a threshold as the pipeline does it."""
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    time = np.arange(len(values)) * 1e-3
+    recording = Recording("r", "r", ("a",), {"speed": Series(time, np.ones(values.shape), "m/s")})
+    signal = Signal(time, values, np.zeros(values.shape, dtype=np.uint8), "N", joints=("a",))
+    found = judge(Operation(recording, MotionClass(1, 1.0)), "d", signal, (Limit.given([1.0]),), activation).verdict
+    return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
+
+
+# Out of the band, then 0.6 s just inside it, out again, 0.6 s far inside, and out once more.
+DWELLING = [2.0] * 5 + [0.9] * 600 + [2.0] * 5 + [0.1] * 600 + [2.0] * 5
+
+
+def test_with_hysteresis_a_signal_that_dwells_at_its_limit_is_one_alarm():
+    assert judged(DWELLING, Activation(3)) == ([2, 607, 1212], [2, 607, 1212])
+    assert judged(DWELLING, Activation(3, hysteresis=0.2)) == ([2, 1212], [2, 607, 1212])
+    assert judged(DWELLING, Activation(3, hysteresis=0.95)) == ([2], [2, 607, 1212])
+
+
+def test_a_latched_alarm_is_the_only_one_and_hides_no_crossing():
+    assert judged(DWELLING, Activation(3, latch=True)) == ([2], [2, 607, 1212])
+
+
+def test_settings_change_only_what_they_name():
+    stored = Activation(5, 0.3, 0.2, True)
+    assert stored.changed({"debounce": 7, "rearm": None, "latch": None}) == Activation(7, 0.3, 0.2, True)
+    assert stored.changed({"latch": False, "hysteresis": 0.0}) == Activation(5, 0.3)
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 0.4, 0.9, 2.0, -0.9, -2.0]), max_size=80),
+    st.floats(0.0, 0.99),
+    st.integers(1, 4),
+)
+def test_more_hysteresis_never_makes_more_alarms_nor_other_crossings(values, hysteresis, debounce):
+    if not values:
+        return
+    plain, crossings = judged(values, Activation(debounce, 0.005))
+    calmer, same = judged(values, Activation(debounce, 0.005, hysteresis))
+    latched, _ = judged(values, Activation(debounce, 0.005, latch=True))
+    assert same == crossings and set(calmer) <= set(crossings)
+    assert len(calmer) <= len(plain) and latched == crossings[:1]
 
 
 @given(st.lists(st.sampled_from([0.0, 2.0, -2.0]), max_size=60), st.integers(1, 5))

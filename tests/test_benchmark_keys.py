@@ -172,23 +172,23 @@ def read_back(folder: Path, results):
 
 
 def test_each_run_of_a_budget_is_judged_by_what_others_teach(gate, monkeypatch):
-    from cdtool.workflows import calibration
+    from cdtool.workflows import calibration, fitting
 
     taught: list[tuple[set[str], set[str]]] = []
     judge = calibration.judge
-    fit_classes = calibration.fit_classes
+    checked_fit = fitting.checked_fit
     latest: set[str] = set()
 
-    def fit(pairs, rule):
+    def fit(rule, pairs):
         nonlocal latest
         latest = {item.name for item, _ in pairs}
-        return fit_classes(pairs, rule)
+        return checked_fit(rule, pairs)
 
     def seen(operation, *others):
         taught.append(({operation.name}, latest))
         return judge(operation, *others)
 
-    monkeypatch.setattr(calibration, "fit_classes", fit)
+    monkeypatch.setattr(fitting, "checked_fit", fit)
     monkeypatch.setattr(calibration, "judge", seen)
     run(gate, 'false_alarm_budget = "1/4op"\n', HEAD, LEARN, ONSET, STIFF)
     assert len(taught) == 24 and not any(judged & learned for judged, learned in taught)

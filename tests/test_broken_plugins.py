@@ -128,7 +128,10 @@ def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_go_on(insta
 
 
 def test_a_threshold_without_a_safety_factor_is_refused(install):
-    install("class Plugin:\n    name = 'odd'\n    needs = ()\n    def fit(self, pairs): ...\n", group="thresholds")
+    install(
+        "class Plugin:\n    name = 'odd'\n    needs = ()\n    fitted = ()\n    def fit(self, pairs): ...\n",
+        group="thresholds",
+    )
     done = cdtool("list", "thresholds")
     assert done.status == 3 and "'odd' of package 'odd-things' lacks the attribute 'safety_factor'" in done.err
 
@@ -186,12 +189,63 @@ def test_a_detector_that_cannot_learn_ends_the_benchmark_with_one_line(install, 
     assert done.status == 2 and done.err.count("\n") == 1 and "detector odd fails: ZeroDivisionError" in done.err
 
 
-def test_a_program_error_is_never_the_status_of_a_broken_limit(install, tmp_path):
-    code = DETECTOR.replace(
-        "    def unit", "    safety_factor = 1.0\n    def fit(self, pairs): return 1 / 0\n    def unit"
-    )
-    install(code.replace("factor: float", "safety_factor: float"), group="thresholds")
-    path = benchmark_file(tmp_path)
+THRESHOLD = """
+from dataclasses import dataclass, replace
+from typing import ClassVar
+import numpy as np
+from cdtool.detection import Band
+from cdtool.thresholds.limit import FittedLimit
+
+class Fitted(FittedLimit):
+    def evaluate(self, recording, signal):
+        statistic, band = super().evaluate(recording, signal)
+        return statistic, band
+
+@dataclass(frozen=True)
+class Plugin:
+    safety_factor: float = 5.5
+    name: ClassVar[str] = "odd"
+    needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (Fitted,)
+
+    def fit(self, pairs):
+        return Fitted((-100.0,), (100.0,), (1.0,), (1.0,), self.safety_factor)
+"""
+
+
+def benchmark_with_threshold(folder: Path) -> Outcome:
+    path = benchmark_file(folder)
     path.write_text(path.read_text(encoding="utf-8").replace('"limit"', '"odd"'), encoding="utf-8")
-    done = cdtool("benchmark", path)
+    return cdtool("benchmark", path)
+
+
+def test_the_threshold_that_the_others_are_made_from_is_fine(install, tmp_path):
+    install(THRESHOLD, group="thresholds")
+    assert benchmark_with_threshold(tmp_path).status == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("return Fitted(", "return 1 / 0, (", "threshold odd fails: ZeroDivisionError"),
+        ("return Fitted(", "return FittedLimit(", "threshold odd makes FittedLimit, its `fitted` names Fitted"),
+        ("return statistic, band", "return 1 / 0", "threshold Fitted fails: ZeroDivisionError"),
+        ("return statistic, band", "return statistic, Band(band.lower[1:], band.upper)", "another shape"),
+        ("return statistic, band", "return statistic, Band(band.lower, band.upper + np.nan)", "gives NaN where it"),
+    ],
+)
+def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old, new, words):
+    assert THRESHOLD.count(old) == 1
+    install(THRESHOLD.replace(old, new), group="thresholds")
+    done = benchmark_with_threshold(tmp_path)
+    assert done.status == 2 and words in done.err and "docs/own-detector.md" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_path):
+    def fault(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("deep inside")
+
+    monkeypatch.setattr("cdtool.workflows.benchmark.read_benchmark_file", fault)
+    done = cdtool("benchmark", benchmark_file(tmp_path))
     assert done.status == 2 and "ZeroDivisionError" in done.err

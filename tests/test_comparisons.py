@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cdtool import benchmark, compare, simulate_gate
+from cdtool.activation import Activation
 from cdtool.evaluation.results import Results
 from cdtool.workflows.benchmark_file import read_benchmark_file
 from tests.builds import MISSED, Outcome, build
@@ -25,7 +26,7 @@ def builds(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Results]:
     folder: Path = tmp_path_factory.mktemp("builds") / "gate"
     simulate_gate(folder, {"free": 10, "stiff": 30, "soft": 30}, seed=77)
     setup = read_benchmark_file(folder / "benchmark.toml")
-    made = {count: replace(setup, debounce=count) for count in (9, 14)}
+    made = {count: replace(setup, activation=Activation(count)) for count in (9, 14)}
     return {count: benchmark(item, detectors=["feekf", "gm"], jobs=2).results for count, item in made.items()}
 
 

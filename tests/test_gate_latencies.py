@@ -16,7 +16,7 @@ from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.learning import fit_signatures
+from cdtool.workflows.fitting import fit_operations
 
 REFERENCE = {
     "none": {},
@@ -34,7 +34,7 @@ def scores(gate, simulated):
     missed, false_alarms = dict.fromkeys(DETECTORS.names(), 0), dict.fromkeys(DETECTORS.names(), 0)
     for name in DETECTORS.names():
         detector = DETECTORS.load(name)()
-        fitted, _, _ = fit_signatures(learned, gate, detector, Signature())
+        fitted = fit_operations(learned, gate, detector, Signature()).thresholds
         for kind, seeds in SEEDS.items():
             latencies = []
             for seed in seeds:

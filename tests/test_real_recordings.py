@@ -15,7 +15,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.learning import fit_signatures
+from cdtool.workflows.fitting import fit_operations
 from tests.command import cdtool as run
 from tests.data_folder import DATA, needs_data
 
@@ -46,9 +46,9 @@ def test_each_emps_stroke_is_quiet_against_a_signature_of_the_others(emps, name)
     detector = machine_file.detector(name)
     for stroke in strokes:
         others = [other for other in strokes if other is not stroke]
-        fitted, _, skipped = fit_signatures(others, machine_file.machine, detector, Signature(force=True))
-        assert len(fitted) == 2 and not skipped
-        detection = detect_operation(stroke, machine_file.machine, detector, fitted, Activation())
+        fitted = fit_operations(others, machine_file.machine, detector, Signature(force=True))
+        assert len(fitted.thresholds) == 2 and not fitted.skipped
+        detection = detect_operation(stroke, machine_file.machine, detector, fitted.thresholds, Activation())
         assert detection.verdict.outcome == "no alarm", stroke.name
         assert detection.statistic.valid.mean() > 0.8
 
@@ -59,7 +59,7 @@ def test_an_added_force_on_an_emps_stroke_is_found(emps):
     machine_file, recording = emps
     strokes = operations_of(recording, "motion")
     detector = machine_file.detector("momentum")
-    fitted, _, _ = fit_signatures(strokes[1:], machine_file.machine, detector, Signature(force=True))
+    fitted = fit_operations(strokes[1:], machine_file.machine, detector, Signature(force=True)).thresholds
     torque = strokes[0].recording["torque"]
     pushed = replace(torque, values=torque.values + 60.0 * (torque.time > 1.2)[:, np.newaxis])
     channels = {**strokes[0].recording.channels, "torque": pushed}

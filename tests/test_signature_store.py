@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint
 from cdtool.signature_store import (
+    FactorOrigin,
     LearnedRun,
     SignatureFile,
     read_signature,
@@ -22,16 +24,27 @@ from cdtool.signature_store import (
 )
 from cdtool.thresholds.signature import Signature
 
+RULE = Signature(position_step=0.02, position_window=0.1)
+
 
 @pytest.fixture(scope="module")
 def learned(gate, simulated) -> SignatureFile:
     recordings = [simulated("none", seed) for seed in range(10, 22)]
-    fitted = Signature(position_step=0.02, position_window=0.1).fit(
-        [(item, Momentum().signal(item, gate)) for item in recordings]
-    )
+    fitted = RULE.fit([(item, Momentum().signal(item, gate)) for item in recordings])
     runs = tuple(LearnedRun(item.name, item.digest) for item in recordings)
     return SignatureFile(
-        "gate", fingerprint(gate), "momentum", {"bandwidth": 10.0}, "N", None, (fitted,), (fitted,), runs
+        machine="gate",
+        machine_fingerprint=fingerprint(gate),
+        detector="momentum",
+        gains={"bandwidth": 10.0},
+        unit="N",
+        joints=fitted.joints,
+        rule=RULE,
+        origin=FactorOrigin(),
+        activation=Activation(5, 0.3, 0.2, True),
+        current=(fitted,),
+        first=(fitted,),
+        runs=runs,
     )
 
 
@@ -41,9 +54,10 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     loaded = read_signature(path)
     write_signature(tmp_path / "again.json", loaded)
     assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+    assert (loaded.rule, loaded.origin, loaded.activation) == (learned.rule, learned.origin, learned.activation)
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
-    assert values["schema_version"] == 2 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+    assert values["schema_version"] == 3 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
 
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
@@ -65,7 +79,7 @@ def test_another_machine_detector_or_gain_is_refused(learned, gate):
         ("[1, 2]", "not a signature file"),
         ('{"kind": "other"}', "not a signature file"),
         ('{"kind": "cdtool signature", "schema_version": 99}', "schema_version is 99"),
-        ('{"kind": "cdtool signature", "schema_version": 2}', "damaged"),
+        ('{"kind": "cdtool signature", "schema_version": 3}', "damaged"),
         ("\x00\x01", "not a signature file"),
     ],
 )

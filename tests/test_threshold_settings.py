@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import cdtool
+from cdtool.activation import Activation
 from cdtool.errors import ConfigurationError
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
@@ -78,6 +79,32 @@ def test_what_the_signature_learns_is_set_in_its_own_table(door):
     assert rule.signature.position_step == 0.01 and rule.signature.alignment == "position"
 
 
+def test_limits_set_by_hand_stand_instead_of_what_the_runs_teach_and_results_say_so(door):
+    setup = read_benchmark_file(written(door, '[threshold]\nname = "limit"\nlimits = 50\n'))
+    assert setup.rule == Limit(limits=(50,)) and setup.limits_by_hand == (50,)
+    done = cdtool.benchmark(setup)
+    assert {row.limit for row in done.results.contacts if row.limit} == {50.0, -50.0}
+    assert done.results.provenance["safety_factor_set"] == "by hand"
+    learned = cdtool.benchmark(written(door, '[threshold]\nname = "limit"\n')).results
+    assert learned.provenance["safety_factor_set"] == "by default"
+    assert 50.0 not in {row.limit for row in learned.contacts}
+
+
+def test_results_say_in_which_unit_the_statistic_is(door):
+    units = cdtool.benchmark(written(door, 'threshold = "cusum"\n')).results.provenance["units"]
+    assert units == {"momentum": "1"}
+    units = cdtool.benchmark(written(door, 'threshold = "trend"\n')).results.provenance["units"]
+    assert units == {"momentum": "N/s"}
+
+
+def test_the_activation_has_a_table_of_its_own(door):
+    text = "[activation]\ndebounce = 4\nrearm_s = 0.3\nhysteresis = 0.2\nlatch = true\n"
+    setup = read_benchmark_file(written(door, text))
+    assert setup.activation == Activation(4, 0.3, 0.2, True)
+    provenance = cdtool.benchmark(setup).results.provenance
+    assert [provenance[key] for key in ("debounce_samples", "rearm_s", "hysteresis", "latch")] == [4, 0.3, 0.2, True]
+
+
 def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
     rule = read_benchmark_file(written(door, '[threshold]\nname = "limit"\n[signature]\nsafety_factor = 9\n')).rule
     assert rule == Limit(9.0)
@@ -96,9 +123,30 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ('[threshold]\nname = "cusum"\nsignature = "x"\n', "threshold.signature: unknown key"),
         ('[threshold]\nname = "glr"\nwindows = [0.5]\n', "threshold.windows: is .0.5.*whole numbers"),
         ('[threshold]\nname = "signature"\nsafety_factor = 3\n', r"threshold.safety_factor.*\[signature\]"),
+        ('[threshold]\nname = "limit"\nlimits = [0]\n', "threshold.name: 'limit': limits are .0"),
+        ('[threshold]\nname = "limit"\nlimits = "a"\n', "threshold.limits: is 'a'.*list of numbers"),
+        ('[threshold]\nname = "limit"\nlimits = 4\nsafety_factor = 2\n', "threshold.safety_factor.*by hand"),
+        ("[activation]\nlatched = true\n", "activation.latched: unknown key"),
+        ("[activation]\nhysteresis = 1\n", "activation.hysteresis: is 1.*below 1"),
+        ("[activation]\nrearm_s = -1\n", "activation.rearm_s: is -1"),
+        ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs to another table.*\[activation\]"),
         ('[threshold]\nname = "combined"\nmembers = ["limit"]\n', "two or more"),
     ],
 )
 def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read_benchmark_file(written(door, text))
+
+
+def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):
+    hand = '[threshold]\nname = "limit"\nlimits = 50\n'
+    file = written(door, hand)
+    file.write_text(file.read_text(encoding="utf-8").replace('["gm"]', '["gm", "pt"]'), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="set by hand beside 2 detectors"):
+        read_benchmark_file(file)
+    file = written(door, hand)
+    file.write_text('false_alarm_budget = "1/8op"\n' + file.read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="set by hand beside a false-alarm budget"):
+        read_benchmark_file(file)
+    with pytest.raises(ConfigurationError, match="set by hand"):
+        cdtool.benchmark(written(door, hand), false_alarm_budget="1/8op")

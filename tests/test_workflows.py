@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.activation import Activation
 from cdtool.errors import SignatureError, UsageError
 from cdtool.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
@@ -162,11 +163,11 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
 def test_the_signature_rule_reaches_the_file(folder):
     rule = Signature(sides="two", safety_factor=7.0, alignment="position")
     learned = cdtool.learn_signature(
-        [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", debounce=4
+        [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", activation={"debounce": 4}
     )
     fitted = learned.signature.current[0]
     assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
-    assert learned.signature.debounce == 4
+    assert learned.signature.activation == Activation(4)
 
 
 def test_what_could_not_be_judged_is_told_with_its_share(folder):

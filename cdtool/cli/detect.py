@@ -13,13 +13,16 @@ from cdtool.cli.console import leave, number, plain, print_error, print_json, pr
 from cdtool.cli.options import (
     DebounceOption,
     DetectorOption,
+    HysteresisOption,
     JointsOption,
     JsonOption,
+    LatchOption,
     LimitOption,
     MachineOption,
     OnsetAboveOption,
     OnsetBackToOption,
     OperationsOption,
+    RearmOption,
     SignatureOption,
     figure_name,
     limits_of,
@@ -50,6 +53,9 @@ def detect(
     ] = "",
     operations: OperationsOption = "whole",
     debounce: DebounceOption = None,
+    rearm: RearmOption = None,
+    hysteresis: HysteresisOption = None,
+    latch: LatchOption = None,
     onset_above: OnsetAboveOption = None,
     onset_back_to: OnsetBackToOption = None,
     plot: Annotated[
@@ -85,7 +91,7 @@ def detect(
                     limit=limits,
                     joints=listed(joints),
                     operations=operations,
-                    debounce=debounce,
+                    activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
                     onset=OnsetRule(above=onset_above, back_to=onset_back_to),
                 )
                 if contact:
@@ -112,12 +118,13 @@ def detect(
     learned = [Skipped(str(log), taught) for log, found in done if found.learned]
     print_skipped(skipped, learned)
     if as_json:
-        pairs = (
+        items = (
             (log, found, *pair) for log, found in done for pair in zip(found.detections, found.matchings, strict=True)
         )
-        print_json([_as_json(*item, forces.get(item[2].operation.name)) for item in pairs])
+        print_json([_as_json(*item, forces.get(item[2].operation.name)) for item in items])
     else:
-        _show([pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)])
+        pairs = [pair for _, found in done for pair in zip(found.detections, found.matchings, strict=True)]
+        _show(pairs, done[0][1].threshold)
         _show_not_judged([detection for _, found in done for detection in found.detections])
         _show_notes([detection for _, found in done for detection in found.detections])
         for force in list(forces.values())[:_SHOWN]:
@@ -139,13 +146,14 @@ def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
     return {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
 
 
-def _show(rows: list[tuple[Detection, Matching]]) -> None:
+def _show(rows: list[tuple[Detection, Matching]], threshold: str) -> None:
     """A row for each alarm, for each contact without one, and for each operation without either."""
     cells = [cell for detection, matching in rows for cell in _rows_of(detection, matching)]
     unit = rows[0][0].statistic.unit
     columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
-    table(columns, cells, title=rows[0][0].detector)
+    typer.echo(f"{rows[0][0].detector}: {plain(threshold)}")
+    table(columns, cells)
 
 
 def _rows_of(detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
@@ -205,6 +213,7 @@ def _as_json(
         "operation": detection.operation.name,
         "detector": detection.detector,
         "unit": detection.statistic.unit,
+        "threshold": found.threshold,
         "verdict": detection.verdict.outcome,
         "reason": detection.verdict.reason or None,
         "alarms": [

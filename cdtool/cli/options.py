@@ -24,6 +24,16 @@ DebounceOption = Annotated[
     int | None,
     typer.Option("--debounce", help="Samples in succession outside the band that raise an alarm. Default: 9 ms."),
 ]
+RearmOption = Annotated[
+    float | None, typer.Option("--rearm", help="Seconds inside the band until an alarm is armed again. Default: 0.5.")
+]
+HysteresisOption = Annotated[
+    float | None,
+    typer.Option("--hysteresis", help="Armed again only within limits of (1 - this) times the safety factor; 0 to 1."),
+]
+LatchOption = Annotated[
+    bool | None, typer.Option("--latch/--no-latch", help="An alarm stands until its operation ends.")
+]
 SignatureOption = Annotated[
     Path | None, typer.Option("--signature", "-s", help="Signature file from cdtool learn-signature.")
 ]

@@ -56,7 +56,7 @@ class Budget:
             raise UsageError(
                 f"{detector}: false-alarm budget {self} needs {counted(self.needed, f'impact-free {self.per}')} "
                 f"to be set, {digits(exposure, 4)} could be judged",
-                f"add {digits(self.needed - exposure, 4)} to [learn], or choose a larger budget",
+                f"add {digits(self.needed - exposure, 4)} to the runs learned from, or choose a larger budget",
             )
 
 

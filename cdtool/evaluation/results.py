@@ -71,7 +71,7 @@ class FalseAlarmResult:
     joint: str = meant("joint that raised it")
     time_s: float = meant("when")
     side: str | None = meant("the limit that was crossed: above or below", default=None)
-    statistic: float | None = meant("value compared with the limit, in the detector's unit", default=None)
+    statistic: float | None = meant("value compared with the limit, in the unit of provenance.units", default=None)
     limit: float | None = meant("limit, in the detector's unit", default=None)
 
 

@@ -48,7 +48,8 @@ def sweep(
         judged = met[status == Status.VALID]
         highest = float(judged.max()) if len(judged) else -np.inf
         for i in np.flatnonzero(factors < highest):
-            at, armed = crossings_of(statistic.time, met > factors[i], status, debounce, activation.rearm)
+            calm = met <= (1.0 - activation.hysteresis) * factors[i]
+            at, armed = crossings_of(statistic.time, met > factors[i], calm, status, debounce, activation.wait)
             times = statistic.time[at]
             alone[i] += [float(time) for time in times[armed] if not belongs(time, spans)]
             for column, (contact, opens, closes) in zip(order, spans, strict=True):
@@ -56,7 +57,7 @@ def sweep(
                 if len(inside):
                     late = max(float(inside[0]) - contact.start, 0.0)
                     latency[i, column] = np.fmin(latency[i, column], late)
-    counts = [len(one_an_event(times, activation.rearm)) for times in alone]
+    counts = [len(one_an_event(times, activation.wait)) for times in alone]
     return Swept(np.array(counts, dtype=np.int64), latency)
 
 

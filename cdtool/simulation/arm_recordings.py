@@ -49,6 +49,8 @@ _BENCHMARK_RULES = (
     "position_step = 2e-3             # rad of the arm",
     "position_window = 22e-3",
     'sides = "one"',
+    "",
+    "[activation]",
     "debounce = 7",
     "",
     "[onset]",

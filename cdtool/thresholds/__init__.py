@@ -18,6 +18,6 @@ THRESHOLDS = Registry(
         "glr": "cdtool.thresholds.glr:Glr",
         "combined": "cdtool.thresholds.combined:Combined",
     },
-    contract=("name", "needs", "safety_factor", "fit"),
+    contract=("name", "needs", "fitted", "safety_factor", "fit"),
     settings=(),
 )

@@ -103,6 +103,7 @@ class Adaptive:
 
     name: ClassVar[str] = "adaptive"
     needs: ClassVar[tuple[str, ...]] = ("reference_speed",)
+    fitted: ClassVar[tuple[type, ...]] = (FittedAdaptive,)
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

@@ -43,8 +43,9 @@ class FittedThreshold(Protocol):
 
 
 class Threshold(Protocol):
-    """The contract: a frozen dataclass of the rule's settings, the channels it needs, and `fit`.
+    """The contract: a frozen dataclass of the rule's settings, the channels it needs, what it makes, and `fit`.
 
+    `fitted` names the classes of which `fit` makes one: files are read back with them.
     A rule may have more: `by_class`, True where it learns each class of motion apart; what it fits then has `motion`,
     the class it serves. A field `sides` that is None becomes the machine's, a field `signature` that is None the
     benchmark file's [signature].
@@ -52,6 +53,7 @@ class Threshold(Protocol):
 
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]]
+    fitted: ClassVar[tuple[type, ...]]
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
         """Learn from impact-free runs; fitting may look at whole runs. Raises SignatureError."""

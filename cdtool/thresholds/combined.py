@@ -12,38 +12,25 @@ from cdtool.detection import Band, Signal, Status
 from cdtool.errors import UsageError
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
-from cdtool.thresholds.adaptive import Adaptive, FittedAdaptive
+from cdtool.thresholds.adaptive import Adaptive
 from cdtool.thresholds.base import FittedThreshold, exceedance
 from cdtool.thresholds.cusum import Cusum
-from cdtool.thresholds.fitted_signature import FittedSignature, known
+from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.innovation import Innovation
-from cdtool.thresholds.limit import FittedLimit, Limit
+from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.limit_and_trend import LimitAndTrend
 from cdtool.thresholds.predicted_limit import PredictedLimit
-from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import check_sides, with_context
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.statistic_limit import FittedStatisticLimit
 from cdtool.thresholds.trend import Trend
-from cdtool.thresholds.trend_table import FittedTrendTable
 
 ACTIVATIONS = ("any", "all")
 _RULES = {
     rule.name: rule
     for rule in (Signature, Limit, PredictedLimit, Trend, LimitAndTrend, Innovation, Adaptive, Cusum, Glr)
 }
-_FITTED: dict[str, Any] = {
-    fitted.__name__: fitted
-    for fitted in (
-        FittedSignature,
-        FittedLimit,
-        FittedStatisticLimit,
-        FittedTrendTable,
-        FittedSequential,
-        FittedAdaptive,
-    )
-}
+_FITTED: dict[str, Any] = {item.__name__: item for rule in _RULES.values() for item in rule.fitted}
 # Shares of a limit are cut here: a side without a limit is infinitely far away.
 _FAR = 1e3
 
@@ -118,6 +105,7 @@ class Combined:
 
     name: ClassVar[str] = "combined"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedCombined,)
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

@@ -36,6 +36,7 @@ class Cusum:
 
     name: ClassVar[str] = "cusum"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    fitted: ClassVar[tuple[type, ...]] = (FittedSequential,)
     by_class: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -32,6 +32,7 @@ class Innovation:
 
     name: ClassVar[str] = "innovation"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    fitted: ClassVar[tuple[type, ...]] = (FittedSequential,)
     by_class: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -73,16 +73,26 @@ class FittedLimit:
 class Limit:
     """Constant limits: the mean of the runs' extremes, `safety_factor` of their standard deviations further out.
 
-    Fails where friction or gravity vary along the path, where a sensor drifts, or where the speed changes.
+    `limits` set by hand, |i| < limit in the signal's unit, one for all joints or one a joint, stand instead of what the
+    runs would teach. Fails where friction or gravity vary along the path, where a sensor drifts, or where the speed
+    changes.
     """
 
     safety_factor: float = 5.5
+    limits: tuple[float, ...] = ()
 
     name: ClassVar[str] = "limit"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedLimit,)
+
+    def __post_init__(self) -> None:
+        if self.limits:
+            self.given(self.limits)  # raises UsageError for limits that are none
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
         """Limits from impact-free runs; raises SignatureError with fewer than two runs or without valid samples."""
+        if self.limits:
+            return self.given(self.limits)
         if len(pairs) < 2:
             raise SignatureError(f"a limit needs at least 2 impact-free runs, {len(pairs)} given", "add runs")
         highest, lowest = [], []

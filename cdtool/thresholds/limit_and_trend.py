@@ -37,6 +37,7 @@ class LimitAndTrend:
 
     name: ClassVar[str] = "limit_and_trend"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit, FittedTrendTable)
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

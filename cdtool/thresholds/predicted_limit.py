@@ -41,6 +41,7 @@ class PredictedLimit:
 
     name: ClassVar[str] = "predicted_limit"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit,)
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

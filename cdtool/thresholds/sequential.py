@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 from cdtool.detection import Band, Signal
@@ -12,7 +12,7 @@ from cdtool.recording import Recording
 from cdtool.thresholds.limit import FittedLimit, Limit
 from cdtool.thresholds.settings import on_side, watched_side
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.statistic_limit import loaded_rule
+from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
 from cdtool.thresholds.whitening import Whitening
 
 # No model of a higher order is learned from a few runs.
@@ -80,9 +80,8 @@ class FittedSequential:
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""
         return {
-            "rule": self.rule.name,
             # The signature's own settings are in the learned one.
-            "settings": asdict(replace(self.rule, signature=None)),  # type: ignore[type-var, call-overload]
+            **rule_to_dict(replace(self.rule, signature=None)),  # type: ignore[type-var]
             "whitening": self.whitening.to_dict(),
             "limit": self.limit.to_dict(),
             "side": self.side,
@@ -92,7 +91,7 @@ class FittedSequential:
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`."""
         return cls(
-            rule=loaded_rule(values),
+            rule=rule_from_dict(values),
             whitening=Whitening.from_dict(values["whitening"]),
             limit=FittedLimit.from_dict(values["limit"]),
             side=int(values["side"]),

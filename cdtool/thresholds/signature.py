@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -38,9 +38,9 @@ class Signature:
 
     `rule` "pooled": spread over neighbours within the window, the mean's deviation from its smoothed course included;
     "thesis": mean + 1 standard deviation, point by point, which alarms in almost every run. `sides` "one" watches the
-    side on which an obstacle opposes the motion, "two" both; None leaves it to the machine (see `for_machine`). Grid
-    and window of the position in load units (m or rad). Fails with another speed, payload or path, with temperature
-    steps, in the first metres after a long stop, with few runs.
+    side on which an obstacle opposes the motion, "two" both; None leaves it to the machine (one for an axis, two for a
+    robot). Grid and window of the position in load units (m or rad). Fails with another speed, payload or path, with
+    temperature steps, in the first metres after a long stop, with few runs.
     """
 
     safety_factor: float | None = None
@@ -53,6 +53,7 @@ class Signature:
 
     name: ClassVar[str] = "signature"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
+    fitted: ClassVar[tuple[type, ...]] = (FittedSignature,)
     by_class: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -71,10 +72,6 @@ class Signature:
         if self.safety_factor is not None:
             return self.safety_factor
         return 1.0 if self.rule == "thesis" else 5.5
-
-    def for_machine(self, default_sides: str) -> Signature:
-        """The rule with the machine's own sides where none are given: one for an axis, two for a robot."""
-        return self if self.sides else replace(self, sides=default_sides)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""

@@ -15,6 +15,7 @@ from cdtool.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.limit import FittedLimit, Limit
 from cdtool.thresholds.settings import on_side, watched_side
+from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
 
 
 class StatisticRule(Protocol):
@@ -65,8 +66,7 @@ class FittedStatisticLimit:
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""
         return {
-            "rule": self.rule.name,
-            "settings": asdict(self.rule),  # type: ignore[call-overload]
+            **rule_to_dict(self.rule),
             "limit": self.limit.to_dict(),
             "period": self.period,
             "motion": asdict(self.motion) if self.motion else None,
@@ -76,19 +76,11 @@ class FittedStatisticLimit:
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`."""
         return cls(
-            rule=loaded_rule(values),
+            rule=rule_from_dict(values),
             limit=FittedLimit.from_dict(values["limit"]),
             period=float(values["period"]),
             motion=MotionClass(**values["motion"]) if values["motion"] else None,
         )
-
-
-def loaded_rule(values: Mapping[str, Any]) -> Any:
-    """The rule that `to_dict` has written as a name and settings; JSON's lists become tuples again."""
-    from cdtool.thresholds import THRESHOLDS
-
-    settings = {name: tuple(item) if isinstance(item, list) else item for name, item in values["settings"].items()}
-    return THRESHOLDS.load(values["rule"])(**settings)
 
 
 def fit_statistic_limit(rule: StatisticRule, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit:

@@ -32,6 +32,7 @@ class Trend:
 
     name: ClassVar[str] = "trend"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit,)
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

@@ -23,11 +23,19 @@ from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors, with_only
+from cdtool.workflows.benchmark_file import (
+    HOLDOUT,
+    BenchmarkFile,
+    read_benchmark_file,
+    refuse_limits_by_hand,
+    with_detectors,
+    with_only,
+)
 from cdtool.workflows.calibration import learn_thresholds, that_can_run
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
 from cdtool.workflows.scoring import Scored, detect_with, score_log
+from cdtool.workflows.threshold_settings import set_by_hand
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,7 @@ def benchmark(
     limits = len(setup.limits)
     setup = with_detectors(setup, detectors) if detectors else setup
     setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup
+    refuse_limits_by_hand(setup)
     machine_file = setup.machine_file
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
@@ -98,7 +107,9 @@ def benchmark(
         gathered.add(group, scored)
         seconds["reading"] += scored.reading
         seconds["detecting"] += scored.detecting
-    results = gathered.results(_provenance(setup, used, learned.thresholds, learn.operations), learned.calibration)
+    provenance = _provenance(setup, used, learned.thresholds, learn.operations)
+    provenance["units"] |= gathered.units
+    results = gathered.results(provenance, learned.calibration)
     return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds)
 
 
@@ -132,7 +143,8 @@ def _provenance(
         },
         "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
         "learned_runs": [operation.name for operation in learned],
-        "debounce_samples": setup.debounce,
+        "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
+        **setup.activation.described,
         **setup.scoring,
         "false_alarm_budget": str(setup.budget) if setup.budget else None,
         "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},

@@ -20,7 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark_sections import read_budget, read_onset, read_signature, read_watched
+from cdtool.workflows.benchmark_sections import read_activation, read_budget, read_onset, read_signature, read_watched
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
 from cdtool.workflows.threshold_settings import read_threshold
 
@@ -53,7 +53,7 @@ class BenchmarkFile:
     budget: Budget | None
     signature: Signature
     rule: Any
-    debounce: int | None
+    activation: Activation
     onset: OnsetRule
     labels: Labels | None
     synchronisation: float
@@ -66,9 +66,9 @@ class BenchmarkFile:
     digest: str
 
     @property
-    def activation(self) -> Activation:
-        """Debounce and re-arming."""
-        return Activation(self.debounce)
+    def limits_by_hand(self) -> tuple[float, ...]:
+        """Limits of the signal that were set by hand; empty where they are learned."""
+        return tuple(getattr(self.rule, "limits", ()))
 
     @property
     def scoring(self) -> dict[str, Any]:
@@ -105,7 +105,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
-    signature, debounce = read_signature(root.table("signature"), machine_file.machine.default_sides)
+    signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
     learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
     force = root.table("force")
@@ -121,7 +121,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         budget=read_budget(root),
         signature=signature,
         rule=rule,
-        debounce=debounce,
+        activation=read_activation(root.table("activation")),
         labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
@@ -139,8 +139,18 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
         raise root.fault("points", "there is no force profile that they are held against", "set [force] profile")
+    refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
+    """Raise ConfigurationError where limits set by hand stand beside a budget, or beside more than one detector."""
+    if setup.limits_by_hand and (setup.budget or len(setup.detectors) > 1):
+        what = "a false-alarm budget" if setup.budget else f"{len(setup.detectors)} detectors"
+        raise ConfigurationError(
+            f"{setup.path}: threshold.limits: are set by hand beside {what}", "they belong to one detector alone"
+        )
 
 
 def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:

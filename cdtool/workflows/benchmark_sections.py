@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from cdtool.activation import Activation
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.truth.onset import OnsetRule
@@ -34,8 +35,10 @@ def read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
     return watched
 
 
-def read_signature(table: Table, default_sides: str) -> tuple[Signature, int | None]:
-    """[signature]: the rule, and the debounce in samples if it is set."""
+def read_signature(table: Table, default_sides: str) -> Signature:
+    """[signature]: the rule."""
+    if "debounce" in table:
+        raise table.fault("debounce", "belongs to another table", "write it in [activation]")
     settings: dict[str, Any] = {
         "rule": table.choice("rule", RULES, "pooled"),
         "sides": table.choice("sides", SIDES, default_sides),
@@ -46,11 +49,27 @@ def read_signature(table: Table, default_sides: str) -> tuple[Signature, int | N
     }
     if "safety_factor" in table:
         settings["safety_factor"] = table.number("safety_factor", above=0.0)
-    debounce = None
-    if "debounce" in table:
-        debounce = table.whole("debounce", 1, minimum=1)
     table.finish()
-    return Signature(**settings), debounce
+    return Signature(**settings)
+
+
+def read_activation(table: Table) -> Activation:
+    """[activation]: how an exit from the band becomes an alarm."""
+    activation = Activation(
+        debounce=table.whole("debounce", 1, minimum=1) if "debounce" in table else None,
+        rearm=table.number("rearm_s", Activation.rearm, minimum=0.0),
+        hysteresis=_share(table, "hysteresis", Activation.hysteresis),
+        latch=table.flag("latch", Activation.latch),
+    )
+    table.finish()
+    return activation
+
+
+def _share(table: Table, name: str, default: float) -> float:
+    value = table.number(name, default, minimum=0.0)
+    if value >= 1.0:
+        raise table.fault(name, f"is {value:g}", "a number from 0 to below 1 is needed")
+    return value
 
 
 def read_onset(table: Table) -> OnsetRule:

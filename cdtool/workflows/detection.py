@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cdtool.activation import Activation
+from cdtool.activation import Activation, ActivationSettings
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
+from cdtool.plain_text import digits
 from cdtool.recording import Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
@@ -24,14 +25,16 @@ from cdtool.workflows.runs import check_joints, load_operations
 class Detected:
     """A log, what the detector says of each of its operations, and the contacts where the log has ground truth.
 
-    `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `activation` is what
-    raised the alarms. `learned`: the signature was learned from this log, so that no alarm shows nothing.
+    `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `threshold` says in
+    words what was held against the signal, `activation` is what raised the alarms. `learned`: the signature was learned
+    from this log, so that no alarm shows nothing.
     """
 
     recording: Recording
     detections: tuple[Detection, ...]
     contacts: tuple[Contact, ...]
     matchings: tuple[Matching, ...]
+    threshold: str
     activation: Activation = field(default_factory=Activation)
     learned: bool = False
 
@@ -50,13 +53,14 @@ def detect(
     limit: Sequence[float] = (),
     joints: Sequence[str] = (),
     operations: str = "whole",
-    debounce: int | None = None,
+    activation: ActivationSettings | None = None,
     onset: OnsetRule | None = None,
     window: float = 1.0,
 ) -> Detected:
     """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
 
     With limits, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
+    `activation`: settings other than the signature's, or than the default's.
     Raises UsageError where neither or both are given, SignatureError where the signature does not belong,
     RecordingError where the log cannot be read.
     """
@@ -73,23 +77,26 @@ def detect(
             raise UsageError("joints belong to a limit", "a signature watches the joints that it was learned for")
         thresholds, joints = stored.current, stored.joints
         learned = {run.sha256 for run in stored.runs}
-        debounce = stored.debounce if debounce is None else debounce
+        raised_by, described = stored.activation, stored.described
     else:
         if detector is None:
             raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
         instance = machine_file.detector(detector)
         check_joints(joints, machine_file.machine)
         thresholds = (Limit.given(limit),)
-    activation = Activation(debounce)
+        raised_by = Activation()
+        described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
+    raised_by = raised_by.changed(activation or {})
     recording, parts = load_operations(Path(log), machine_file, operations)
     detections = tuple(
-        detect_operation(part, machine_file.machine, instance, thresholds, activation, joints) for part in parts
+        detect_operation(part, machine_file.machine, instance, thresholds, raised_by, joints) for part in parts
     )
     contacts = _contacts(recording, onset or OnsetRule())
     matchings = tuple(
-        match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window) for item in detections
+        match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window, rearm=raised_by.wait)
+        for item in detections
     )
-    return Detected(recording, detections, contacts, matchings, activation, recording.digest in learned)
+    return Detected(recording, detections, contacts, matchings, described, raised_by, recording.digest in learned)
 
 
 def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdtool.activation import ActivationSettings
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -36,7 +37,7 @@ def explain(
     limit: Sequence[float] = (),
     joints: Sequence[str] = (),
     operations: str = "whole",
-    debounce: int | None = None,
+    activation: ActivationSettings | None = None,
     onset: OnsetRule | None = None,
     window: float = 1.0,
 ) -> Explained:
@@ -53,7 +54,7 @@ def explain(
         limit=limit,
         joints=joints,
         operations=operations,
-        debounce=debounce,
+        activation=activation,
         onset=onset,
         window=window,
     )

@@ -39,6 +39,8 @@ class Gathering:
         self.scored: list[Scored] = []
         self.skipped: list[Skipped] = []
         self.findings: list[Skipped] = []
+        # By detector: the unit of what was held against its limits, which need not be that of its signal.
+        self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
         self._sweep = SweepRows(factors, HOLDOUT)
         self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
@@ -56,6 +58,7 @@ class Gathering:
         self._refuse_learned(scored.recording)
         for judged in scored.judged:
             for detection, matching, swept in zip(judged.detections, judged.matchings, judged.sweeps, strict=True):
+                self.units.setdefault(detection.detector, detection.statistic.unit)
                 self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
                 self._sweep.add(group, detection, swept, matching)
             _offer(self._choice, self._logs - 1, judged, self.setup.activation)

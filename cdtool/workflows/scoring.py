@@ -200,7 +200,15 @@ def _judge(
 ) -> Judged:
     window = setup.impacts[group].window
     matchings = tuple(
-        match(item.verdict, contacts, item.statistic, window, of_log=of_log, crossings=crossings[item.detector])
+        match(
+            item.verdict,
+            contacts,
+            item.statistic,
+            window,
+            of_log=of_log,
+            crossings=crossings[item.detector],
+            rearm=setup.activation.wait,
+        )
         for item in detections
     )
     sweeps = tuple(

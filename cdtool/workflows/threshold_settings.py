@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from typing import Any
 
-from cdtool.errors import UsageError
+from cdtool.errors import UsageError, nearest
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.benchmark_sections import read_signature
 
 _DEFAULT = "signature"
 
@@ -36,6 +39,8 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
     own = [item for item in fields(rule) if item.name != "signature"]
     settings = {item.name: _value(table, item) for item in own if item.name in table}
     table.finish()
+    if "limits" in settings and "safety_factor" in settings:
+        raise table.fault("safety_factor", "is given beside limits set by hand", "leave one of the two out")
     if "safety_factor" not in settings and signature.safety_factor is not None:
         settings["safety_factor"] = signature.safety_factor
     try:
@@ -44,22 +49,57 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
         raise table.fault("name", f"'{name}': {fault.message}", fault.hint) from fault
 
 
+def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Any:
+    """The rule of that name for a command line: `given` are its settings as KEY=VALUE, `signature` the signature's.
+
+    Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
+    """
+    known = THRESHOLDS.names(plugins=True)
+    if name not in known:
+        raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
+    settings = dict(_setting(text) for text in given)
+    if name == _DEFAULT:
+        return read_signature(Table({**signature, **settings}, "--set"), default_sides)
+    learned = read_signature(Table(signature, "--set"), default_sides)
+    return read_threshold(Table({"threshold": {"name": name, **settings}}, "--set"), learned)[1]
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """KEY=VALUE, the value as TOML has it; a bare word is a text."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise UsageError(f"--set is '{text}'", "KEY=VALUE, as drift=0.5; docs/thresholds.md names the keys")
+    try:
+        return name, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name, value
+
+
+def set_by_hand(rule: Any) -> bool:
+    """Whether the rule's limits, or its safety factor, are other than what it has by itself."""
+    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
+
+
 def _value(table: Table, item: Field[Any]) -> Any:
-    """A key's value, checked against the type of the field's default."""
-    default = item.default
-    if isinstance(default, bool):
-        return table.flag(item.name, default)
-    if isinstance(default, int):
-        return table.whole(item.name, default, minimum=0)
-    if isinstance(default, float):
-        return table.number(item.name, default)
-    if isinstance(default, tuple) and all(isinstance(entry, int) for entry in default):
-        return _whole_numbers(table, item.name)
-    return table.texts(item.name) if isinstance(default, tuple) else table.text(item.name)
+    """A key's value, checked against the type of the field."""
+    kind = item.type
+    if kind == "bool":
+        return table.flag(item.name, False)
+    if kind == "int":
+        return table.whole(item.name, 0, minimum=0)
+    if kind in ("float", "float | None"):
+        return table.number(item.name)
+    if kind == "tuple[int, ...]":
+        return _numbers(table, item.name, int, "a list of whole numbers is needed")
+    if kind == "tuple[float, ...]":
+        return _numbers(table, item.name, (int, float), "a list of numbers is needed")
+    return table.texts(item.name) if kind == "tuple[str, ...]" else table.text(item.name)
 
 
-def _whole_numbers(table: Table, name: str) -> tuple[int, ...]:
+def _numbers(table: Table, name: str, kind: type | tuple[type, ...], wanted: str) -> tuple[Any, ...]:
+    """A list of numbers, or one alone."""
     values = table.raw(name)
-    if not isinstance(values, list) or any(isinstance(x, bool) or not isinstance(x, int) for x in values):
-        raise table.fault(name, f"is {values!r}", "a list of whole numbers is needed")
+    values = values if isinstance(values, list) else [values]
+    if not values or any(isinstance(x, bool) or not isinstance(x, kind) for x in values):
+        raise table.fault(name, f"is {table.raw(name)!r}", wanted)
     return tuple(values)

@@ -20,7 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.learning import fit_signatures
+from cdtool.workflows.fitting import fit_operations
 
 DETECTORS = ("gm", "pt")
 RULE = Signature(force=True)
@@ -33,7 +33,7 @@ def strokes_of(path: Path, machine: MachineFile) -> list[Operation]:
 
 def judge(stroke: Operation, runs: list[Operation], machine: MachineFile, detector: Any) -> Detection:
     """What the detector says of a stroke, its normal band learned from `runs`."""
-    fitted, _, _ = fit_signatures(runs, machine.machine, detector, RULE)
+    fitted = fit_operations(runs, machine.machine, detector, RULE).thresholds
     return detect_operation(stroke, machine.machine, detector, fitted, Activation())
 
 

@@ -284,7 +284,7 @@ def test_an_impact_log_without_contact_is_left_out_by_name(gate_folder, tmp_path
         ("back_to_n = 8.0", "back_to_n = 30.0", ("onset.back_to_n", "more than above_n")),
         ("above_n", "above", ("onset.above", "above_n")),
         ("[onset]", '[signature]\nforce = "no"\n[onset]', ("signature.force", "true or false")),
-        ("[onset]", "[signature]\ndebounce = 2.6\n[onset]", ("signature.debounce", "whole number")),
+        ("[onset]", "[activation]\ndebounce = 2.6\n[onset]", ("activation.debounce", "whole number")),
         ("machine.toml", "machine.tml", ("machine.tml", "no such file")),
     ],
 )

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import cdtool.thresholds
+from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import CHANNELS, GROUND_TRUTH
+from cdtool.signature_store import FactorOrigin, SignatureFile, read_signature, write_signature
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import exceedance
 
@@ -26,7 +28,9 @@ def pairs(gate, simulated):
 
 def test_every_file_of_the_folder_with_a_threshold_is_registered():
     folder = Path(cdtool.thresholds.__file__).parent
-    helpers = {"__init__", "base", "alignment", "signature_curve", "fitted_signature"} | {
+    helpers = {"__init__", "base", "alignment", "signature_curve", "fitted_signature", "guarded_update"} | {
+        "contract",
+        "stored",
         "common_class",
         "settings",
         "stretches",
@@ -59,6 +63,31 @@ def test_a_fitted_threshold_survives_saving_and_loading(name, pairs, gate, simul
         for attribute in ("values", "status", "lower", "upper"):
             if hasattr(ours, attribute):
                 np.testing.assert_array_equal(getattr(ours, attribute), getattr(theirs, attribute))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_survives_a_signature_file_with_its_rule(name, pairs, gate, tmp_path):
+    rule = THRESHOLDS.load(name)()
+    fitted = rule.fit(pairs)
+    assert type(fitted) in rule.fitted
+    stored = SignatureFile(
+        machine="gate",
+        machine_fingerprint="x",
+        detector="momentum",
+        gains={},
+        unit="N",
+        joints=pairs[0][1].joints,
+        rule=rule,
+        origin=FactorOrigin("budget", "1/300op", 300, 0),
+        activation=Activation(),
+        current=(fitted,),
+        first=(fitted,),
+        runs=(),
+    )
+    write_signature(tmp_path / "s.json", stored)
+    loaded = read_signature(tmp_path / "s.json")
+    assert (loaded.rule, loaded.origin, loaded.threshold) == (rule, stored.origin, name)
+    assert loaded.current[0].to_dict() == fitted.to_dict() and loaded.first[0].to_dict() == fitted.to_dict()
 
 
 @pytest.mark.parametrize("name", NAMES)

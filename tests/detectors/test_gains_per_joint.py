@@ -7,13 +7,14 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import of_joint, single
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import ConfigurationError, SignatureError
 from cdtool.machine_file import fingerprint, read_machine_file
-from cdtool.signature_store import SignatureFile, read_signature, write_signature
+from cdtool.signature_store import FactorOrigin, SignatureFile, read_signature, write_signature
 from cdtool.thresholds.signature import Signature
 from tests.conftest import GATE, machine_of
 from tests.motions import moving
@@ -98,7 +99,20 @@ def test_a_signature_keeps_them_and_is_checked_against_them(tmp_path, gate, simu
     runs = [(simulated("none", seed), detector.signal(simulated("none", seed), gate)) for seed in range(10, 20)]
     fitted = Signature(position_step=0.02, position_window=0.1).fit(runs)
     gains = {"bandwidth": detector.bandwidth}
-    stored = SignatureFile("gate", fingerprint(gate), "momentum", gains, "N", None, (fitted,), (fitted,), ())
+    stored = SignatureFile(
+        machine="gate",
+        machine_fingerprint=fingerprint(gate),
+        detector="momentum",
+        gains=gains,
+        unit="N",
+        joints=fitted.joints,
+        rule=Signature(),
+        origin=FactorOrigin(),
+        activation=Activation(),
+        current=(fitted,),
+        first=(fitted,),
+        runs=(),
+    )
     write_signature(tmp_path / "s.json", stored)
     again = read_signature(tmp_path / "s.json")
     again.check(gate, detector)

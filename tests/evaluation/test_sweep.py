@@ -26,7 +26,7 @@ ACTIVATION = Activation(3, rearm=0.2)
 LIMIT = FittedLimit((0.0,), (0.0,), (1.0,), (1.0,), safety_factor=3.0)
 
 
-def detection(seed: int, factor: float = 3.0) -> Detection:
+def detection(seed: int, factor: float = 3.0, activation: Activation = ACTIVATION) -> Detection:
     """Coloured noise on two joints with contacts' steps, a gap and a stretch that is not applicable."""
     rng = np.random.default_rng(seed)
     noise = rng.normal(0.0, 0.2, (8100, 2)).cumsum(axis=0)
@@ -37,18 +37,23 @@ def detection(seed: int, factor: float = 3.0) -> Detection:
     status[1000:1050] = Status.GAP
     status[4000:4500] = Status.NOT_APPLICABLE
     signal = Signal(TIME, values, status, "N", joints=("a", "b"))
-    return judge(OPERATION, "d", signal, (LIMIT.with_safety_factor(factor),), ACTIVATION)
+    return judge(OPERATION, "d", signal, (LIMIT.with_safety_factor(factor),), activation)
 
 
+@pytest.mark.parametrize(
+    "activation",
+    [ACTIVATION, Activation(3, 0.2, hysteresis=0.4), Activation(3, latch=True)],
+    ids=["plain", "hysteresis", "latch"],
+)
 @pytest.mark.parametrize("seed", range(6))
-def test_each_step_is_what_matching_says_with_those_limits(seed):
+def test_each_step_is_what_matching_says_with_those_limits(seed, activation):
     contacts = [Contact(3.0, 3.2, 0.005), Contact(6.0, 6.1, 0.005)]
     factors = 3.0 * MULTIPLES
-    swept = sweep(detection(seed), contacts, ACTIVATION, 1.0, factors)
+    swept = sweep(detection(seed, activation=activation), contacts, activation, 1.0, factors)
     assert swept.false_alarms[0] > 0 and swept.false_alarms[-1] == 0
     for i, factor in enumerate(factors):
-        moved = detection(seed, float(factor))
-        matching = match(moved.verdict, contacts, moved.statistic, 1.0, rearm=ACTIVATION.rearm)
+        moved = detection(seed, float(factor), activation)
+        matching = match(moved.verdict, contacts, moved.statistic, 1.0, rearm=activation.wait)
         assert len(matching.false_alarms) == swept.false_alarms[i]
         np.testing.assert_allclose([item.latency for item in matching.matches], swept.latency[i])
 
@@ -152,7 +157,7 @@ def test_a_budget_tells_what_is_missing_with_all_digits():
         UsageError, match=r"budget 1/2000000op needs 2000000 impact-free operations .* 12 could be"
     ) as at:
         Budget.parse("1/2000000op").check(12.0, "gm")
-    assert "add 1999988 to [learn]" in at.value.hint
+    assert "add 1999988 to the runs learned from" in at.value.hint
     with pytest.raises(UsageError, match=r"needs 1 impact-free operation to be set, 0 could be"):
         Budget.parse("1/op").check(0.0, "gm")
     assert [str(Budget.parse(text)) for text in ("1/3op", "0.002/op", "1/8h", "2500000/h")] == [

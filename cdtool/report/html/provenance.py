@@ -17,10 +17,14 @@ _WORDS = {
     "watched_joints": "joints watched, of all",
     "threshold": "threshold",
     "signature_rule": "how the normal band is made",
+    "safety_factor_set": "safety factor or limits set",
     "false_alarm_budget": "false-alarm budget",
     "operations": "operations cut by",
     "window_s": "matching window [s]",
     "debounce_samples": "debounce [samples]",
+    "rearm_s": "armed again after [s]",
+    "hysteresis": "hysteresis, share of the safety factor",
+    "latch": "alarms latch",
     "onset": "onset of a contact",
     "label_file": "label file",
     "synchronisation_s": "synchronisation of the load cell [s]",
@@ -45,7 +49,12 @@ def provenance_tables(results: Results) -> list[Table]:
             ("what", "value"),
             [(Cell(_WORDS.get(key, shown(key))), Cell(_in_words(value))) for key, value in entries],
         ),
-        _table("gains-table", "Detectors", ("detector", "unit", "gains", "SHA-256 of its threshold"), _gains(results)),
+        _table(
+            "gains-table",
+            "Detectors",
+            ("detector", "compared in", "gains", "SHA-256 of its threshold"),
+            _gains(results),
+        ),
         _table(
             "profiles-table", "Force profiles", ("group", "profile", "limits", "source", "note"), _profiles(provenance)
         ),

@@ -26,6 +26,7 @@ class RobustLimit:
 
     name: ClassVar[str] = "robust_limit"
     needs: ClassVar[tuple[str, ...]] = ()
+    fitted: ClassVar[tuple[type, ...]] = (FittedLimit,)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
         """Limits from impact-free runs; raises SignatureError with fewer than three or without valid samples."""

@@ -1,0 +1,132 @@
+"""Fitting a threshold to impact-free runs: a detector's signals, classes of motion, what was used and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cdtool.detection import Signal
+from cdtool.errors import CdtoolError, SignatureError
+from cdtool.evaluation.results import Skipped
+from cdtool.operations import Operation
+from cdtool.pipeline import run_detector
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
+from cdtool.thresholds.contract import checked_fit
+from cdtool.thresholds.settings import with_context
+from cdtool.thresholds.signature import Signature
+
+Pair = tuple[Operation, Signal]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Fitted thresholds with the operations that each was learned from, and the operations left out."""
+
+    thresholds: tuple[FittedThreshold, ...]
+    learned_from: tuple[tuple[Operation, ...], ...]
+    skipped: tuple[Skipped, ...]
+
+    @property
+    def used(self) -> tuple[Operation, ...]:
+        """All operations that were learned from."""
+        return tuple(operation for operations in self.learned_from for operation in operations)
+
+
+Fit = Callable[[Sequence[Pair]], Fitted]
+
+
+def fitting(rule: Any) -> Fit:
+    """How that rule learns of runs: each class of motion apart where it is `by_class`, all together otherwise.
+
+    The function raises SignatureError where nothing can be learned.
+    """
+    by_class = getattr(rule, "by_class", False)
+    return lambda pairs: _fit_classes(rule, pairs) if by_class else _fit_all(rule, pairs)
+
+
+def signals_of(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    watched: Sequence[str] = (),
+    unread: Sequence[Skipped] = (),
+) -> tuple[list[Pair], list[Skipped]]:
+    """A detector's signal of each operation, and what was left out; raises SignatureError where none is left.
+
+    `unread`: what was left out before, for the reason in that error.
+    """
+    skipped: list[Skipped] = []
+    pairs: list[Pair] = []
+    for operation in operations:
+        try:
+            pairs.append((operation, run_detector(operation, machine, detector, watched)))
+        except CdtoolError as fault:
+            skipped.append(Skipped(operation.name, str(fault)))
+    if not pairs:
+        reasons = [*unread, *skipped]
+        reason = f"; first reason: {reasons[0].reason}" if reasons else ""
+        raise SignatureError(f"no run to learn {detector.name} from{reason}", "check with cdtool info")
+    return pairs, skipped
+
+
+def fit_operations(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    rule: Any,
+    unread: Sequence[Skipped] = (),
+    watched: Sequence[str] = (),
+) -> Fitted:
+    """What the rule learns of impact-free operations of a machine with a detector; raises SignatureError."""
+    pairs, skipped = signals_of(operations, machine, detector, watched, unread)
+    fitted = fitting(for_machine(rule, machine))(pairs)
+    return replace(fitted, skipped=(*skipped, *fitted.skipped))
+
+
+def for_machine(rule: Any, machine: Any) -> Any:
+    """The rule with the machine's own sides where it leaves them open, in its signature too."""
+    sides = machine.default_sides
+    return with_context(rule, sides, Signature(sides=sides))
+
+
+def by_class(pairs: Sequence[Pair]) -> list[list[Pair]]:
+    """The runs by their class of motion, in order of the first of each."""
+    classes: list[list[Pair]] = []
+    for pair in pairs:
+        for members in classes:
+            if pair[0].motion.matches(members[0][0].motion, 2.0 * SPEED_TOLERANCE):
+                members.append(pair)
+                break
+        else:
+            classes.append([pair])
+    return classes
+
+
+def _fit_all(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+    return Fitted((_fit(rule, pairs),), (tuple(operation for operation, _ in pairs),), ())
+
+
+def _fit_classes(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+    fitted: list[FittedThreshold] = []
+    used: list[tuple[Operation, ...]] = []
+    skipped: list[Skipped] = []
+    refused: list[CdtoolError] = []
+    for members in by_class(pairs):
+        try:
+            fitted.append(_fit(rule, members))
+            used.append(tuple(operation for operation, _ in members))
+        except SignatureError as fault:
+            # A stray run of another class does not stop the others; without any class to learn it is an error.
+            refused.append(fault)
+            motion = members[0][0].motion.described
+            skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]
+    if not fitted:
+        raise refused[0]
+    return Fitted(tuple(fitted), tuple(used), tuple(skipped))
+
+
+def _fit(rule: Any, pairs: Sequence[Pair]) -> FittedThreshold:
+    fitted: FittedThreshold = checked_fit(rule, [(item.recording.without_ground_truth(), each) for item, each in pairs])
+    return fitted
