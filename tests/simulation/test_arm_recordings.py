@@ -97,7 +97,8 @@ def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: 
     assert values["joints"] == [watched]
     assert values["learn"]["logs"] == ["free/*.csv"]
     assert list(values["impacts"]) == ["soft"]
-    assert values["signature"] == {"position_step": 2e-3, "position_window": 22e-3, "sides": "one", "debounce": 7}
+    assert values["signature"] == {"position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
+    assert values["activation"] == {"debounce": 7}
     assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "samples": 3}
 
 
