@@ -4,6 +4,8 @@ What a command does, a notebook does in one line:
 
     cdtool.read("run.csv", "machine.toml")                              -> Recording
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
+    cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
+    cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
@@ -35,11 +37,15 @@ if TYPE_CHECKING:
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
     from cdtool.workflows.study import study_sensors
+    from cdtool.workflows.upkeep import check_signature
+    from cdtool.workflows.upkeep import update_with_runs as update_signature
 
 _API = {
     "__version__": "cdtool.version:__version__",
     "read": "cdtool.workflows.runs:read_log",
     "learn_signature": "cdtool.workflows.learning:learn_signature",
+    "check_signature": "cdtool.workflows.upkeep:check_signature",
+    "update_signature": "cdtool.workflows.upkeep:update_with_runs",
     "detect": "cdtool.workflows.detection:detect",
     "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
@@ -55,6 +61,7 @@ _API = {
 __all__ = [
     "__version__",
     "benchmark",
+    "check_signature",
     "compare",
     "detect",
     "explain",
@@ -66,6 +73,7 @@ __all__ = [
     "simulate_arm",
     "simulate_gate",
     "study_sensors",
+    "update_signature",
 ]
 
 

@@ -152,7 +152,7 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
     machine = ("-m", folder / "machine.toml", "--operations", "motion")
     assert run("learn-signature", folder / "free.csv", *machine, "-d", "gm", "-o", path).status == 0
     first = json.loads(path.read_text())
-    done = run("learn-signature", folder / "quiet.csv", *machine, "--update", path, "--forget", 20)
+    done = run("signature", "update", path, folder / "quiet.csv", *machine, "--forget", 20)
     assert done.status == 0 and "6 runs added" in done.out
     second = json.loads(path.read_text())
     assert second["first"] == first["first"] and len(second["runs"]) == 30

@@ -22,6 +22,7 @@ from cdtool.cli.list_known import list_known
 from cdtool.cli.plan import plan
 from cdtool.cli.report import report
 from cdtool.cli.score import score
+from cdtool.cli.signature import signature
 from cdtool.cli.simulate import simulate
 from cdtool.cli.study import study
 from cdtool.errors import CdtoolError, ExitStatus
@@ -43,6 +44,7 @@ app.command("report")(report)
 app.command("score")(score)
 app.command("compare")(compare)
 app.command("plan")(plan)
+app.add_typer(signature, name="signature")
 app.add_typer(simulate, name="simulate")
 app.add_typer(study, name="study")
 app.command("list")(list_known)

@@ -81,6 +81,34 @@ def arm(
     _report(output, written, seed, as_json)
 
 
+@simulate.command("season")
+def season(
+    output: OutputOption,
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Impact-free runs, one after another.")] = 60,
+    friction_change: Annotated[
+        float, typer.Option("--friction-change", help="Share by which friction changes over the season: 0.3, -0.2.")
+    ] = 0.0,
+    obstruction_growth: Annotated[
+        float, typer.Option("--obstruction-growth", help="Resistance that grows at one place [N a run].")
+    ] = 0.0,
+    obstruction_at: Annotated[float, typer.Option("--obstruction-at", help="That place along the travel [m].")] = 0.9,
+    seed: SeedOption = 1,
+    file_format: FormatOption = "csv",
+    as_json: JsonOption = False,
+) -> None:
+    """A season of the sliding gate without impacts: friction that drifts, an obstruction that grows.
+
+    Example: cdtool simulate season --runs 60 --friction-change 0.3 -o season
+    """
+    _check_format(file_format)
+    from cdtool.simulation.season import Season, write_gate_season
+
+    wanted = Season(runs, friction_change, obstruction_growth, obstruction_at)
+    with progress("simulating") as advance:
+        written = write_gate_season(output, wanted, seed, file_format, advance)
+    _report(output, written, seed, as_json)
+
+
 def _check_format(file_format: str) -> None:
     if file_format not in _FORMATS:
         raise UsageError(f"unknown format '{file_format}'", nearest(file_format, _FORMATS))

@@ -12,7 +12,7 @@ from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_
 from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, write_folder
 from cdtool.units import UNITS
 
-__all__ = ["GROUPS", "as_recording", "write_gate_recordings"]
+__all__ = ["GROUPS", "as_recording", "gate_bench", "write_gate_recordings"]
 
 # What the fictitious drive and sensors log: motor current, revolutions, an accelerometer mounted backward.
 _TORQUE_CONSTANT = 0.56  # N m/A
@@ -69,8 +69,12 @@ def write_gate_recordings(
         rng = np.random.default_rng([seed, GROUPS.index(group), number])
         return simulate_gate_run(gate, rng, IMPACT_OF[group])
 
-    bench = Bench(simulate, _write_csv, _write_mcap, _machine_toml(gate), _BENCHMARK_SETTINGS, _BENCHMARK_RULES)
-    return write_folder(folder, counts, file_format, bench, progress)
+    return write_folder(folder, counts, file_format, gate_bench(gate, simulate), progress)
+
+
+def gate_bench(gate: GateParameters, simulate: Callable[[str, int], GateRun]) -> Bench[GateRun]:
+    """How runs of the gate are logged, whatever `simulate` makes of a group and a number."""
+    return Bench(simulate, _write_csv, _write_mcap, _machine_toml(gate), _BENCHMARK_SETTINGS, _BENCHMARK_RULES)
 
 
 def _write_csv(path: Path, run: GateRun) -> None:

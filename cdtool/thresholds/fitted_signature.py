@@ -49,7 +49,7 @@ class FittedSignature:
         if signal.joints != self.joints:
             learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
             raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
-        where = self._progress(recording, signal.time)
+        where = self.progress(recording, signal.time)
         shape = signal.values.shape
         lower, upper = np.full(shape, np.nan), np.full(shape, np.nan)
         for curve, axis, use in self._curves(where):
@@ -61,31 +61,60 @@ class FittedSignature:
 
     def limits(self, curve: Curve) -> tuple[FloatArray, FloatArray]:
         """Lower and upper limit (g, J) on a curve's grid: mean -+ k s, the side without a limit infinite."""
-        mean, spread = curve.band(pooled=self.rule == "pooled")
+        mean, spread = curve.band(self.pooled)
         reach = self.safety_factor * spread
         lower, upper = mean - reach, mean + reach
-        if self.sides == "one":
-            if self.signed and self.motion.direction < 0:
-                upper = np.where(np.isnan(upper), np.nan, np.inf)
-            else:
-                lower = np.where(np.isnan(lower), np.nan, -np.inf)
+        if self.watched < 0:
+            upper = np.where(np.isnan(upper), np.nan, np.inf)
+        elif self.watched > 0:
+            lower = np.where(np.isnan(lower), np.nan, -np.inf)
         return lower, upper
 
-    def with_run(self, recording: Recording, signal: Signal, forget: float | None = None) -> FittedSignature:
-        """The signature with one more impact-free run, by Welford's update, or by forgetting with N_eff = `forget`."""
-        where = self._progress(recording, signal.time)
-        sample = [
-            resample(signal, where, curve, axis) for curve, axis in axes_of(self.by_time, self.by_position, where)
-        ]
+    def with_run(
+        self, recording: Recording, signal: Signal, forget: float | None = None, cap: float | None = None
+    ) -> FittedSignature:
+        """The signature with one more impact-free run, by Welford's update, or by forgetting with N_eff = `forget`.
+
+        `cap`: the run counts as no further than that many spreads from the mean, place by place (see `guarded`).
+        """
+        by_time, by_position = self.samples(recording, signal)
+        if cap is not None:
+            by_time = self.by_time.clipped(by_time, cap, self.pooled)
+            by_position = self.by_position.clipped(by_position, cap, self.pooled)
         return replace(
             self,
-            by_time=self.by_time.updated(sample[0], forget),
-            by_position=self.by_position.updated(sample[1], forget),
+            by_time=self.by_time.updated(by_time, forget),
+            by_position=self.by_position.updated(by_position, forget),
         )
+
+    def without_run(self, recording: Recording, signal: Signal) -> FittedSignature:
+        """The signature as learned from all its runs but this one, on the same grid; not where runs were forgotten."""
+        by_time, by_position = self.samples(recording, signal)
+        return replace(self, by_time=self.by_time.without(by_time), by_position=self.by_position.without(by_position))
+
+    def samples(self, recording: Recording, signal: Signal) -> tuple[FloatArray, FloatArray]:
+        """One run's values on the grids of `by_time` and `by_position`, each (g, J), NaN where it has none."""
+        where = self.progress(recording, signal.time)
+        by_time, by_position = (
+            resample(signal, where, curve, axis) for curve, axis in axes_of(self.by_time, self.by_position, where)
+        )
+        return by_time, by_position
 
     def with_safety_factor(self, factor: float) -> FittedSignature:
         """The same with its limits at `factor` spreads from the mean."""
         return replace(self, safety_factor=factor)
+
+    @property
+    def watched(self) -> int:
+        """The side with a limit: +1 above, -1 below, 0 both."""
+        if self.sides == "two":
+            return 0
+        return -1 if self.signed and self.motion.direction < 0 else 1
+
+    @property
+    def pooled(self) -> bool:
+        """Whether mean and spread are those of the neighbours within the window."""
+        return self.rule == "pooled"
 
     @property
     def runs(self) -> int:
@@ -96,7 +125,7 @@ class FittedSignature:
         """True (n,) at the sample from which on travel counts instead of time: mean and spread may jump there."""
         changes = np.zeros(len(clock), dtype=bool)
         if self.alignment == "time_then_position":
-            running = self._progress(recording, clock).running
+            running = self.progress(recording, clock).running
             changes[1:] = running[1:] & ~running[:-1]
         return changes
 
@@ -131,7 +160,8 @@ class FittedSignature:
             by_position=Curve.from_dict(values["by_position"]),
         )
 
-    def _progress(self, recording: Recording, clock: FloatArray) -> Progress:
+    def progress(self, recording: Recording, clock: FloatArray) -> Progress:
+        """Where in its stroke a recording is at the times of `clock`; raises RecordingError without its channels."""
         speed = self.motion.nominal_speed
         return progress(
             recording,

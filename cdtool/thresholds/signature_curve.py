@@ -14,7 +14,7 @@ from cdtool.recording import FloatArray
 from cdtool.thresholds.alignment import Progress
 
 # A grid point has a limit once this share of the runs has been there.
-_COVERAGE = 0.8
+COVERAGE = 0.8
 # The spread is nowhere below this share of its median: a quantised signal may not vary at all at some points.
 _SMALLEST_SPREAD = 0.1
 
@@ -47,7 +47,7 @@ class Curve:
     @property
     def end(self) -> float:
         """The last grid point that enough runs have reached."""
-        covered = np.flatnonzero((self.count >= self._enough()).all(axis=1))
+        covered = np.flatnonzero((self.count >= self.enough).all(axis=1))
         return float(covered[-1] * self.step) if len(covered) else 0.0
 
     def learned(self, samples: FloatArray) -> Curve:
@@ -75,13 +75,30 @@ class Curve:
         squares = np.where(known, moved * np.maximum(self.count - 1.0, 1.0), self.squares)
         return replace(self, mean=self.mean + np.where(known, weight * deviation, 0.0), squares=squares)
 
+    def without(self, sample: FloatArray) -> Curve:
+        """Without one of the runs (g, J) that it was learned from: Welford's update undone."""
+        present = np.isfinite(sample)
+        count = self.count - present
+        deviation = np.where(present, sample - self.mean, 0.0)
+        moved = np.divide(deviation, count, out=np.zeros_like(deviation), where=count > 0)
+        mean = np.where(count > 0, self.mean - moved, 0.0)
+        squares = np.maximum(self.squares - deviation * np.where(present, sample - mean, 0.0), 0.0)
+        return replace(self, count=count, mean=mean, squares=np.where(count > 0, squares, 0.0))
+
+    def clipped(self, sample: FloatArray, cap: float, pooled: bool) -> FloatArray:
+        """One more run (g, J), no further than `cap` spreads from the mean; as it is where no spread is known yet."""
+        _, spread = self.band(pooled)
+        reach = np.where(np.isfinite(spread), cap * spread, np.inf)
+        held: FloatArray = np.clip(sample, self.mean - reach, self.mean + reach)
+        return held
+
     def band(self, pooled: bool) -> tuple[FloatArray, FloatArray]:
         """Mean and spread (g, J), NaN where too few runs have been.
 
         Pooled: the mean smoothed over the window, and the spread from the variance pooled over the window, the mean's
         deviation from its smoothed course included. Otherwise point by point.
         """
-        known = self.count >= self._enough()
+        known = self.count >= self.enough
         mean, variance = self.mean, self._variance()
         if pooled:
             reach = round(self.window / self.step)
@@ -112,8 +129,10 @@ class Curve:
         arrays = (np.array(values[name], dtype=np.float64) for name in ("count", "mean", "squares"))
         return cls(float(values["step"]), float(values["window"]), *arrays)
 
-    def _enough(self) -> float:
-        return max(2.0, math.ceil(_COVERAGE * float(self.count.max(initial=0.0))))
+    @property
+    def enough(self) -> float:
+        """How many runs a grid point needs to have a limit."""
+        return max(2.0, math.ceil(COVERAGE * float(self.count.max(initial=0.0))))
 
     def _variance(self) -> FloatArray:
         return self.squares / np.maximum(self.count - 1.0, 1.0)

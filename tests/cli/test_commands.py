@@ -161,18 +161,6 @@ def test_a_log_that_was_learned_from_is_told_and_shows_nothing(gate_folder, feek
     assert "learned from it" not in cdtool("detect", gate_folder / "holdout" / "01.csv", *machine).err
 
 
-def test_updating_adds_free_runs_and_refuses_impacts_and_repeats(gate_folder, feekf_signature, tmp_path):
-    signature = tmp_path / "s.json"
-    signature.write_bytes(feekf_signature.read_bytes())
-    machine = ("-m", gate_folder / "machine.toml")
-    logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
-    done = cdtool("learn-signature", *logs, *machine, "--update", signature)
-    assert done.status == 3 and "1 run added" in done.out
-    assert "not an impact-free run" in done.err and "in the signature already" in done.err
-    before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
-    assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
-
-
 def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path):
     results, report = tmp_path / "results.json", tmp_path / "report"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "-o", results, "-o", report)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,7 @@ from tests.command import cdtool
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate" / "machine.toml"
 STUDY = ROOT / "docs" / "examples" / "gate_study.toml"
+ARM = ROOT / "sample_logs" / "arm" / "trial_1" / "machine.toml"
 ORDER = ["load_cell", "torque_sensor", "accelerometer", "motor_position", "motor_speed", "motor_torque"]
 
 BARRIER = """
@@ -95,6 +97,72 @@ def test_a_rotary_axis_is_taken_at_the_lever_of_its_contact(barrier, tmp_path):
     assert ranked("-m", slide, "--speed", 0.5) == found
 
 
+@pytest.mark.parametrize(
+    ("key", "values", "row"),
+    [
+        ("encoder.counts_per_turn", (16384, 4096, 1024, 256), ("motor_position", "motor_speed")),
+        ("accelerometer.vibration", (0.0, 0.1, 0.4), ("accelerometer",)),
+        ("accelerometer.noise_density", (0.0, 0.003, 0.02), ("accelerometer",)),
+        ("motor_torque.noise", (1, 10, 50), ("motor_torque",)),
+    ],
+)
+def test_a_coarser_or_noisier_sensor_is_never_earlier_and_moves_no_other_row(tmp_path, key, values, row):
+    table, _, name = key.partition(".")
+    found = []
+    for value in values:
+        (tmp_path / "study.toml").write_text(f"[sensors.{table}]\n{name} = {value}\n", encoding="utf-8")
+        found.append(ranked("-m", GATE, "--study", tmp_path / "study.toml"))
+    for sensor in ORDER:
+        times = [one[sensor]["time_ms"] for one in found]
+        if sensor in row:
+            assert times == sorted(times) and times[0] < times[-1]
+        else:
+            assert len(set(times)) == 1
+
+
+def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
+    # The forearm of the simulated arm: M22 without its motor, hit 0.3 m from the elbow, is that rotary axis.
+    done = cdtool("study", "sensors", "-m", ARM, "--joint", "forearm", "--lever", 0.3)
+    assert done.status == 0
+    assert "the other joints stand: 0.06984 kg m2 at forearm, without its motor" in done.out
+    alone = tmp_path / "forearm.toml"
+    alone.write_text(
+        '[machine]\ntype = "rotary_axis"\nmotor_inertia = 1.5e-5\nload_inertia = 0.06984\n'
+        "transmission_ratio = 0.016666666666666666\nviscous_friction = 0.00011111111111111112\n",
+        encoding="utf-8",
+    )
+    same = ranked("-m", alone, "--lever", 0.3)
+    for name, found in ranked("-m", ARM, "--joint", "forearm", "--lever", 0.3).items():
+        assert found["time_ms"] == pytest.approx(same[name]["time_ms"], abs=1e-3)
+        assert found["peak_so_far_n"] == pytest.approx(same[name]["peak_so_far_n"], rel=1e-3)
+
+
+def test_a_derivative_part_and_a_force_limit_of_the_controller_count(tmp_path):
+    def with_controller(lines: str) -> Any:
+        (tmp_path / "study.toml").write_text(f"[controller]\n{lines}\n", encoding="utf-8")
+        return json.loads(cdtool("study", "sensors", "-m", GATE, "--study", tmp_path / "study.toml", "--json").out)
+
+    plain, quick, held = (with_controller(lines) for lines in ("", "derivative = 200", "force_limit = 1200"))
+    torque = {name: one["sensors"][-1] for name, one in (("plain", plain), ("quick", quick), ("held", held))}
+    assert {one["sensor"] for one in torque.values()} == {"motor_torque"}
+    assert torque["quick"]["time_ms"] < torque["plain"]["time_ms"] == pytest.approx(torque["held"]["time_ms"])
+    # Without a limit the controller presses ever harder; with it the load's own swing is the worst.
+    assert plain["peak_time_ms"] > 400.0 and held["peak_time_ms"] < 100.0
+    assert held["peak_force_n"] < 0.85 * plain["peak_force_n"]
+
+
+def test_the_first_frequency_of_the_load_says_whether_waves_matter(tmp_path):
+    (tmp_path / "study.toml").write_text("[impact]\nfirst_frequency = 18\n", encoding="utf-8")
+    done = cdtool("study", "sensors", "-m", GATE, "--study", tmp_path / "study.toml")
+    assert "waves matter: the contact lasts" in done.out and "assumed: impact.first_frequency" not in done.out
+    (tmp_path / "study.toml").write_text("[impact]\nfirst_frequency = 500\n", encoding="utf-8")
+    assert (
+        "the load counts as rigid: the contact lasts"
+        in cdtool("study", "sensors", "-m", GATE, "--study", tmp_path / "study.toml").out
+    )
+    assert "assumed: impact.first_frequency = none: the load is rigid" in cdtool("study", "sensors", "-m", GATE).out
+
+
 def test_a_figure_is_drawn(tmp_path):
     path = tmp_path / "ranking.svg"
     assert cdtool("study", "sensors", "-m", GATE, "-o", path).status == 0
@@ -124,6 +192,7 @@ def test_the_figures_of_the_thesis_are_drawn_anew(tmp_path):
         (("--study", "absent.toml"), "absent.toml: no such file"),
         (("--study", "wrong.toml"), "wrong.toml: sensors.encoder.counts: unknown key (did you mean counts_per_turn?"),
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
+        (("--study", "limit.toml"), "controller.force_limit is 5 N, steady motion takes 30 N"),
         (("--study", "negative.toml"), "negative.toml: sensors.load_cell.noise: is -1"),
         (("-o", "ranking.txt"), "ranking.txt is no name for a figure"),
     ],
@@ -132,20 +201,26 @@ def test_what_cannot_be_used_ends_with_2_and_one_line(tmp_path, monkeypatch, arg
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.toml").write_text("[sensors.encoder]\ncounts = 10\n", encoding="utf-8")
     (tmp_path / "kind.toml").write_text("impact = 3\n", encoding="utf-8")
+    (tmp_path / "limit.toml").write_text("[controller]\nforce_limit = 5\n", encoding="utf-8")
     (tmp_path / "negative.toml").write_text("[sensors.load_cell]\nnoise = -1\n", encoding="utf-8")
     done = cdtool("study", "sensors", "-m", GATE, *arguments)
     assert done.status == 2 and done.out == ""
     assert message in done.err and done.err.count("\n") == 1
 
 
-def test_a_machine_without_inertia_or_of_another_kind_is_refused(tmp_path):
+def test_a_machine_without_what_a_study_needs_is_refused(tmp_path):
     bare = tmp_path / "bare.toml"
     bare.write_text(BARRIER.format(motor=0.0), encoding="utf-8")
     done = cdtool("study", "sensors", "-m", bare)
     assert done.status == 2 and "machine.motor_inertia is missing or 0" in done.err
-    arm = ROOT / "sample_logs" / "arm" / "trial_1" / "machine.toml"
-    done = cdtool("study", "sensors", "-m", arm)
-    assert done.status == 2 and "no single axis" in done.err
+    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--joint", "elbow")
+    assert done.status == 2 and "coordinates = 'motor' with motor_inertia" in done.err
+    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "scara.toml")
+    assert done.status == 2 and "have to turn all or slide all" in done.err
+    done = cdtool("study", "sensors", "-m", ARM)
+    assert done.status == 2 and "2 joints (name one with --joint: arm, forearm)" in done.err
+    done = cdtool("study", "sensors", "-m", ARM, "--joint", "arm")
+    assert done.status == 2 and "no lever is given" in done.err
 
 
 def test_one_of_several_joints_has_to_be_named(tmp_path):
@@ -156,7 +231,7 @@ def test_one_of_several_joints_has_to_be_named(tmp_path):
         encoding="utf-8",
     )
     done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (name one: x, y)" in done.err
+    assert done.status == 2 and "2 joints (name one with --joint: x, y)" in done.err
     assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
 
 

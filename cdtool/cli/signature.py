@@ -1,0 +1,174 @@
+"""`cdtool signature show|check|update`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
+from cdtool.cli.options import JobsOption, JsonOption, MachineOption, OperationsOption, figure_name
+from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
+from cdtool.errors import ExitStatus, UsageError
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.upkeep.audit import DriftAudit
+    from cdtool.workflows.upkeep import Checked
+
+signature = typer.Typer(
+    help="Look at a signature, check it against runs, add runs to it.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+
+
+@signature.callback()
+def _signature() -> None:
+    """Look at a signature, check it against runs, add runs to it."""
+
+
+FileArgument = Annotated[Path, typer.Argument(help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")]
+PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw.")]
+
+
+@signature.command("show")
+def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = False) -> None:
+    """What a signature file holds: machine, detector, threshold, classes of motion, runs, and its drift since learned.
+
+    Example: cdtool signature show gate.feekf.json --plot signature.png
+    """
+    from cdtool.signature_store import read_signature
+
+    drawn = figure_name(plot) if plot else None
+    stored = read_signature(file)
+    if as_json:
+        print_json(file_as_json(stored))
+    else:
+        show_file(stored)
+    if drawn:
+        from cdtool.report.plots.signature_plot import plot_signature
+        from cdtool.workflows.upkeep import signatures_in
+
+        pairs = signatures_in(stored)
+        plot_signature(
+            [current for current, _ in pairs], [first for _, first in pairs], stored.unit, stored.detector, drawn
+        )
+        if not as_json:
+            typer.echo(f"plot written to {plain(drawn)}")
+
+
+@signature.command("check")
+def check(
+    file: FileArgument,
+    logs: Annotated[
+        list[Path],
+        typer.Argument(help="Impact-free recordings: those learned from, and those since, in order.", metavar="LOG..."),
+    ],
+    machine: MachineOption,
+    operations: OperationsOption = "whole",
+    target: Annotated[
+        float, typer.Option("--target", help="Chance of a false alarm in an operation that the runs have to show.")
+    ] = 1e-3,
+    plot: Annotated[
+        Path | None,
+        typer.Option("--plot", help="PNG, SVG or PDF of the drift; a folder for several classes."),
+    ] = None,
+    jobs: JobsOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Do the runs that a signature was learned from suffice, and has the machine drifted since? Learn again, or not?
+
+    Runs that are in the signature are judged by all the others (leave one out); others are taken as a season, in the
+    order given.
+
+    Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
+    """
+    from cdtool.workflows.upkeep import check_signature
+
+    with progress("reading runs") as advance:
+        checked = check_signature(
+            file, logs, machine, operations=operations, target=target, jobs=jobs, progress=advance
+        )
+    names = _plot_names(plot, checked)
+    print_skipped(checked.skipped, checked.findings)
+    if as_json:
+        print_json(checked_as_json(checked))
+    else:
+        for item in checked.classes:
+            show_class(item)
+    for path, audit in names:
+        from cdtool.report.plots.drift_plot import plot_drift
+
+        plot_drift(audit, path)
+        if not as_json:
+            typer.echo(f"plot written to {plain(path)}")
+    if all(item.coverage is None and item.drift is None for item in checked.classes):
+        raise typer.Exit(ExitStatus.UNUSABLE)
+    leave(checked.skipped)
+
+
+@signature.command("update")
+def update(
+    file: FileArgument,
+    logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings to add.", metavar="LOG...")],
+    machine: MachineOption,
+    operations: OperationsOption = "whole",
+    forget: Annotated[
+        float | None, typer.Option("--forget", help="Forget old runs: effective number of runs, 20 to 50.")
+    ] = None,
+    cap: Annotated[
+        float | None, typer.Option("--cap", help="A run's deviation counts up to this many spreads.")
+    ] = None,
+    reserve: Annotated[
+        float | None, typer.Option("--reserve", help="Spreads that a limit may move from where it was first learned.")
+    ] = None,
+    jobs: JobsOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Add impact-free runs to a signature, without learning a fault that grows slowly.
+
+    Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
+    """
+    from cdtool.thresholds.guarded_update import CAP, RESERVE
+    from cdtool.workflows.upkeep import update_with_runs
+
+    with progress("reading runs") as advance:
+        done = update_with_runs(
+            file,
+            logs,
+            machine,
+            operations=operations,
+            forget=forget,
+            cap=CAP if cap is None else cap,
+            reserve=RESERVE if reserve is None else reserve,
+            jobs=jobs,
+            progress=advance,
+        )
+    print_skipped(done.refused)
+    if as_json:
+        reasons = [{"recording": item.recording, "reason": item.reason} for item in done.refused]
+        print_json({"file": str(file), "added": list(done.added), "refused": reasons})
+    else:
+        many = "run" if len(done.added) == 1 else "runs"
+        counts = f"{len(done.refused)} refused; {len(done.file.runs)} in all"
+        typer.echo(f"{len(done.added)} {many} added to {plain(file)}, {counts}")
+    if not done.added:
+        raise typer.Exit(ExitStatus.UNUSABLE)
+    leave(done.refused)
+
+
+def _plot_names(plot: Path | None, checked: Checked) -> list[tuple[Path, DriftAudit]]:
+    """The figure of each class that has a season; raises UsageError where the name fits none."""
+    audits = [item.drift for item in checked.classes if item.drift]
+    if plot is None:
+        return []
+    if not audits:
+        raise UsageError(
+            "--plot shows the drift over a season: no log is new", "give logs that are not in the signature"
+        )
+    if plot.is_dir():
+        return [(plot / f"drift_{number}.png", audit) for number, audit in enumerate(audits, 1)]
+    if len(audits) > 1:
+        raise UsageError(f"--plot is one file for {len(audits)} classes of motion", "give an existing folder")
+    return [(figure_name(plot), audits[0])]

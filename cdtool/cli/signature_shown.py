@@ -1,0 +1,171 @@
+"""What `cdtool signature` shows: a stored file, and what a check of it found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cdtool.cli.console import number, plain, table
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.upkeep.coverage import Coverage
+    from cdtool.evaluation.upkeep.audit import DriftAudit
+    from cdtool.signature_store import SignatureFile
+    from cdtool.workflows.upkeep import Checked, CheckedClass
+
+# Rows of a table, and stretches, that are shown; --json has all.
+_SHOWN = 12
+
+
+def show_file(stored: SignatureFile) -> None:
+    """What a signature file holds, as lines and a table."""
+    from cdtool.evaluation.upkeep.summary import summarise_signature
+    from cdtool.thresholds.fitted_signature import FittedSignature
+
+    gains = ", ".join(f"{name} {value}" for name, value in stored.gains.items()) or "none"
+    typer.echo(f"machine: {plain(stored.machine)}")
+    typer.echo(f"detector: {plain(stored.detector)}, gains: {plain(gains)}; unit {plain(stored.unit)}")
+    typer.echo(f"threshold: {plain(stored.described)}")
+    typer.echo(f"activation: {_activation(stored)}")
+    typer.echo(f"joints: {plain(', '.join(stored.joints))}")
+    typer.echo(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
+    rows = []
+    for current, first in zip(stored.current, stored.first, strict=True):
+        if not (isinstance(current, FittedSignature) and isinstance(first, FittedSignature)):
+            continue
+        item = summarise_signature(current, first)
+        for joint in item.joints:
+            moved = f"{joint.moved:.2f} at {joint.moved_at:.2f} of {joint.moved_along}" if joint.moved > 0.0 else "not"
+            stroke = f"{item.travel[0]:.2f} to {item.travel[1]:.2f}"
+            grown = f"{item.runs}" if item.runs == item.first_runs else f"{item.runs} (first {item.first_runs})"
+            rows.append(
+                (item.motion.described, plain(joint.joint), grown, item.sides, stroke, number(joint.spread, 3), moved)
+            )
+    if rows:
+        columns = [("class", "left"), ("joint", "left"), ("runs", "right"), ("sides", "left")]
+        columns += [("limits from\nto, travel", "right"), (f"spread\n{stored.unit}", "right")]
+        table([*columns, ("limits moved since\nfirst learned, spreads", "right")], rows)
+
+
+def _activation(stored: SignatureFile) -> str:
+    item = stored.activation
+    debounce = "9 ms" if item.debounce is None else f"{item.debounce} samples"
+    armed = "latches" if item.latch else f"armed again after {item.rearm:g} s inside"
+    calm = f" of (1 - {item.hysteresis:g}) times the safety factor" if item.hysteresis else ""
+    return f"debounce {debounce}, {armed}{calm}"
+
+
+def file_as_json(stored: SignatureFile) -> dict[str, Any]:
+    """The same as JSON values."""
+    from cdtool.evaluation.upkeep.summary import summarise_signature
+    from cdtool.thresholds.fitted_signature import FittedSignature
+
+    pairs = zip(stored.current, stored.first, strict=True)
+    return {
+        "file": stored.source,
+        "machine": stored.machine,
+        "detector": stored.detector,
+        "gains": dict(stored.gains),
+        "unit": stored.unit,
+        "joints": list(stored.joints),
+        "threshold": stored.threshold,
+        "settings": asdict(stored.rule),
+        "safety_factor": stored.current[0].safety_factor,
+        "safety_factor_set": asdict(stored.origin),
+        "activation": asdict(stored.activation),
+        "runs": [asdict(run) for run in stored.runs],
+        "classes": [
+            asdict(summarise_signature(current, first))
+            for current, first in pairs
+            if isinstance(current, FittedSignature) and isinstance(first, FittedSignature)
+        ],
+    }
+
+
+def show_class(item: CheckedClass) -> None:
+    """What a check found of one class of motion."""
+    typer.echo(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
+    if item.coverage:
+        _show_coverage(item.coverage)
+    if item.drift:
+        _show_drift(item.drift)
+    typer.echo(f"advice: {item.advice}")
+
+
+def _show_coverage(found: Coverage) -> None:
+    factors = [run.critical_factor for run in found.runs if math.isfinite(run.critical_factor)]
+    nearest = f", the nearest at {100.0 * max(factors) / found.safety_factor:.0f} % of its limit" if factors else ""
+    judged = f"{len(found.runs)} runs, each judged by the others: {found.alarms} with an alarm{nearest}"
+    typer.echo(f"coverage: {judged}")
+    typer.echo(f"  {plain(found.verdict)}")
+    for gap in found.gaps[:_SHOWN]:
+        typer.echo(f"  no limit: {plain(gap.joint)}, {plain(gap.described)}")
+    if len(found.gaps) > _SHOWN:
+        typer.echo(f"  no limit: and {len(found.gaps) - _SHOWN} stretches more (--json has all)")
+
+
+def _show_drift(found: DriftAudit) -> None:
+    for joint in found.joints:
+        typer.echo(f"season: {len(joint.runs)} runs, {plain(joint.joint)}")
+        for verdict in joint.verdicts:
+            typer.echo(f"  {plain(verdict)}")
+        step = max(1, math.ceil(len(joint.runs) / _SHOWN))
+        rows = [
+            (
+                plain(run.name),
+                number(run.overall, 2),
+                number(run.local, 2),
+                f"{run.local_at:.2f}",
+                f"{100.0 * run.margin_used:.0f}",
+                "alarm" if run.alarm else "",
+            )
+            for run in joint.runs[::-step][::-1]
+        ]
+        columns = [("run", "left"), ("overall\nspreads", "right"), ("largest\nplace", "right"), ("at", "right")]
+        table([*columns, ("of its\nlimit %", "right"), ("", "left")], rows)
+        if step > 1:
+            typer.echo(f"every {step}th run is shown (--json has all)")
+    for name, reason in found.not_assessable:
+        typer.echo(f"  not assessable: {plain(name)}: {plain(reason)}")
+
+
+def checked_as_json(checked: Checked) -> dict[str, Any]:
+    """What a check found, as JSON values."""
+    return {
+        "file": checked.file.source,
+        "detector": checked.file.detector,
+        "classes": [
+            {
+                "motion": asdict(item.signature.motion),
+                "safety_factor": item.signature.safety_factor,
+                "coverage": _coverage_as_json(item.coverage) if item.coverage else None,
+                "drift": _drift_as_json(item.drift) if item.drift else None,
+                "advice": item.advice,
+            }
+            for item in checked.classes
+        ],
+        "skipped": [asdict(item) for item in checked.skipped],
+    }
+
+
+def _coverage_as_json(found: Coverage) -> dict[str, Any]:
+    return {**asdict(found), "alarms": found.alarms, "more_runs": found.more_runs, "verdict": found.verdict}
+
+
+def _drift_as_json(found: DriftAudit) -> dict[str, Any]:
+    return {
+        "axis": found.axis,
+        "joints": [
+            {
+                "joint": joint.joint,
+                "verdicts": list(joint.verdicts),
+                "runs_left": joint.runs_left,
+                "runs": [asdict(run) for run in joint.runs],
+            }
+            for joint in found.joints
+        ],
+        "not_assessable": [{"recording": name, "reason": reason} for name, reason in found.not_assessable],
+    }

@@ -1,0 +1,133 @@
+"""The chance that the next run goes beyond a limit, predicted from the largest values of a few runs.
+
+Conventions: `values` (n,) are maxima, one a run (critical factors, say); what is predicted is one more run of the same
+kind. The prediction holds its own uncertainty: with few runs neither mean nor spread is sure.
+
+A run's maximum is taken as the sum of two parts of equal variance: what shifts the run as a whole (normal), and the
+largest of its noise (Gumbel). Alone, the normal one promises too much, the Gumbel one far too little:
+`benchmarks/signature_coverage.py` measures all three.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import UsageError
+from cdtool.recording import FloatArray
+
+LEAST_VALUES = 3
+# Nobody makes more runs than this.
+MOST_RUNS = 1000
+
+# The Gumbel part's share of the variance.
+GUMBEL_SHARE = 0.5
+# Samples of n maxima on which a prediction rests: the fewer, the longer each is.
+_DRAWN, _FEWEST, _MOST = 2_000_000, 2_000, 20_000
+_SEED = 1
+# The distribution's tail is tabulated up to so many standard deviations.
+_TABLE = np.linspace(-12.0, 60.0, 3601)
+_NODES = 61
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of `n` maxima with that mean and standard deviation (ddof 1): what one more will do."""
+
+    n: int
+    mean: float
+    std: float
+    gumbel_share: float = GUMBEL_SHARE
+
+    def chance_above(self, limit: float) -> float:
+        """P(x > limit) = E[S(m + t s)], t = (limit - mean) / std: m, s are mean and std of n values whose tail is S.
+
+        The expectation is over samples of the standardised distribution, so that the chance is right on average
+        whatever mean and std are truly.
+        """
+        if self.std == 0.0:
+            return 0.0 if limit > self.mean else 1.0
+        return _chance((limit - self.mean) / self.std, self.n, self.gumbel_share)
+
+    def limit_for(self, chance: float) -> float:
+        """The limit that one more run exceeds with that chance: the inverse of `chance_above`."""
+        if self.std == 0.0:
+            return self.mean
+        from scipy import optimize
+
+        above = 1.0
+        while _chance(above, self.n, self.gumbel_share) > chance:
+            above *= 2.0
+        below = -1.0
+        while _chance(below, self.n, self.gumbel_share) < chance:
+            below *= 2.0
+
+        def too_much(t: float) -> float:
+            return math.log(max(_chance(t, self.n, self.gumbel_share), 1e-300) / chance)
+
+        return self.mean + self.std * float(optimize.brentq(too_much, below, above, xtol=1e-6))
+
+    def runs_for(self, limit: float, chance: float) -> int | None:
+        """The least number of runs, mean and std staying as they are, with which `chance_above` is at most `chance`.
+
+        More runs make mean and std surer, not smaller: None where even `MOST_RUNS` would not do.
+        """
+        if self.std == 0.0:
+            return LEAST_VALUES if limit > self.mean else None
+        t = (limit - self.mean) / self.std
+        if _chance(t, MOST_RUNS, self.gumbel_share) > chance:
+            return None
+        below, above = LEAST_VALUES - 1, MOST_RUNS
+        while above - below > 1:
+            middle = (above + below) // 2
+            enough = _chance(t, middle, self.gumbel_share) <= chance
+            below, above = (below, middle) if enough else (middle, above)
+        return above
+
+
+def prediction_of(values: npt.ArrayLike, gumbel_share: float = GUMBEL_SHARE) -> Prediction:
+    """What the maxima (n,) of n runs predict; raises UsageError for fewer than 3 or one that is not finite."""
+    given = np.asarray(values, dtype=np.float64)
+    if len(given) < LEAST_VALUES or not np.isfinite(given).all():
+        raise UsageError(f"{len(given)} values to predict from", f"at least {LEAST_VALUES}, all of them finite")
+    return Prediction(len(given), float(given.mean()), float(given.std(ddof=1)), gumbel_share)
+
+
+def _chance(t: float, n: int, share: float) -> float:
+    mean, std = _samples(n, share)
+    log_tail: FloatArray = np.interp(mean + t * std, _TABLE, _log_tail(share))
+    return float(np.exp(log_tail).mean())
+
+
+@cache
+def _samples(n: int, share: float) -> tuple[FloatArray, FloatArray]:
+    """Mean and standard deviation of many samples of n from the standardised distribution."""
+    rng = np.random.default_rng((_SEED, n))
+    number = int(np.clip(_DRAWN // n, _FEWEST, _MOST))
+    scale = _gumbel_scale(share)
+    drawn = scale * (rng.gumbel(size=(number, n)) - np.euler_gamma)
+    drawn += math.sqrt(1.0 - share) * rng.standard_normal((number, n))
+    return drawn.mean(axis=1), drawn.std(axis=1, ddof=1)
+
+
+@cache
+def _log_tail(share: float) -> FloatArray:
+    """ln P(x > `_TABLE`) of the standardised sum: the Gumbel tail averaged over the normal part (Gauss-Hermite)."""
+    from scipy import stats
+
+    if share == 0.0:
+        return np.asarray(stats.norm.logsf(_TABLE))
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    reduced = (_TABLE[:, np.newaxis] - math.sqrt(1.0 - share) * nodes) / _gumbel_scale(share) + np.euler_gamma
+    tail = -np.expm1(-np.exp(-reduced)) @ (weights / weights.sum())
+    log_tail: FloatArray = np.log(tail)
+    return log_tail
+
+
+def _gumbel_scale(share: float) -> float:
+    """Of a Gumbel distribution whose variance is `share`: pi^2 scale^2 / 6."""
+    return math.sqrt(6.0 * share) / math.pi

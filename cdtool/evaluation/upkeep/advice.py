@@ -1,0 +1,41 @@
+"""What to do with a signature, from what its runs and a season since say of it."""
+
+from __future__ import annotations
+
+from cdtool.evaluation.upkeep.audit import DriftAudit
+from cdtool.evaluation.upkeep.coverage import Coverage
+from cdtool.evaluation.upkeep.words import place_of
+
+
+def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
+    """What to do, in a line, the most urgent first.
+
+    A place that grows comes before everything: learned anew, an obstruction would be normal. Then drift of the whole
+    stroke, then too few runs. Alarms without a drift are left to `cdtool explain`.
+    """
+    steps = []
+    if drift is not None:
+        steps += _inspect(drift)
+        overall = [item.overall for item in drift.joints if item.overall is not None]
+        if overall:
+            steps.append("learn anew from the latest runs" if not steps else "then learn anew")
+        elif drift.alarms and not steps:
+            steps.append("look at the alarms with cdtool explain: they are no drift")
+    if coverage is not None and not coverage.enough and not any("anew" in step for step in steps):
+        steps.append(_more(coverage))
+    return "; ".join(steps) if steps else "keep the signature"
+
+
+def _inspect(drift: DriftAudit) -> list[str]:
+    places = dict.fromkeys(
+        place_of(item.local.place, drift.axis, drift.unit)
+        for item in drift.joints
+        if item.local is not None and item.local.place is not None
+    )
+    return [f"inspect the machine {' and '.join(places)} before anything is learned"] if places else []
+
+
+def _more(coverage: Coverage) -> str:
+    if coverage.more_runs is None:
+        return "raise the safety factor, or add runs and check again"
+    return f"add at least {coverage.more_runs} runs, or raise the safety factor"

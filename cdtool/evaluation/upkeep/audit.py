@@ -1,0 +1,118 @@
+"""What an audit of a season found: runs, joints, and the changes that are shown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.trends import Course
+from cdtool.evaluation.upkeep.deviation import Axis
+from cdtool.evaluation.upkeep.words import verdicts
+from cdtool.motion import MotionClass
+from cdtool.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class AuditedRun:
+    """One run and one joint: see `Deviations` for what is in spreads, and its signs.
+
+    `overall`: shift of the whole stroke. `local`: the largest one beyond it, at the place `local_at`; NaN where none is
+    valid. `critical_factor`: the safety factor at which this joint would alarm; `margin_used` is its share of the one
+    in use, 1 at an alarm. `alarm`: whether this joint does.
+    """
+
+    name: str
+    overall: float
+    local: float
+    local_at: float
+    critical_factor: float
+    margin_used: float
+    alarm: bool
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A change that is shown: its course over the runs, its place (None: all along the stroke), and what is left.
+
+    `outward`: it goes towards a limit. `runs_left`: in how many more runs a typical run alarms, should it go on;
+    infinite where it does not come nearer.
+    """
+
+    course: Course
+    place: float | None
+    outward: bool
+    runs_left: Interval
+
+
+@dataclass(frozen=True)
+class JointDrift:
+    """One joint over the season: its runs, its deviation (runs, places), and what is shown of the whole and of a place.
+
+    `course` is that of the runs' `overall`; `overall` and `local` are None where no change is shown. `deviation` is in
+    spreads, at the `places` along `axis`, in its `unit`.
+    """
+
+    joint: str
+    axis: Axis
+    unit: str
+    places: FloatArray
+    runs: tuple[AuditedRun, ...]
+    deviation: FloatArray
+    course: Course
+    overall: Shown | None
+    local: Shown | None
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """What is shown, the place first: it is to be looked at before anything is learned."""
+        return tuple(item for item in (self.local, self.overall) if item is not None)
+
+    def at_place(self, place: float) -> FloatArray:
+        """The runs' deviation (runs,) at the nearest of the places."""
+        column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
+        return column
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What the runs say, in plain words; a line each."""
+        return verdicts(self)
+
+    @property
+    def runs_left(self) -> float:
+        """In how many more runs a typical run alarms if it goes on like this; infinite where nothing comes nearer."""
+        return min((item.runs_left.value for item in self.shown), default=math.inf)
+
+
+@dataclass(frozen=True)
+class DriftAudit:
+    """Runs of one class of motion in order of time, held against one signature, which does not change meanwhile.
+
+    `places` (m,) along `axis`, in its `unit`: m or rad of travel, or s since the motion began. `not_assessable`: runs
+    that could be judged nowhere, and why; they are in no row.
+    """
+
+    motion: MotionClass
+    safety_factor: float
+    axis: Axis
+    unit: str
+    places: FloatArray
+    joints: tuple[JointDrift, ...]
+    not_assessable: tuple[tuple[str, str], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The runs that were judged."""
+        return tuple(item.name for item in self.joints[0].runs)
+
+    @property
+    def alarms(self) -> tuple[int, ...]:
+        """The runs in which any joint alarms, by their index in `names`."""
+        return tuple(i for i in range(len(self.names)) if any(joint.runs[i].alarm for joint in self.joints))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether a change of any joint is shown."""
+        return any(item.shown for item in self.joints)

@@ -1,0 +1,150 @@
+"""Were there enough runs? Each is judged by the signature of all the others, and predicts what the next will do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.detection import Signal
+from cdtool.errors import SignatureError, UsageError
+from cdtool.evaluation.statistics.prediction import LEAST_VALUES, Prediction, prediction_of
+from cdtool.evaluation.sweep import critical_factor
+from cdtool.evaluation.upkeep.gaps import NoLimit, changeover, gaps_of
+from cdtool.motion import MotionClass
+from cdtool.operations import Operation
+from cdtool.pipeline import judge
+from cdtool.plain_text import counted, digits
+from cdtool.thresholds.signature import Signature
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One run judged by the signature of all the others: the factor below which it alarms, and whether it does."""
+
+    name: str
+    critical_factor: float
+    alarm: bool
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What the runs of one class of motion say of the signature that is learned from them.
+
+    `chance`: predicted, that the next impact-free operation alarms; `target` the one that is wanted. `runs_needed`:
+    with how many runs in all it would be kept, None where no number would do; `factor_needed`: the safety factor that
+    keeps it with these runs. The last three are NaN (None) where fewer than 3 runs could be judged. `gaps`: parts of
+    the stroke without a limit.
+    """
+
+    motion: MotionClass
+    safety_factor: float
+    target: float
+    runs: tuple[LeftOut, ...]
+    not_assessable: tuple[str, ...]
+    chance: float
+    runs_needed: int | None
+    factor_needed: float
+    gaps: tuple[NoLimit, ...]
+
+    @property
+    def alarms(self) -> int:
+        """How many runs alarm with the signature of all the others."""
+        return sum(run.alarm for run in self.runs)
+
+    @property
+    def enough(self) -> bool:
+        """Whether the target is kept with the runs that there are."""
+        return self.chance <= self.target
+
+    @property
+    def more_runs(self) -> int | None:
+        """How many more runs keep the target: 0 where these do, None where no number would."""
+        if self.enough:
+            return 0
+        return None if self.runs_needed is None else max(self.runs_needed - len(self.runs), 1)
+
+    @property
+    def verdict(self) -> str:
+        """The answer in a line."""
+        if math.isnan(self.chance):
+            return (
+                f"{counted(len(self.runs), 'run')} could be judged: too few to predict from, {LEAST_VALUES} are needed"
+            )
+        expected = f"the next impact-free operation alarms with a chance of {_chance(self.chance)}"
+        if self.enough:
+            return f"enough: {expected}, {_chance(self.target)} is allowed"
+        raised = f"raise the safety factor to {_raised(self.factor_needed)}"
+        if self.more_runs is None:
+            more = "more runs like these would not do"
+            return f"{more}: {expected}, {_chance(self.target)} is allowed; {raised}, or add runs and check again"
+        return (
+            f"needs {counted(self.more_runs, 'more run')}, or {raised}: {expected}, {_chance(self.target)} is allowed"
+        )
+
+
+def check_coverage(
+    pairs: Sequence[tuple[Operation, Signal]], rule: Signature, activation: Activation, target: float = 1e-3
+) -> Coverage:
+    """Leave one run out: judge each impact-free run of a class of motion by the signature of all the others.
+
+    The critical factors of the n runs, each a run's maximum in spreads, are taken as a sample; the chance that the next
+    one is above the safety factor is predicted with the uncertainty of so small a sample (see `Prediction`). A
+    signature of n - 1 runs is less sure than one of all n: its critical factors are some 3 % larger at 14 runs and
+    not noticeably so at 40. That is not corrected, so that the chance comes out too large rather than too small.
+    "Needs more runs" assumes that the critical factors stay as they are and only become better known. Measured on
+    simulated runs by `benchmarks/signature_coverage.py`; runs that all come from one day tell nothing of other days.
+
+    `rule.sides` has to be given. Raises SignatureError where the runs are too few or differ, UsageError for a target
+    that is no chance.
+    """
+    if not 0.0 < target < 1.0:
+        raise UsageError(f"target is {target:g}", "a chance between 0 and 1, such as 0.001")
+    if len(pairs) < LEAST_VALUES:
+        raise SignatureError(
+            f"{counted(len(pairs), 'run')} to judge by the others", f"at least {LEAST_VALUES} are needed"
+        )
+    bare = [(operation.recording.without_ground_truth(), signal) for operation, signal in pairs]
+    fitted = rule.fit(bare)
+    left_out: list[LeftOut] = []
+    refused: list[str] = []
+    for (operation, signal), (recording, _) in zip(pairs, bare, strict=True):
+        detection = judge(operation, "", signal, (fitted.without_run(recording, signal),), activation)
+        critical = critical_factor(detection, activation)
+        if math.isfinite(critical):
+            left_out.append(LeftOut(operation.name, critical, detection.verdict.outcome == "alarm"))
+        else:
+            refused.append(operation.name)
+    prediction = _prediction(left_out)
+    return Coverage(
+        motion=fitted.motion,
+        safety_factor=fitted.safety_factor,
+        target=target,
+        runs=tuple(left_out),
+        not_assessable=tuple(refused),
+        chance=prediction.chance_above(fitted.safety_factor) if prediction else math.nan,
+        runs_needed=prediction.runs_for(fitted.safety_factor, target) if prediction else None,
+        factor_needed=prediction.limit_for(target) if prediction else math.nan,
+        gaps=gaps_of(fitted, changeover(fitted, bare)),
+    )
+
+
+def _prediction(runs: Sequence[LeftOut]) -> Prediction | None:
+    return prediction_of([run.critical_factor for run in runs]) if len(runs) >= LEAST_VALUES else None
+
+
+def _chance(share: float) -> str:
+    """A chance as one in so many."""
+    if share >= 0.1:
+        return f"{100.0 * share:.0f} %"
+    if share < 1e-6:
+        return "less than 1 in a million"
+    return f"1 in {digits(float(f'{1.0 / share:.2g}'))}"
+
+
+def _raised(factor: float) -> str:
+    """Rounded up to a tenth: rounded down it would not keep the target."""
+    return f"at least {np.ceil(10.0 * factor - 1e-9) / 10.0:.1f}"

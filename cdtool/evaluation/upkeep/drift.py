@@ -1,0 +1,156 @@
+"""A season of runs held against one signature: does the machine drift away from it, all along or at one place?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.activation import Activation
+from cdtool.detection import Signal
+from cdtool.errors import SignatureError
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.trends import Course, course_of, may_change
+from cdtool.evaluation.upkeep.audit import AuditedRun, DriftAudit, JointDrift, Shown
+from cdtool.evaluation.upkeep.deviation import Deviations, critical_of, deviations_of, near
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection, judge
+from cdtool.thresholds.fitted_signature import FittedSignature
+
+__all__ = ["DriftAudit", "audit_drift"]
+
+# What a place has beyond the whole stroke is its own where it changes by this share of what the whole stroke does:
+# below, it may be the shape of the friction along the track, which grows with the friction.
+_OWN_SHARE = 0.25
+
+
+def audit_drift(
+    signature: FittedSignature, pairs: Sequence[tuple[Operation, Signal]], activation: Activation
+) -> DriftAudit:
+    """Hold runs in order of time against a signature, and ask what changes from run to run.
+
+    Drift: Mann and Kendall's test, with Theil and Sen's slope; step: Pettitt's test (see `course_of`). The whole stroke
+    and its places are asked apart, each at 1 % for all joints (and places) together: of steady seasons at most 2 % show
+    something. A place is told only where it changes by more than a quarter of what the whole stroke does. With one
+    watched side a place that moves away from the limit is not told. Runs are taken as independent: a temperature that
+    wanders within a day looks like a drift. Raises SignatureError where no run can be judged.
+    """
+    detections: list[Detection] = []
+    refused: list[tuple[str, str]] = []
+    for operation, signal in pairs:
+        detection = judge(operation, "", signal, (signature,), activation)
+        if detection.verdict.outcome == "not assessable":
+            refused.append((operation.name, detection.verdict.reason))
+        else:
+            detections.append(detection)
+    if not detections:
+        reason = f"; first reason: {refused[0][1]}" if refused else ""
+        raise SignatureError(f"no run to hold against the signature{reason}", "runs of the class that was learned")
+    found = deviations_of(signature, detections)
+    unit = "s" if found.axis == "time" else detections[0].operation.recording["position"].unit
+    audited = [_Joint(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]
+    return DriftAudit(
+        signature.motion,
+        signature.safety_factor,
+        found.axis,
+        unit,
+        found.places,
+        tuple(item.drift() for item in audited),
+        tuple(refused),
+    )
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """One joint's part of an audit in the making."""
+
+    signature: FittedSignature
+    detections: Sequence[Detection]
+    activation: Activation
+    found: Deviations
+    unit: str
+    joint: int
+
+    def drift(self) -> JointDrift:
+        course = course_of(self.found.overall[:, self.joint], len(self.signature.joints))
+        return JointDrift(
+            joint=self.signature.joints[self.joint],
+            axis=self.found.axis,
+            unit=self.unit,
+            places=self.found.places,
+            runs=tuple(self._run(i) for i in range(len(self.detections))),
+            deviation=self.found.pooled[:, :, self.joint],
+            course=course,
+            overall=self._shown(course, None) if course.kind != "steady" else None,
+            local=self._local(course),
+        )
+
+    def _run(self, index: int) -> AuditedRun:
+        detection, factor = self.detections[index], self.signature.safety_factor
+        beyond = self.found.beyond[index, :, self.joint]
+        size = beyond if self.signature.watched else np.abs(beyond)
+        known = np.isfinite(size)
+        at = int(np.argmax(np.where(known, size, -np.inf))) if known.any() else -1
+        critical = critical_of(detection, self.activation, self.joint)
+        return AuditedRun(
+            name=detection.operation.name,
+            overall=float(self.found.overall[index, self.joint]),
+            local=float(beyond[at]) if at >= 0 else math.nan,
+            local_at=float(self.found.places[at]) if at >= 0 else math.nan,
+            critical_factor=critical,
+            margin_used=critical / factor,
+            alarm=any(alarm.joint == self.joint for alarm in detection.verdict.alarms),
+        )
+
+    def _local(self, overall: Course) -> Shown | None:
+        """Of the places whose change is shown and their own, the one with the largest change."""
+        beyond = self.found.beyond[:, :, self.joint]
+        comparisons = max(len(self.found.places), 1) * len(self.signature.joints)
+        best: tuple[float, float, Course] | None = None
+        for place, values in zip(self.found.places.tolist(), beyond.T, strict=True):
+            if not may_change(values, comparisons):
+                continue
+            course = course_of(values, comparisons)
+            size = course.change if self.signature.watched else abs(course.change)
+            own = size > _OWN_SHARE * abs(overall.change)
+            if course.kind != "steady" and own and size > (best[0] if best else 0.0):
+                best = (size, place, course)
+        return self._shown(best[2], best[1]) if best else None
+
+    def _shown(self, course: Course, place: float | None) -> Shown:
+        outward = course.change > 0.0
+        side = 0
+        if not self.signature.watched:
+            # Of two limits the one counts towards which the signal goes, if it is not on its way back to the middle.
+            values = self.found.overall if place is None else self.found.pooled[:, self._index(place), :]
+            last = float(np.nanmedian(values[-max(course.n // 4, 1) :, self.joint]))
+            outward = course.change * last > 0.0
+            side = 1 if course.change > 0.0 else -1
+        left = Interval(math.inf, math.inf, math.inf)
+        if course.kind == "drift" and outward:
+            left = self._runs_left(course, place, side)
+        return Shown(course, place, outward, left)
+
+    def _index(self, place: float) -> int:
+        return int(np.argmin(np.abs(self.found.places - place)))
+
+    def _runs_left(self, course: Course, place: float | None, side: int) -> Interval:
+        """(k - c) / b: the critical factor c grows by the slope b a run, from where it is after the last one."""
+        trend = course.trend
+        if trend is None:
+            return Interval(math.nan, math.nan, math.nan)
+        critical = np.array([self._critical(item, place, side) for item in self.detections])
+        runs = np.flatnonzero(np.isfinite(critical))
+        last = len(critical) - 1
+        bounds = []
+        for slope in (trend.slope.value, trend.slope.high, trend.slope.low):
+            rise = abs(slope) if slope * trend.slope.value > 0.0 else 0.0
+            now = float(np.median(critical[runs] + rise * (last - runs))) if len(runs) else math.nan
+            bounds.append(max(self.signature.safety_factor - now, 0.0) / rise if rise > 0.0 else math.inf)
+        return Interval(bounds[0], min(bounds[1:]), max(bounds[1:]), trend.slope.level)
+
+    def _critical(self, detection: Detection, place: float | None, side: int) -> float:
+        keep = None if place is None else near(self.signature, detection, place, self.found.window)
+        return critical_of(detection, self.activation, self.joint, keep, side)

@@ -1,0 +1,136 @@
+"""Updating a signature without learning a slowly growing fault: change per run capped, all changes bounded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.detection import Signal
+from cdtool.errors import SignatureError, UsageError
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.alignment import Progress
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.signature_curve import Curve
+
+# A run counts as no further from the mean than this many spreads. Of Gaussian scatter 0.3 % is clipped, so that the
+# spread comes out 0.3 % smaller than without a cap.
+CAP = 3.0
+# No limit is learned further than this many of the first spreads from where it was first learned. On the simulated
+# gate, where nothing drifts, 14 runs know the spread so badly that 2 would refuse a fifth of all runs, 3 refuse 2 %.
+RESERVE = 3.0
+# A run that covers this share of the learned stroke has completed it.
+_COMPLETE = 0.95
+
+
+def guarded(
+    first: FittedSignature,
+    current: FittedSignature,
+    recording: Recording,
+    signal: Signal,
+    forget: float | None = None,
+    cap: float = CAP,
+    reserve: float = RESERVE,
+) -> FittedSignature:
+    """`current` with one more impact-free run, unless a limit would leave the first one's neighbourhood.
+
+    The run's deviation from the mean is clipped to `cap` spreads s before Welford's update (weight w = 1 / (n + 1)) or
+    forgetting (w = 1 / `forget`): see `largest_move` for how far one run can move a limit. All updates together move
+    no limit by more than `reserve` spreads of `first`. Raises SignatureError, with the place, where they would, or
+    where the run does not complete the stroke; UsageError for a cap or reserve that is not above 0.
+    """
+    for name, value in (("cap", cap), ("reserve", reserve)):
+        if not value > 0.0:
+            raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
+    check_complete(current, recording, signal)
+    updated = current.with_run(recording, signal, forget, cap)
+    where = current.progress(recording, signal.time)
+    unit = recording["position"].unit
+    for part in _parts(first.with_safety_factor(updated.safety_factor), updated, where):
+        part.check(reserve, unit)
+    return updated
+
+
+def largest_move(safety_factor: float, weight: float, cap: float) -> float:
+    """How far one run moves a limit at most, in the largest spread near it: w c + k (sqrt((1 + 2 w c)^2 + w c^2) - 1).
+
+    `weight` w as in `guarded`, `cap` c, safety factor k. With that spread S the mean moves by at most w c S, its
+    deviation from its smoothed course by twice that, the variance by at most w (c S)^2. A run that is off by c spreads
+    or more all along moves an even limit by w c + k (sqrt((1 - w) (1 + w c^2)) - 1) where runs are forgotten.
+    """
+    shift = weight * cap
+    return shift + safety_factor * (float(np.sqrt((1.0 + 2.0 * shift) ** 2 + shift * cap)) - 1.0)
+
+
+def check_complete(signature: FittedSignature, recording: Recording, signal: Signal) -> None:
+    """Raise SignatureError, with the share that was covered, where a run ends before the stroke that was learned."""
+    where = signature.progress(recording, signal.time)
+    by_time = signature.alignment == "time"
+    reached, end = (where.elapsed, signature.by_time.end) if by_time else (where.travel, signature.by_position.end)
+    share = float(np.nanmax(reached, initial=0.0)) / end if end > 0.0 else 1.0
+    if share < _COMPLETE:
+        raise SignatureError(
+            f"covers {100.0 * share:.0f} % of the learned stroke: not completed", "update with whole strokes"
+        )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One curve's limits before and after, (g, J), where they count; `spread` is the first one's."""
+
+    axis: str
+    grid: FloatArray
+    first: tuple[FloatArray, FloatArray]
+    updated: tuple[FloatArray, FloatArray]
+    spread: FloatArray
+
+    def check(self, reserve: float, unit: str) -> None:
+        """Raise SignatureError where a limit is lost, or further than `reserve` spreads from the first one."""
+        for old, new in zip(self.first, self.updated, strict=True):
+            # Where the stroke begins and ends, how many runs have been there changes from run to run.
+            left = np.flatnonzero(~np.isnan(new).all(axis=1))
+            within = np.arange(len(new)) > (left[0] if len(left) else 0)
+            within &= np.arange(len(new)) < (left[-1] if len(left) else len(new))
+            lost = np.isfinite(old) & np.isnan(new) & within[:, np.newaxis]
+            if lost.any():
+                raise SignatureError(
+                    f"{self._place(lost, unit)} no limit would be left: too few runs are valid there",
+                    "inspect the sensors there, then learn anew",
+                )
+            known = np.isfinite(old) & np.isfinite(new)
+            moved = np.where(known, np.abs(new - np.where(known, old, 0.0)) / self.spread, 0.0)
+            if moved.max(initial=0.0) > reserve:
+                raise SignatureError(
+                    f"{self._place(moved == moved.max(), unit)} the limit would be {moved.max():.1f} spreads from the one "
+                    f"first learned, {reserve:g} are allowed",
+                    "inspect the machine there, then learn anew",
+                )
+
+    def _place(self, mask: BoolArray, unit: str) -> str:
+        at = float(self.grid[int(np.flatnonzero(mask.any(axis=1))[0])])
+        return f"at {at:.2f} {unit}" if self.axis == "travel" else f"{at:.2f} s after the motion began"
+
+
+def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) -> list[_Part]:
+    """What counts of each curve: that of time up to where this run had accelerated, that of travel from there on."""
+    running = np.flatnonzero(where.running)
+    begun = int(running[0]) if len(running) else len(where.elapsed) - 1
+    mixed = first.alignment == "time_then_position"
+    parts = []
+    if first.alignment != "position":
+        until = float(where.elapsed[begun]) if mixed else np.inf
+        parts.append(_part("time", first, updated, first.by_time, updated.by_time, (0.0, until)))
+    if first.alignment != "time":
+        since = float(where.travel[begun]) if mixed else 0.0
+        parts.append(_part("travel", first, updated, first.by_position, updated.by_position, (since, np.inf)))
+    return parts
+
+
+def _part(
+    axis: str, first: FittedSignature, updated: FittedSignature, old: Curve, new: Curve, span: tuple[float, float]
+) -> _Part:
+    use = (old.grid >= span[0]) & (old.grid <= span[1])
+    spread = old.band(first.pooled)[1]
+    old_low, old_high = (limit[use] for limit in first.limits(old))
+    new_low, new_high = (limit[use] for limit in updated.limits(new))
+    return _Part(axis, old.grid[use], (old_low, old_high), (new_low, new_high), spread[use])

@@ -1,0 +1,208 @@
+"""Keeping a signature: do its runs suffice, has the machine drifted since, and adding runs without learning a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import CdtoolError, SignatureError, UsageError
+from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.upkeep.advice import advice
+from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
+from cdtool.evaluation.upkeep.audit import DriftAudit
+from cdtool.evaluation.upkeep.drift import audit_drift
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import Operation
+from cdtool.pipeline import detect_operation, run_detector
+from cdtool.signature_store import SignatureFile, read_signature, update_signature, with_run
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.fitting import Pair, signals_of
+from cdtool.workflows.learning import learned_run
+from cdtool.workflows.runs import Progress, load_runs
+
+# The chance of a false alarm in an operation that the runs have to show.
+TARGET = 1e-3
+
+
+@dataclass(frozen=True)
+class CheckedClass:
+    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given."""
+
+    signature: FittedSignature
+    coverage: Coverage | None
+    drift: DriftAudit | None
+
+    @property
+    def advice(self) -> str:
+        """What to do, in a line."""
+        return advice(self.coverage, self.drift)
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check of a signature found, class by class, and what was left out."""
+
+    file: SignatureFile
+    classes: tuple[CheckedClass, ...]
+    skipped: tuple[Skipped, ...]
+    findings: tuple[Skipped, ...]
+
+
+@dataclass(frozen=True)
+class Updated:
+    """A signature file after an update, the runs added and those refused with the reason."""
+
+    file: SignatureFile
+    added: tuple[str, ...]
+    refused: tuple[Skipped, ...]
+
+
+def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:
+    """The current and the first signature of each class; raises SignatureError where the file holds another threshold.
+
+    What is learned afresh has no curve along the stroke that could be held against a season's runs.
+    """
+    pairs = []
+    for current, first in zip(file.current, file.first, strict=True):
+        if not (isinstance(current, FittedSignature) and isinstance(first, FittedSignature)):
+            raise SignatureError(
+                f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
+                "such a threshold is not updated run by run: learn it again with learn-signature",
+            )
+        pairs.append((current, first))
+    return tuple(pairs)
+
+
+def check_signature(
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    operations: str = "whole",
+    target: float = TARGET,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Checked:
+    """Hold a signature against impact-free logs: those that it was learned from, and those of a season since.
+
+    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is the
+    chance of a false alarm in an operation that they have to show. In the second, taken in the order given, drift is
+    looked for. Which log is which is told by its bytes. Raises SignatureError where the file does not belong or holds
+    no signature, CdtoolError where nothing can be read.
+    """
+    if not 0.0 < target < 1.0:
+        raise UsageError(f"target is {target:g}", "the chance of a false alarm in an operation, above 0 and below 1")
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    file = read_signature(path)
+    signatures = signatures_in(file)
+    detector = machine_file.detector(file.detector)
+    file.check(machine_file.machine, detector)
+    runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
+    pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
+    skipped = [*runs.skipped, *unusable]
+    known = {(run.sha256, run.operation) for run in file.runs}
+    learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
+    classes, served = [], set()
+    for current, _ in signatures:
+        own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
+        served.update(own)
+        taught, season = (
+            [pairs[i] for i in own if learned[i]],
+            [pairs[i] for i in own if not learned[i]],
+        )
+        classes.append(
+            CheckedClass(
+                current,
+                _tried(partial(check_coverage, taught, _rule_of(file, current), file.activation, target), taught, skipped),
+                _tried(partial(audit_drift, current, season, file.activation), season, skipped),
+            )
+        )
+    skipped += [
+        Skipped(item.name, f"no signature for its class: runs {item.motion.described}")
+        for i, (item, _) in enumerate(pairs)
+        if i not in served
+    ]
+    return Checked(file, tuple(classes), tuple(skipped), runs.findings)
+
+
+def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
+    """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
+    rule: Signature = replace(file.rule, safety_factor=current.safety_factor, force=True)
+    return rule
+
+
+def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
+    """What the work gives; None without runs, or where they are too few, which is named."""
+    if not pairs:
+        return None
+    try:
+        return work()
+    except SignatureError as fault:
+        skipped.append(Skipped(f"{len(pairs)} runs, {pairs[0][0].name} first", fault.message))
+        return None
+
+
+def update_with_runs(
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    operations: str = "whole",
+    forget: float | None = None,
+    cap: float = CAP,
+    reserve: float = RESERVE,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Updated:
+    """Add impact-free runs to a signature file, by Welford or by forgetting (`forget`: effective number of runs).
+
+    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
+    was first learned. Refused are such a run, one with an alarm, one that is in the signature already, one that ends
+    early, and one that cannot be assessed. Raises SignatureError where the file does not belong.
+    """
+    if forget is not None and not forget > 1.0:
+        raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    detector = machine_file.detector(read_signature(path).detector)
+    runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
+    added: list[str] = []
+    refused = list(runs.skipped)
+
+    def change(file: SignatureFile) -> SignatureFile:
+        signatures_in(file)
+        file.check(machine_file.machine, detector)
+        for operation in runs.operations:
+            try:
+                file = _with_operation(file, operation, machine_file.machine, detector, (forget, cap, reserve))
+                added.append(operation.name)
+            except CdtoolError as fault:
+                refused.append(Skipped(operation.name, str(fault)))
+        return file
+
+    return Updated(update_signature(path, change), tuple(added), tuple(refused))
+
+
+def _with_operation(
+    file: SignatureFile, operation: Operation, machine: Any, detector: Any, guard: tuple[float | None, float, float]
+) -> SignatureFile:
+    run = learned_run(operation)
+    if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in file.runs):
+        raise SignatureError("this run is in the signature already")
+    detection = detect_operation(operation, machine, detector, file.current, file.activation, file.joints)
+    if detection.verdict.outcome == "alarm":
+        raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")
+    if detection.verdict.outcome == "not assessable":
+        raise SignatureError(f"not assessable: {detection.verdict.reason}")
+    pairs = signatures_in(file)
+    index = next(i for i, (item, _) in enumerate(pairs) if item.motion.matches(operation.motion, SPEED_TOLERANCE))
+    current, first = pairs[index]
+    recording = operation.recording.without_ground_truth()
+    forget, cap, reserve = guard
+    signal = run_detector(operation, machine, detector, file.joints)
+    return with_run(file, index, guarded(first, current, recording, signal, forget, cap, reserve), run)

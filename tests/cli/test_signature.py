@@ -1,0 +1,130 @@
+"""`cdtool signature show|check|update` on a simulated gate: coverage, a season that drifts, and what is not learned."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.command import Outcome, cdtool
+
+
+@pytest.fixture(scope="module")
+def seasons(tmp_path_factory) -> Path:
+    """30 runs each: nothing changes, friction grows by half, an obstruction grows at 0.9 m."""
+    folder = tmp_path_factory.mktemp("seasons")
+    changes = {"quiet": (), "friction": ("--friction-change", 0.5), "stone": ("--obstruction-growth", 8)}
+    for name, change in changes.items():
+        done = cdtool("simulate", "season", "--runs", 30, *change, "--seed", 3, "-o", folder / name)
+        assert done.status == 0, done.err
+    return folder
+
+
+@pytest.fixture
+def signature(gate_folder, feekf_signature, tmp_path) -> Path:
+    path = tmp_path / "s.json"
+    path.write_bytes(feekf_signature.read_bytes())
+    return path
+
+
+def logs_of(folder: Path) -> list[Path]:
+    return sorted((folder / "free").glob("*.csv"))
+
+
+def check(signature: Path, gate_folder: Path, *arguments: object) -> Outcome:
+    return cdtool("signature", "check", signature, *arguments, "-m", gate_folder / "machine.toml")
+
+
+def test_show_tells_what_the_file_holds(signature, tmp_path):
+    done = cdtool("signature", "show", signature, "--plot", tmp_path / "s.png")
+    assert done.status == 0, done.err
+    for words in ("friction_ekf", "safety factor 5.5 by default", "debounce 9 ms", "forward at 0.2/s", "11"):
+        assert words in done.out, done.out
+    assert (tmp_path / "s.png").stat().st_size > 10_000
+    values = json.loads(cdtool("signature", "show", signature, "--json").out)
+    assert len(values["runs"]) == 11 and values["classes"][0]["runs"] == 11
+    assert [joint["moved"] for joint in values["classes"][0]["joints"]] == [0.0]
+
+
+def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
+    path = tmp_path / "cusum.json"
+    free = logs_of(gate_folder)
+    learned = cdtool("learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "-t", "cusum", "-o", path)
+    assert learned.status == 0 and "cusum, safety factor 15 by default" in learned.out, learned.err
+    done = cdtool("signature", "show", path)
+    assert done.status == 0 and "threshold: cusum, safety factor 15 by default" in done.out
+    refused = cdtool("signature", "update", path, *free, "-m", gate_folder / "machine.toml")
+    assert refused.status == 2 and "holds the threshold cusum, no signature" in refused.err
+
+
+def test_runs_that_were_learned_from_are_judged_by_the_others(signature, gate_folder):
+    done = check(signature, gate_folder, *logs_of(gate_folder))
+    assert done.status == 0, done.err
+    assert "11 runs, each judged by the others: 0 with an alarm" in done.out and "advice: " in done.out
+    values = json.loads(check(signature, gate_folder, *logs_of(gate_folder), "--json").out)
+    coverage = values["classes"][0]["coverage"]
+    assert len(coverage["runs"]) == 11 and 0.0 < coverage["chance"] < 0.2
+    assert values["classes"][0]["drift"] is None
+
+
+def test_a_stricter_target_needs_more_runs(signature, gate_folder):
+    found = []
+    for target in (0.2, 1e-3, 1e-5):
+        done = check(signature, gate_folder, *logs_of(gate_folder), "--target", target, "--json")
+        found.append(json.loads(done.out)["classes"][0]["coverage"])
+    assert found[0]["more_runs"] == 0
+    needed = [item["factor_needed"] for item in found]
+    assert needed == sorted(needed) and needed[0] < needed[-1]
+
+
+def test_a_quiet_season_shows_no_drift_and_a_drifting_one_says_what_and_where(signature, gate_folder, seasons, tmp_path):
+    quiet = check(signature, gate_folder, *logs_of(seasons / "quiet"))
+    assert quiet.status == 0 and "no drift shown" in quiet.out, quiet.out + quiet.err
+    picture = tmp_path / "drift.png"
+    friction = check(signature, gate_folder, *logs_of(seasons / "friction"), "--plot", picture)
+    assert "no drift shown" not in friction.out and "spreads a run" in friction.out and picture.exists()
+    stone = check(signature, gate_folder, *logs_of(seasons / "stone"))
+    assert "no drift shown" not in stone.out and "inspect" in stone.out, stone.out
+
+
+def test_an_update_adds_what_is_free_and_refuses_impacts_and_repeats(signature, gate_folder, feekf_signature):
+    logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
+    done = cdtool("signature", "update", signature, *logs, "-m", gate_folder / "machine.toml")
+    assert done.status == 3 and "1 run added" in done.out
+    assert "not an impact-free run" in done.err and "in the signature already" in done.err
+    before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
+    assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
+
+
+def test_a_growing_obstruction_is_refused_before_it_is_learned(signature, gate_folder, seasons):
+    logs = logs_of(seasons / "stone")
+    done = cdtool("signature", "update", signature, *logs, "-m", gate_folder / "machine.toml", "--forget", 20)
+    assert done.status == 3 and ("spreads from the one first learned" in done.err or "not an impact-free" in done.err)
+    last = cdtool("detect", logs[-1], "-m", gate_folder / "machine.toml", "-s", signature)
+    assert "alarm" in last.out.replace("no alarm", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--forget", 0.5), "forget is 0.5"),
+        (("--cap", 0), "cap is 0"),
+        (("--reserve", -1), "reserve is -1"),
+    ],
+)
+def test_a_wrong_guard_is_one_line(signature, gate_folder, options, said):
+    log = gate_folder / "holdout" / "01.csv"
+    done = cdtool("signature", "update", signature, log, "-m", gate_folder / "machine.toml", *options)
+    assert done.status == 2 and said in done.err, done.err
+
+
+def test_wrong_names_and_targets_are_one_line(signature, gate_folder, tmp_path):
+    free = logs_of(gate_folder)
+    assert "no such file" in cdtool("signature", "show", tmp_path / "none.json").err
+    wrong = check(signature, gate_folder, *free, "--target", 2)
+    assert wrong.status == 2 and "target is 2" in wrong.err
+    plot = check(signature, gate_folder, *free, "--plot", tmp_path / "d.png")
+    assert plot.status == 2 and "no log is new" in plot.err
+    other = cdtool("signature", "check", signature, gate_folder / "none.csv", "-m", gate_folder / "machine.toml")
+    assert other.status == 2 and other.err.count("Traceback") == 0
