@@ -80,9 +80,10 @@ def impact_momentum(d: Diagram) -> None:
 def impact_control(d: Diagram) -> None:
     """Impact under speed control.
 
-    The regulator R = K_P + K_I/s makes the control action u of the speed error, the actuator A = mu_a/(tau_a s + 1) the
-    motor torque. The contact force F_c acts, times r, against it on the machine G = 1 / (J_t s + d_t). So tau_m/F_c is
-    r L/(1 + L) with L = G R A, and u/F_c is that over A (thesis figure 4.8; 4.37 to 4.39, corrected).
+    The regulator R = K_P + K_I/s + K_D s/(T_f s + 1) makes the control action u of the speed error, the actuator
+    A = mu_a/(tau_a s + 1) the motor torque. The contact force F_c acts, times r, against it on the machine
+    G = 1 / (J_t s + d_t). So tau_m/F_c is r L/(1 + L) with L = G R A, and u/F_c is that over A (thesis figure 4.8; 4.37
+    to 4.39, corrected).
     """
     error, regulator, actuator = d.sum(17, 34, bottom="-"), d.block(30, 34, "$R(s)$", 11), d.block(48, 34, "$A(s)$", 11)
     total, machine = d.sum(64, 34, top="-"), d.block(79, 34, r"$\dfrac{1}{J_t s+d_t}$", 14, 10)

@@ -36,7 +36,7 @@ def sensors(
     speed: Annotated[float | None, typer.Option("--speed", help="Of the load at the contact [m/s].")] = None,
     stiffness: Annotated[float | None, typer.Option("--stiffness", help="Of the obstacle [N/m].")] = None,
     lever: Annotated[
-        float | None, typer.Option("--lever", help="Rotary axis: from the axis to the contact [m].")
+        float | None, typer.Option("--lever", help="Rotary axis, arm, robot: from the axis to the contact [m].")
     ] = None,
     drive_stiffness: Annotated[
         float | None, typer.Option("--drive-stiffness", help="Of the drive at the load [N/m, N m/rad].")
@@ -124,10 +124,12 @@ def _show(done: SensorStudy) -> None:
         "without the machine's own scatter"
     )
     typer.echo(
-        f"if nothing stops the drive, the force reaches {ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms "
+        f"if nobody stops the drive, the force reaches {ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms "
         f"(looked at for {1e3 * case.window:g} ms)"
     )
     typer.echo(ranking.rigidity.words)
+    if done.waves:
+        typer.echo(done.waves.words)
     for words in done.assumptions:
         typer.echo(f"assumed: {plain(words)}")
 
@@ -164,5 +166,6 @@ def _as_dict(done: SensorStudy) -> dict[str, Any]:
         "peak_force_n": ranking.peak_force,
         "peak_time_ms": 1e3 * ranking.peak_time,
         "rigidity": {"share": rigidity.share, "rigid": rigidity.rigid, "motion_ratio": rigidity.motion_ratio},
+        "waves": None if done.waves is None else {"ratio": done.waves.ratio, "warning": done.waves.warning},
         "assumptions": list(done.assumptions),
     }

@@ -16,6 +16,7 @@ from cdtool.errors import UsageError
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw, KeepsIndentation, StoresEnergy
+from cdtool.impact.effort import bounded
 from cdtool.impact.impact import Collision, Impact
 from cdtool.recording import FloatArray
 
@@ -55,7 +56,8 @@ def collide(law: ContactLaw, bodies: Bodies, contacts: int = 1, longest: float |
     where a push brings the bodies together again; the surface has then come back, but for a permanent indentation. A
     contact that passes a least penetration without a separation lasts: less and less energy is in it, and the series
     stops. `longest` is a hundred times the duration without damping, unless it is given.
-    Raises UsageError for a law without force and for numbers without meaning.
+    Raises UsageError for a law without force, for numbers without meaning, and where the damping is so large that the
+    motion lasts thousands of times as long as its quickest part.
     """
     if contacts < 1:
         raise UsageError(f"{contacts} contacts", "1 or more")
@@ -126,7 +128,7 @@ def _stretch(
 
     events = [_event(falling, -1.0)] + ([] if rising is None else [_event(rising, 1.0)])
     found: Any = solve_ivp(
-        motion, span, begin, "DOP853", events=events, dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE * size
+        bounded(motion), span, begin, "DOP853", events=events, dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE * size
     )
     met = next((i for i, times in enumerate(found.t_events) if len(times)), None)
     return _Stretch(law, found.sol, span[0], float(found.t[-1]), met)

@@ -10,7 +10,9 @@ from cdtool.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.transfer import Transfer
-from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
+from cdtool.impact.transmission import ElasticTransmission, RigidTransmission, Transmission
+
+Polynomial = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,10 @@ class ContactStiffness:
 
     stiffness: float
     damping: float
+
+
+NO_CONTACT = ContactStiffness(0.0, 0.0)
+"""Before the touch and between contacts."""
 
 
 def linearised_contact(law: ContactLaw, penetration: float, rate: float) -> ContactStiffness:
@@ -37,20 +43,25 @@ def linearised_contact(law: ContactLaw, penetration: float, rate: float) -> Cont
     )
 
 
-def free_rigid(transmission: RigidTransmission) -> Transfer:
-    """Theta/tau_m = 1 / (J_t s^2 + d_t s) [rad/(N m)] (4.8): poles 0 and -d_t/J_t, gain 1/d_t."""
-    return Transfer((1.0,), (transmission.inertia, transmission.friction, 0.0), "rad/(N m)")
+def motor_by_torque(transmission: Transmission, contact: ContactStiffness = NO_CONTACT) -> Transfer:
+    """Theta/tau_m [rad/(N m)], before the contact (4.8, 4.22) or about a state of it (4.18 with 4.16 and 4.17, 4.26).
 
-
-def rigid_in_contact(transmission: RigidTransmission, law: ContactLaw, penetration: float, rate: float) -> Transfer:
-    """Theta/tau_m = 1 / (J_t s^2 + (d_t + D) s + K) [rad/(N m)] about a state of the contact (4.18, 4.16, 4.17).
-
-    K = r^2 K_c and D = r^2 D_c. `transfer.second_order` gives wn, xi and 1/K. It is the answer to a small change of the
-    torque while the contact stays about that state; an impact of a stiff contact leaves it within its first ms.
+    Rigid: 1 / (J_t s^2 + (d_t + r^2 D_c) s + r^2 K_c); before the contact poles 0 and -d_t/J_t, gain 1/d_t; in it
+    `transfer.second_order` gives wn, xi and 1/K. Elastic: Q/(P Q - E^2/r^2) with P = J_m s^2 + d_t s + k_el,
+    E = d_el s + k_el, d_t = d_m + d_el and Q = M_l s^2 + (d_l + D_c) s + K_c + E/r^2. It is the answer to a small
+    change of the torque while the contact stays about its state; an impact of a stiff contact leaves it within 1 ms.
     """
-    contact, square = linearised_contact(law, penetration, rate), transmission.ratio**2
-    damping = transmission.friction + square * contact.damping
-    return Transfer((1.0,), (transmission.inertia, damping, square * contact.stiffness), "rad/(N m)")
+    motor, _, both = _driven(transmission, contact)
+    return Transfer(motor, both, "rad/(N m)").reduced
+
+
+def load_by_torque(transmission: Transmission, contact: ContactStiffness = NO_CONTACT) -> Transfer:
+    """X_l/tau_m [m/(N m)] = [rad/N]: rigid r Theta/tau_m (4.7), elastic (E/r)/(P Q - E^2/r^2), see `motor_by_torque`.
+
+    By reciprocity it is also -Theta/F_c, the motor's answer to a force on the load.
+    """
+    _, load, both = _driven(transmission, contact)
+    return Transfer(load, both, "m/(N m)").reduced
 
 
 def penetration_by_momentum(
@@ -65,22 +76,17 @@ def penetration_by_momentum(
     """
     require_positive("contact stiffness", contact_stiffness, "N/m")
     require_not_negative("contact damping", contact_damping, "N s/m")
-    t, square = transmission, transmission.ratio**2
-    friction, k_c, d_c = t.motor_friction + t.damping, contact_stiffness, contact_damping + t.load_friction
-    a1 = friction * k_c + d_c * t.stiffness + t.motor_friction * t.stiffness / square
-    a2 = t.motor_inertia * k_c + d_c * friction + t.stiffness * t.load_mass
-    a2 += (t.motor_inertia * t.stiffness + t.motor_friction * t.damping) / square
-    a3 = t.motor_inertia * d_c + friction * t.load_mass + t.motor_inertia * t.damping / square
-    a4, a0 = t.motor_inertia * t.load_mass, k_c * t.stiffness
-    return Transfer((t.motor_inertia, friction, t.stiffness), (a4, a3, a2, a1, a0), "m/(N s)")
+    t = transmission
+    _, _, both = _driven(t, ContactStiffness(contact_stiffness, contact_damping))
+    return Transfer((t.motor_inertia, t.motor_friction + t.damping, t.stiffness), both, "m/(N s)")
 
 
 def motor_by_penetration(transmission: ElasticTransmission) -> Transfer:
     """G_dt: Theta/delta = (1/r) (d_el s + k_el) / (J_m s^2 + d_t s + k_el) [rad/m] (4.28 corrected): gain 1/r."""
     t = transmission
     friction = t.motor_friction + t.damping
-    numerator = (t.damping / t.ratio, t.stiffness / t.ratio) if t.damping else (t.stiffness / t.ratio,)
-    return Transfer(numerator, (t.motor_inertia, friction, t.stiffness), "rad/m")
+    _, load, _ = _driven(t, NO_CONTACT)
+    return Transfer(load, (t.motor_inertia, friction, t.stiffness), "rad/m").reduced
 
 
 def undamped(transmission: ElasticTransmission) -> ElasticTransmission:
@@ -100,3 +106,21 @@ def resonances(transmission: ElasticTransmission, contact_stiffness: float) -> t
     # Without cancellation: the larger root first, the smaller from their product.
     upper = (b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
     return float(np.sqrt(c / (a * upper))), float(np.sqrt(upper))
+
+
+def _driven(transmission: Transmission, contact: ContactStiffness) -> tuple[Polynomial, Polynomial, Polynomial]:
+    """Numerators of Theta/tau_m and of X_l/tau_m and their denominator, from the highest power of s down.
+
+    The denominator of an elastic drive is 4.29 (corrected; the friction d_l of the load added to D_c).
+    """
+    t, square, k_c = transmission, transmission.ratio**2, contact.stiffness
+    if isinstance(t, RigidTransmission):
+        return (1.0,), (t.ratio,), (t.inertia, t.friction + square * contact.damping, square * k_c)
+    friction, d_c = t.motor_friction + t.damping, contact.damping + t.load_friction
+    a1 = friction * k_c + d_c * t.stiffness + t.motor_friction * t.stiffness / square
+    a2 = t.motor_inertia * k_c + d_c * friction + t.stiffness * t.load_mass
+    a2 += (t.motor_inertia * t.stiffness + t.motor_friction * t.damping) / square
+    a3 = t.motor_inertia * d_c + friction * t.load_mass + t.motor_inertia * t.damping / square
+    motor = (t.load_mass, d_c + t.damping / square, k_c + t.stiffness / square)
+    load = (t.damping / t.ratio, t.stiffness / t.ratio)
+    return motor, load, (t.motor_inertia * t.load_mass, a3, a2, a1, k_c * t.stiffness)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError
-from cdtool.impact.checks import require_positive, require_restitution
+from cdtool.impact.checks import require_not_negative, require_positive, require_restitution
 from cdtool.recording import FloatArray
 
 # Powers 1, 2, ... of x in e(x) - 1 and of 1 - e in x(e): the exact relation, solved as a power series about x = 0.
@@ -97,7 +97,12 @@ def rate_from_force(time: FloatArray, force: FloatArray, mass: float, approach_s
 
 
 def goldsmith(approach_speed: npt.ArrayLike, alpha: float, beta: float = 1.0) -> FloatArray:
-    """e = sqrt(1 - alpha |v|^beta) (thesis 3.10 with the magnitude); NaN beyond the speed at which it would be 0."""
+    """e = sqrt(1 - alpha |v|^beta) (thesis 3.10 with the magnitude); NaN beyond the speed at which it would be 0.
+
+    alpha [(s/m)^beta] and beta depend on material and geometry. Raises UsageError where one of them is below 0.
+    """
+    require_not_negative("alpha", alpha)
+    require_not_negative("beta", beta)
     left = 1.0 - alpha * np.abs(np.asarray(approach_speed, dtype=np.float64)) ** beta
     return np.where(left >= 0.0, np.sqrt(np.maximum(left, 0.0)), np.nan)[()]
 
@@ -154,12 +159,16 @@ def damping_for_restitution(restitution: float, approach_speed: float, stiffness
 
 def hunt_crossley_damping(restitution: float, approach_speed: float, stiffness: float) -> float:
     """mu = 3/2 alpha k, alpha = (1 - e)/v (thesis 3.21): of first order; half of what is needed at e = 0.5."""
+    require_restitution(restitution)
+    require_positive("the stiffness", stiffness, "N/m^n")
     require_positive("the approach speed", approach_speed, "m/s")
     return 1.5 * (1.0 - restitution) * stiffness / approach_speed
 
 
 def lankarani_nikravesh_damping(restitution: float, approach_speed: float, stiffness: float) -> float:
     """mu = 3 k (1 - e^2)/(4 v) (thesis 3.22 with the alpha of 3.21): of first order, and less than 3.21."""
+    require_restitution(restitution)
+    require_positive("the stiffness", stiffness, "N/m^n")
     require_positive("the approach speed", approach_speed, "m/s")
     return 0.75 * (1.0 - restitution**2) * stiffness / approach_speed
 

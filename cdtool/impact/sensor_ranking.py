@@ -88,7 +88,8 @@ class Sight:
 class Ranking:
     """The sensors from the first to the last that sees the impact; those that see nothing come last.
 
-    `time` (n,) and `contact_force` (n,) are the impact's course [s, N]; `factor` is the k of k sigma.
+    `time` (n,) and `contact_force` (n,) are the impact's course [s, N]; `factor` is the k of k sigma;
+    `swing_duration` is how long the force's first swing lasts [s]: see `_swing_duration`.
     """
 
     case: ImpactCase
@@ -96,6 +97,7 @@ class Ranking:
     sights: tuple[Sight, ...]
     time: FloatArray
     contact_force: FloatArray
+    swing_duration: float
     rigidity: Rigidity
 
     @property
@@ -121,10 +123,17 @@ def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.
     motion = case.simulate()
     shown = deviations(case, motion)
     stronger = {cause: deviations(other, other.simulate()) for cause, other in _stronger_machines(case).items()}
-    time = motion.time
     sights = [_sight(sensor, factor, motion, shown, stronger) for sensor in sensors]
     order = sorted(sights, key=lambda item: np.inf if item.time is None else item.time)
-    return Ranking(case, factor, tuple(order), time, motion.force, rigidity(case.transmission, case.obstacle.stiffness))
+    rigid = rigidity(case.transmission, case.obstacle.stiffness)
+    return Ranking(case, factor, tuple(order), motion.time, motion.force, _swing_duration(motion), rigid)
+
+
+def _swing_duration(motion: Motion) -> float:
+    """The first contact [s], or twice the rise to its first peak where a drive that pushes on makes it last."""
+    falls = np.flatnonzero(np.diff(motion.force) < 0.0)
+    duration = motion.contacts[0].duration
+    return duration if not len(falls) else min(duration, 2.0 * float(motion.time[falls[0]]))
 
 
 def deviations(case: ImpactCase, motion: Motion) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -147,7 +156,9 @@ def _stronger_machines(case: ImpactCase) -> dict[tuple[str, str], ImpactCase]:
     """The case with one part of the machine twice as good, by (cause, remedy)."""
     transmission, controller = case.transmission, case.controller
     stiffer = replace(transmission, stiffness=2.0 * transmission.stiffness)
-    quicker = replace(controller, proportional=2.0 * controller.proportional, integral=2.0 * controller.integral)
+    gains = (controller.proportional, controller.integral, controller.derivative)
+    proportional, integral, derivative = (2.0 * gain for gain in gains)
+    quicker = replace(controller, proportional=proportional, integral=integral, derivative=derivative)
     found = {
         ("elastic drive", "twice the stiffness"): replace(case, transmission=stiffer),
         ("speed controller", "twice the gains"): replace(case, controller=quicker),

@@ -45,6 +45,14 @@ class Transfer:
         s = 1j * np.asarray(frequency, dtype=np.float64)
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s), dtype=np.complex128)
 
+    @property
+    def reduced(self) -> Transfer:
+        """The same without leading zeros, and without the poles and zeros at the origin that cancel."""
+        numerator, denominator = self.numerator, self.denominator
+        while numerator[-1] == denominator[-1] == 0.0:
+            numerator, denominator = numerator[:-1], denominator[:-1]
+        return Transfer(_trimmed(numerator), _trimmed(denominator), self.unit)
+
     def as_scipy(self) -> TransferFunction[np.float64, np.float64]:
         """The same for scipy.signal."""
         from scipy.signal import TransferFunction
@@ -92,3 +100,8 @@ def second_order(transfer: Transfer) -> SecondOrder:
 
 def _lowest(coefficients: tuple[float, ...]) -> float:
     return next(value for value in reversed(coefficients) if value != 0.0)
+
+
+def _trimmed(coefficients: tuple[float, ...]) -> tuple[float, ...]:
+    first = next(i for i, value in enumerate(coefficients) if value != 0.0)
+    return coefficients[first:]

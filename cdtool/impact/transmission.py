@@ -8,7 +8,6 @@ the obstacle: x_l - x_o and, behind an elastic transmission, r theta_m - x_o.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,8 +58,8 @@ class RigidTransmission:
             )
         return [penetration, load_speed]
 
-    def rates(self, state: Sequence[float], torque: float, force: float) -> list[float]:
-        """Time derivative of the state under a motor torque [N m] and a contact force [N]."""
+    def rates(self, state: Any, torque: Any, force: Any) -> list[Any]:
+        """Rate of change of one or many states under a motor torque [N m] and a contact force [N]."""
         speed = state[1]
         return [speed, ((torque - self.friction * speed / self.ratio) / self.ratio - force) / self.mass]
 
@@ -137,8 +136,8 @@ class ElasticTransmission:
         motor = load_speed if motor_speed is None else motor_speed * self.ratio
         return [penetration, load_speed, penetration + wind_up, motor]
 
-    def rates(self, state: Sequence[float], torque: float, force: float) -> list[float]:
-        """Time derivative of the state under a motor torque [N m] and a contact force [N]."""
+    def rates(self, state: Any, torque: Any, force: Any) -> list[Any]:
+        """Rate of change of one or many states under a motor torque [N m] and a contact force [N]."""
         _, speed, _, motor = state[:4]
         drive = self.drive_force(state)
         load = (drive - self.load_friction * speed - force) / self.load_mass

@@ -11,6 +11,7 @@ from cdtool.errors import UsageError
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.drives import Drive
+from cdtool.impact.effort import bounded
 from cdtool.impact.transmission import Transmission
 from cdtool.recording import FloatArray
 
@@ -79,8 +80,9 @@ def simulate_impact(
 
     A negative gap starts pressed in. `motor_speed` [rad/s]: only behind an elastic transmission; None: as the load.
     `samples` are at least that many over `duration` [s]; each contact has its own thousand besides. Events find touch
-    and separation, relative tolerance 1e-9. Raises UsageError for values without meaning for a law with a memory, and
-    where the contacts never end (a law that loses nothing against a steady push).
+    and separation, relative tolerance 1e-9. Raises UsageError for values without meaning, for a law with a memory,
+    where the contacts never end (a law that loses nothing against a steady push), and where the motion is far quicker
+    than the duration.
     """
     require_positive("duration", duration, "s")
     require_positive("samples", samples)
@@ -117,10 +119,12 @@ class _Solver:
         self.transmission, self.drive, self.law, self.duration = transmission, drive, law, duration
         # Between events the step is bounded: a load that swings into the obstacle and out again is not stepped over.
         self.longest_step = min(transmission.swing_period / 20.0, duration)
+        self.motion = bounded(self.rates)
 
-    def rates(self, _: float, state: Any) -> list[float]:
+    def rates(self, _: float, now: FloatArray) -> list[float]:
         transmission, drive = self.transmission, self.drive
-        force = contact_force(self.law, float(state[0]), float(state[1]))
+        state: list[float] = now.tolist()
+        force = contact_force(self.law, state[0], state[1])
         torque = drive.torque_of(state[:-1])
         moving = transmission.rates(state, torque, force)
         _, speed = transmission.motor(state)
@@ -135,7 +139,7 @@ class _Solver:
 
         crosses.terminal, crosses.direction = True, direction  # type: ignore[attr-defined]
         span = (start, self.duration)
-        return solve_ivp(self.rates, span, state, events=crosses, max_step=self.longest_step, **_SETTINGS)
+        return solve_ivp(self.motion, span, state, events=crosses, max_step=self.longest_step, **_SETTINGS)
 
 
 def contact_force(law: ContactLaw, penetration: float, rate: float) -> float:
@@ -178,14 +182,13 @@ def _motion(
     time = np.concatenate([times for times, _ in kept])
     states = np.concatenate([values for _, values in kept], axis=1)
     force = _forces(law, states)
-    torque = np.array([drive.torque_of(column[:-1]) for column in states.T])
-    rates = [transmission.rates(column, now, load) for column, now, load in zip(states.T, torque, force, strict=True)]
+    torque = np.broadcast_to(drive.torque_of(states[:-1]), time.shape).copy()
     position, speed = transmission.motor(states)
     return Motion(
         time=time,
         penetration=states[0],
         load_speed=states[1],
-        load_acceleration=np.array([item[1] for item in rates]),
+        load_acceleration=np.asarray(transmission.rates(states, torque, force)[1]),
         force=force,
         motor_position=position,
         motor_speed=speed,

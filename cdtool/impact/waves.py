@@ -34,6 +34,11 @@ class WaveCheck:
         """Whether the bodies count as rigid but for the contact."""
         return not self.warning
 
+    @property
+    def words(self) -> str:
+        """One sentence for a report."""
+        return self.warning or f"the load counts as rigid: the contact lasts {self.ratio:.2g} periods of its first mode"
+
 
 def check_waves(contact_duration: float, first_frequency: float) -> WaveCheck:
     """Hold a contact's duration [s] against the first natural frequency [Hz] of a body (thesis 3.1.4).

@@ -11,79 +11,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.errors import UsageError
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
 from cdtool.impact.sensor_ranking import ImpactCase
 from cdtool.impact.sensors import Sensor
 from cdtool.impact.transmission import ElasticTransmission
 from cdtool.machine_file import MachineFile
-from cdtool.machines.axis import Axis
-from cdtool.machines.linear_axis import LinearAxis
 from cdtool.tables import Table, read_toml
+from cdtool.workflows.study_joint import StudiedJoint, studied_joint
+from cdtool.workflows.study_reader import StudyReader
+from cdtool.workflows.study_sensors import studied_sensors
 
-_GRAVITY = 9.80665
 _DRIVE_FREQUENCY = 10.0
 _LOOP_FREQUENCY = 2.0
 
 
 @dataclass(frozen=True)
 class Study:
-    """What is simulated, what is looked at, and what was assumed because nobody gave it."""
+    """What is simulated and looked at, the load's first natural frequency [Hz] if it is known, and what was assumed."""
 
     joint: str
     case: ImpactCase
     sensors: tuple[Sensor, ...]
+    first_frequency: float | None
     assumptions: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Joint:
-    """One joint, referred to the contact: kg, m/rad, N m s/rad; `square` turns a load-side stiffness into N/m."""
-
-    name: str
-    load_mass: float
-    motor_inertia: float
-    ratio: float
-    motor_friction: float
-    square: float
-    rotary: bool
-
-    @property
-    def mass(self) -> float:
-        """Load and motor together at the contact [kg]."""
-        return self.load_mass + self.motor_inertia / self.ratio**2
-
-    def unit(self, linear: str) -> str:
-        """The load-side unit: N/m of a linear axis is N m/rad of a rotary one."""
-        return linear.replace("/m", "/rad").replace("N", "N m") if self.rotary else linear
-
-
-class _Reader:
-    """Reads numbers and keeps what was assumed."""
-
-    def __init__(self, root: Table) -> None:
-        self._tables = {"": root}
-        self.assumed: list[str] = []
-
-    def table(self, name: str) -> Table:
-        """A table such as sensors.encoder, always the same one."""
-        if name not in self._tables:
-            above, _, last = name.rpartition(".")
-            self._tables[name] = self.table(above).table(last)
-        return self._tables[name]
-
-    def number(self, table: str, key: str, default: float, unit: str, why: str = "", **bounds: float) -> float:
-        """A number of a table; the default is told with its reason."""
-        part = self.table(table)
-        if key not in part:
-            self.assumed.append(f"{table}.{key} = {default:.4g} {unit}".rstrip() + (f": {why}" if why else ""))
-        return part.number(key, default, **bounds)
-
-    def finish(self) -> None:
-        """Raise ConfigurationError if a key of any table is left that nobody asked for."""
-        for table in self._tables.values():
-            table.finish()
 
 
 def read_study(
@@ -98,13 +50,13 @@ def read_study(
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value:g}", "a number above 0 is needed")
     root = Table(_merged(read_toml(Path(file)) if file else {}, options), str(file or "study"))
-    reader = _Reader(root)
-    axis = _axis(machine)
-    part = _joint(machine, axis, joint, reader)
+    reader = StudyReader(root)
+    part = studied_joint(machine, joint, reader)
     case = _case(part, reader)
-    sensors = _sensors(part, reader)
+    frequency = reader.optional("impact", "first_frequency", "the load is rigid but for its drive")
+    sensors = studied_sensors(part, reader)
     reader.finish()
-    return Study(part.name, case, sensors, tuple(reader.assumed))
+    return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
 
 
 def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, Any]:
@@ -117,35 +69,7 @@ def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, A
     return merged
 
 
-def _axis(machine: MachineFile) -> Axis:
-    if not isinstance(machine.machine, Axis):
-        raise ConfigurationError(
-            f"{machine.path}: the machine is no single axis", "a study needs type linear_axis or rotary_axis"
-        )
-    return machine.machine
-
-
-def _joint(machine: MachineFile, axis: Axis, wanted: str, reader: _Reader) -> _Joint:
-    if not wanted and len(axis.joints) > 1:
-        raise UsageError(f"{machine.path} has {len(axis.joints)} joints", f"name one: {', '.join(axis.joints)}")
-    if wanted and wanted not in axis.joints:
-        raise UsageError(f"{machine.path} has no joint '{wanted}'", nearest(wanted, axis.joints))
-    at = axis.joints.index(wanted) if wanted else 0
-    load, motor = axis.load_inertia[at], axis.motor_inertia[at]
-    for key, value in ((axis.inertia_key, load), ("motor_inertia", motor)):
-        if value <= 0.0:
-            raise ConfigurationError(
-                f"{machine.path}: machine.{key} is missing or 0", "a study needs the inertias of load and motor"
-            )
-    rotary = not isinstance(axis, LinearAxis)
-    if not rotary and "lever" in reader.table("impact"):
-        raise UsageError("a lever is given for a linear axis", "it belongs to a rotary axis")
-    lever = reader.number("impact", "lever", 1.0, "m", "contact to axis", above=0.0) if rotary else 1.0
-    ratio = abs(axis.transmission_ratio[at]) * lever
-    return _Joint(axis.joints[at], load / lever**2, motor, ratio, axis.viscous_friction[at], lever**2, rotary)
-
-
-def _case(part: _Joint, reader: _Reader) -> ImpactCase:
+def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
     speed = reader.number("impact", "speed", 0.2, "m/s", "at the contact", above=0.0)
     stiffness = reader.number("impact", "stiffness", 5e5, "N/m", above=0.0)
     factor = reader.number("impact", "damping_factor", 0.0, "s/m", minimum=0.0)
@@ -165,10 +89,19 @@ def _case(part: _Joint, reader: _Reader) -> ImpactCase:
         2.0 * ratio * math.sqrt(drive * part.load_mass) * square,
         part.motor_friction,
     )
-    return ImpactCase(transmission, _controller(part, reader), obstacle, speed, window)
+    controller = _controller(part, reader)
+    needed = transmission.steady_torque(speed)
+    if controller.torque_limit < needed:
+        unit = part.unit("N")
+        limit, steady = (value / part.ratio * part.lever for value in (controller.torque_limit, needed))
+        raise UsageError(
+            f"controller.force_limit is {limit:.4g} {unit}, steady motion takes {steady:.4g} {unit}",
+            "a larger limit, or less friction or speed",
+        )
+    return ImpactCase(transmission, controller, obstacle, speed, window)
 
 
-def _controller(part: _Joint, reader: _Reader) -> SpeedController:
+def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
     angular = 2.0 * math.pi * _LOOP_FREQUENCY
     why = f"a speed loop of {_LOOP_FREQUENCY:g} Hz for the whole mass"
     default = part.mass * angular * part.square
@@ -176,70 +109,19 @@ def _controller(part: _Joint, reader: _Reader) -> SpeedController:
     default = 0.25 * angular * proportional
     integral = reader.number("controller", "integral", default, part.unit("N/m"), "critically damped", minimum=0.0)
     lag = reader.number("controller", "actuator_time", 0.002, "s", "lag of the current loop", above=0.0)
+    derivative = reader.number("controller", "derivative", 0.0, part.unit("N s2/m"), minimum=0.0)
+    filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative", above=0.0)
     table = reader.table("controller")
-    slew = table.number("slew_limit", above=0.0) / part.square**0.5 if "slew_limit" in table else math.inf
-    to_motor = part.ratio**2 / part.square
-    return SpeedController(0.0, proportional * to_motor, integral * to_motor, lag, slew_limit=slew * part.ratio)
-
-
-def _sensors(part: _Joint, reader: _Reader) -> tuple[Sensor, ...]:
-    lever = math.sqrt(part.square)
-    why = f"what accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
-    rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why, above=0.0) / lever
-    torque = (part, reader, rated, lever)
-    return (
-        _force_sensor("load_cell", "at the contact", "contact_force", (part, reader, rated, 1.0), 0.001, 500.0),
-        _force_sensor("torque_sensor", "in the drive", "drive_force", torque, 0.002, 500.0),
-        _accelerometer(reader),
-        *_encoder(part, reader),
-        _force_sensor("motor_torque", "control action", "motor_force", torque, 0.01, 200.0),
-    )
-
-
-def _force_sensor(
-    name: str,
-    place: str,
-    quantity: str,
-    scales: tuple[_Joint, _Reader, float, float],
-    share: float,
-    bandwidth: float,
-) -> Sensor:
-    part, reader, rated, lever = scales
-    table, unit = f"sensors.{name}", "N" if lever == 1.0 and name == "load_cell" else part.unit("N")
-    why = f"{100.0 * share:g} % of the rated force"
-    return Sensor(
-        name,
-        place,
-        quantity,
-        "N",
-        reader.number(table, "noise", share * rated * lever, unit, why, minimum=0.0) / lever,
-        reader.number(table, "resolution", 0.0, unit, minimum=0.0) / lever,
-        reader.number(table, "bandwidth", bandwidth, "Hz", above=0.0),
-        reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0),
-    )
-
-
-def _accelerometer(reader: _Reader) -> Sensor:
-    table, unit = "sensors.accelerometer", "m/s2"
-    bandwidth = reader.number(table, "bandwidth", 100.0, "Hz", above=0.0)
-    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)", minimum=0.0)
-    vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms", minimum=0.0)
-    # A first-order low-pass lets noise of pi/2 times its corner through.
-    noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
-    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g", minimum=0.0)
-    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
-    return Sensor("accelerometer", "on the load", "load_acceleration", unit, noise, resolution, bandwidth, rate)
-
-
-def _encoder(part: _Joint, reader: _Reader) -> tuple[Sensor, Sensor]:
-    table = "sensors.encoder"
-    counts = reader.number(table, "counts_per_turn", 4096.0, "", "12 bit, on the motor", minimum=1.0)
-    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
-    bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference", above=0.0)
-    speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed", minimum=0.0)
-    noise = reader.number(table, "position_noise", 0.0, "m", "scatter of the impact-free position", minimum=0.0)
-    step = 2.0 * math.pi * part.ratio / counts
-    return (
-        Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
-        Sensor("motor_speed", "on the motor", "motor_position", "m/s", speed_noise, step, bandwidth, rate, True),
+    slew = table.number("slew_limit", above=0.0) if "slew_limit" in table else math.inf
+    limit = reader.optional("controller", "force_limit", "nothing stops the drive") or math.inf
+    to_motor, to_torque = part.ratio**2 / part.square, part.ratio / part.lever
+    return SpeedController(
+        0.0,
+        proportional * to_motor,
+        integral * to_motor,
+        lag,
+        slew_limit=slew * to_torque,
+        derivative=derivative * to_motor,
+        derivative_time=filtered,
+        torque_limit=limit * to_torque,
     )

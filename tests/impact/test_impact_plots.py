@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.impact.examples import loops, restitution_over_damping, restitution_over_speed, two_bodies
+from cdtool.impact.examples.chapter_3 import loops, restitution_over_damping, restitution_over_speed, two_bodies
 from cdtool.report.plots.impact_plots import plot_course, plot_loops, plot_restitution, write_impact_plots
 
 

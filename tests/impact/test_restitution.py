@@ -145,6 +145,8 @@ def test_the_first_order_relations_have_the_reference_values_and_are_too_small()
         assert second < first < damping_for_restitution(e, 1.0, 1.0)
     for x in (0.01, 0.05, 0.1, 0.149):
         assert hunt_crossley_restitution(x) == pytest.approx(1.0 - 2.0 * x / 3.0, abs=0.01)
+    # Only there: at 0.3 it is three times as far off.
+    assert hunt_crossley_restitution(0.3) - (1.0 - 0.2) > 0.03
 
 
 def test_what_comes_out_of_lankarani_and_nikraveshs_damping_is_as_its_law_says():
@@ -157,6 +159,29 @@ def test_what_comes_out_of_lankarani_and_nikraveshs_damping_is_as_its_law_says()
 def test_the_damping_scales_with_stiffness_over_speed(e, speed, stiffness):
     unit = damping_for_restitution(e, 1.0, 1.0)
     assert damping_for_restitution(e, speed, stiffness) == pytest.approx(unit * stiffness / speed, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: goldsmith(0.5, -0.1),
+        lambda: goldsmith(0.5, 0.1, -1.0),
+        lambda: hunt_crossley_damping(1.2, 0.5, 1e8),
+        lambda: lankarani_nikravesh_damping(-0.1, 0.5, 1e8),
+        lambda: hunt_crossley_damping(0.8, 0.5, 0.0),
+    ],
+    ids=["alpha", "beta", "above_1", "below_0", "stiffness"],
+)
+def test_constants_that_would_give_a_restitution_outside_0_to_1_are_refused(wrong):
+    with pytest.raises(UsageError):
+        wrong()
+
+
+@settings(deadline=None)
+@given(st.floats(-100.0, 100.0), st.floats(0.0, 10.0), st.floats(0.0, 3.0))
+def test_goldsmiths_restitution_lies_within_0_and_1_or_is_not_there(speed, alpha, beta):
+    e = goldsmith(speed, alpha, beta)
+    assert np.isnan(e) or 0.0 <= e <= 1.0
 
 
 def test_a_plastic_impact_has_no_damping_that_could_be_given():

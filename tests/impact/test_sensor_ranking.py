@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import UsageError
-from cdtool.impact import thesis_example as example
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.sensor_ranking import ITSELF, Ranking, deviations, rank_sensors
 from cdtool.impact.sensors import Sensor
 
@@ -113,6 +113,36 @@ def test_the_force_is_that_of_the_simulated_impact_at_that_moment(ranking):
         assert item.force == pytest.approx(np.interp(item.time, ranking.time, ranking.contact_force))
         assert item.peak_so_far >= item.force
     assert ranking.peak_force == pytest.approx(ranking.contact_force.max())
+
+
+@pytest.mark.parametrize("index", [3, 4], ids=["motor_position", "motor_speed"])
+@pytest.mark.parametrize("counts", [1024, 4096])
+def test_a_log_in_whole_counts_is_quiet_before_the_touch_and_sees_it_within_a_count(index, counts):
+    # Sample by sample, as an encoder does it: round down to a count, take the difference, low-pass it.
+    plain = replace(example.SENSORS[index], resolution=2.0 * math.pi * 0.015 / counts)
+    motion = example.RANKED.simulate()
+    touch, speed = motion.motor_position[0], example.RANKED.speed
+    promised = rank_sensors(example.RANKED, [plain]).sights[0].time
+    assert promised is not None
+    keep = math.exp(-2.0 * math.pi * plain.bandwidth / plain.sample_rate)
+    seen = []
+    for offset, phase in np.random.default_rng(3).random((40, 2)):
+        time = (np.arange(-300, 90) + phase) / plain.sample_rate
+        moved = 0.015 * (np.interp(time, motion.time, motion.motor_position) - touch)
+        position = np.where(time < 0.0, speed * time, moved) + offset * plain.resolution
+        logged = np.floor(position / plain.resolution) * plain.resolution
+        steady = speed * time + offset * plain.resolution
+        if plain.differentiated:
+            rate, logged = np.diff(logged, prepend=logged[0]) * plain.sample_rate, np.full(time.size, speed)
+            for i in range(1, time.size):
+                logged[i] = keep * logged[i - 1] + (1.0 - keep) * rate[i]
+            steady = np.full(time.size, speed)
+        beyond = np.abs(logged - steady) >= plain.threshold(5.0)
+        assert not np.any(beyond[time < 0.0])
+        seen.append(time[np.argmax(beyond)])
+    # A count may hide as much of the deviation as the limit has for it.
+    hidden = replace(plain, noise=plain.step).time_to_see(*deviations(example.RANKED, motion)[plain.quantity], 1.0)
+    assert hidden is not None and 0.4 * promised < max(seen) <= hidden < 1.5 * promised
 
 
 def test_the_steady_motion_deviates_by_nothing_at_the_touch():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cdtool.impact import thesis_example as example
+from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.sensor_ranking import rank_sensors
 from cdtool.report.plots.impact_plots import write_impact_plots
 from cdtool.report.plots.sensor_plot import plot_ranking

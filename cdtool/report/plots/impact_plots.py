@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cdtool.impact.examples import RestitutionCurve
+    from cdtool.impact.examples.chapter_3 import RestitutionCurve
 
 _FIRST, _SECOND, _THIRD = "#0072B2", "#D55E00", "#009E73"
 _COLOURS = (_FIRST, _SECOND, _THIRD)
@@ -102,7 +102,7 @@ def plot_loops(panels: Mapping[str, Mapping[str, Impact]]) -> Figure:
 
 def write_impact_plots(folder: Path) -> list[Path]:
     """Write figures 3.2, 3.4, 3.5 and that of the damping, with cdtool's example impacts, to a folder that exists."""
-    from cdtool.impact.examples import (
+    from cdtool.impact.examples.chapter_3 import (
         loops,
         restitution_over_damping,
         restitution_over_speed,

@@ -16,6 +16,8 @@ FORCE = "black"
 LIMIT = "0.25"
 BAND = "#DCE6EE"
 UNJUDGED = "0.72"
+# From far below the mean to far above it, pale in the middle; told apart by the colour-blind and, by hue, in print.
+DEVIATION_COLOURS = ("#003F6B", _BLUE, "#9CCBE6", "#F7F7F7", "#F2B48A", _RED, "#7A2E00")
 ONSET_DASHES = (0, (6, 2, 1.5, 2))
 # The reason not to judge, told apart without colour.
 HATCHES = {

@@ -10,10 +10,10 @@ import numpy as np
 
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.linearised import (
-    free_rigid,
+    linearised_contact,
     motor_by_penetration,
+    motor_by_torque,
     penetration_by_momentum,
-    rigid_in_contact,
     undamped,
 )
 from cdtool.impact.rigidity import rigidity
@@ -62,7 +62,7 @@ def plot_impact(motion: Motion, path: Path) -> None:
         panels[0, 0].set_title("the whole event", loc="left", fontweight="bold")
         panels[0, 1].set_title("its first contact", loc="left", fontweight="bold")
         panels[0, 1].annotate(
-            f"{first.peak_force:.0f} N, {1e3 * first.max_penetration:.4f} mm\n{1e3 * first.duration:.3f} ms\n"
+            f"{first.peak_force:.1f} N, {1e3 * first.max_penetration:.4f} mm\n{1e3 * first.duration:.3f} ms\n"
             f"energy lost: {100.0 * first.energy_loss:.1f} %",
             (0.5, 0.1),
             xycoords="axes fraction",
@@ -98,9 +98,9 @@ def plot_rigid_bode(
     with drawing():
         figure = new_figure(9.0, 5.4)
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
-        _bode(panels, free_rigid(transmission), frequency, "before the impact", "0.45", "-")
+        _bode(panels, motor_by_torque(transmission), frequency, "before the impact", "0.45", "-")
         for i, (depth, rate) in enumerate(states):
-            about = rigid_in_contact(transmission, law, depth, rate)
+            about = motor_by_torque(transmission, linearised_contact(law, depth, rate))
             found = second_order(about)
             words = f"δ = {1e6 * depth:g} µm: ωₙ = {found.natural_frequency:.0f} rad/s, ξ = {found.damping_ratio:.3f}"
             _bode(panels, about, frequency, words, _SERIES[i % len(_SERIES)], _DASHES[i % len(_DASHES)])

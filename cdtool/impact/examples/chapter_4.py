@@ -1,4 +1,4 @@
-"""The example of the thesis's chapter 4: Table 4.1 with its units put right, and an elastic drive of the same size."""
+"""Table 4.1 of the thesis with its units put right, an elastic drive of the same size, and sensors on it."""
 
 from __future__ import annotations
 
