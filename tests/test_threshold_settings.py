@@ -8,11 +8,13 @@ import pytest
 
 import cdtool
 from cdtool.activation import Activation
-from cdtool.errors import ConfigurationError
+from cdtool.errors import ConfigurationError, UsageError
+from cdtool.signature_store import write_signature
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
+from cdtool.thresholds.signature import Signature
 from cdtool.workflows.benchmark_file import read_benchmark_file
 from tests.test_workflows import MACHINE, write_log
 
@@ -150,3 +152,35 @@ def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):
         read_benchmark_file(file)
     with pytest.raises(ConfigurationError, match="set by hand"):
         cdtool.benchmark(written(door, hand), false_alarm_budget="1/8op")
+
+
+def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_budget(door, tmp_path):
+    text = '[threshold]\nname = "cusum"\n[signature]\nforce = true\n'
+    wanted = cdtool.benchmark(written(door, text), false_alarm_budget="1/8op").results.calibration[0]
+    learned = cdtool.learn_signature(
+        [door / "free.csv"],
+        door / "machine.toml",
+        "gm",
+        rule=Cusum(signature=Signature(force=True)),
+        operations="motion",
+        false_alarm_budget="1/8op",
+    ).signature
+    assert [item.safety_factor for item in learned.current] == [wanted.safety_factor] * 2
+    assert (learned.origin.by, learned.origin.budget) == ("budget", "1/8op")
+    assert (learned.origin.operations, learned.origin.alarms) == (wanted.operations, wanted.alarms)
+    write_signature(tmp_path / "s.json", learned)
+    found = cdtool.detect(door / "hits.csv", door / "machine.toml", signature=tmp_path / "s.json", operations="motion")
+    assert [found.detections[i].verdict.outcome for i in (1, 2, 5)] == ["alarm"] * 3
+    assert found.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
+
+
+def test_a_factor_set_by_hand_is_refused_beside_a_budget_and_told_without_one(door):
+    machine, logs = door / "machine.toml", [door / "free.csv"]
+    with pytest.raises(UsageError, match="set by hand, and a false-alarm budget 1/8op"):
+        cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion", false_alarm_budget="1/8op")
+    by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion").signature
+    assert by_hand.described == "limit, safety factor 9 set by hand"
+    limits = cdtool.learn_signature(logs, machine, "gm", rule=Limit(limits=(50.0,)), operations="motion").signature
+    assert limits.described == "limit 50 N set by hand"
+    plain = cdtool.learn_signature(logs, machine, "gm", rule=Limit(), operations="motion").signature
+    assert plain.described == "limit, safety factor 5.5 by default"
