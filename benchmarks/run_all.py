@@ -1,4 +1,6 @@
-"""Every benchmark, one after the other, each in its own process; ends with status 1 where a target is not held.
+"""Every benchmark but thresholds.py, which takes 40 minutes and has no target, each in its own process.
+
+Ends with status 1 where a target is not held.
 
 python benchmarks/run_all.py
 """
