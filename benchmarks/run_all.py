@@ -1,4 +1,4 @@
-"""Every benchmark but thresholds.py, which takes 40 minutes and has no target, each in its own process.
+"""Every benchmark but thresholds.py (40 minutes, no target) and signature_coverage.py (10 minutes), a process each.
 
 Ends with status 1 where a target is not held.
 

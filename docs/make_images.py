@@ -65,6 +65,17 @@ def budget(work: Path) -> None:
         shutil.copyfile(work / name, IMAGES / name)
 
 
+def season(work: Path) -> None:
+    """An obstruction that grows over a season of simulated runs, as docs/signature.md has it."""
+    cdtool("simulate", "gate", "-o", "gate", "--free", 14, "--holdout", 40, "--stiff", 0, "--soft", 0, folder=work)
+    cdtool("simulate", "season", "--runs", 60, "--obstruction-growth", 2, "-o", "season", folder=work)
+    taught = sorted(path.relative_to(work) for name in ("free", "holdout") for path in (work / "gate" / name).iterdir())
+    machine = ("-m", "gate/machine.toml")
+    cdtool("learn-signature", *taught, *machine, "-d", "gm", "-o", "season.json", folder=work)
+    runs = sorted(path.relative_to(work) for path in (work / "season" / "free").iterdir())
+    cdtool("signature", "check", "season.json", *runs, *machine, "--plot", IMAGES / "season.png", folder=work)
+
+
 def emps(work: Path) -> None:
     """The momentum observer on the recording with force pulses."""
     logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
@@ -97,7 +108,7 @@ def main() -> int:
     IMAGES.mkdir(exist_ok=True)
     arm = DATA / "ur10e"
     samples = ROOT / "sample_logs" / "gate"
-    sources = {gate: samples, budget: samples, emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
+    sources = {gate: samples, budget: samples, season: samples, emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for make, needed in sources.items():
             if needed.is_dir():

@@ -11,8 +11,8 @@ import typer
 from cdtool.cli.console import number, plain, table
 
 if TYPE_CHECKING:
-    from cdtool.evaluation.upkeep.coverage import Coverage
     from cdtool.evaluation.upkeep.audit import DriftAudit
+    from cdtool.evaluation.upkeep.coverage import Coverage
     from cdtool.signature_store import SignatureFile
     from cdtool.workflows.upkeep import Checked, CheckedClass
 
@@ -87,11 +87,17 @@ def file_as_json(stored: SignatureFile) -> dict[str, Any]:
 
 def show_class(item: CheckedClass) -> None:
     """What a check found of one class of motion."""
+    from cdtool.evaluation.upkeep.summary import summarise_signature
+
     typer.echo(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
     if item.coverage:
         _show_coverage(item.coverage)
     if item.drift:
         _show_drift(item.drift)
+    for joint in summarise_signature(item.signature, item.first).joints:
+        if joint.moved > 0.0:
+            moved = f"{joint.moved:.2f} spreads at {joint.moved_at:.2f} of {joint.moved_along}"
+            typer.echo(f"since first learned: the limit of {plain(joint.joint)} moved by up to {moved}")
     typer.echo(f"advice: {item.advice}")
 
 

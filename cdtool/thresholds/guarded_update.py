@@ -17,7 +17,7 @@ from cdtool.thresholds.signature_curve import Curve
 # spread comes out 0.3 % smaller than without a cap.
 CAP = 3.0
 # No limit is learned further than this many of the first spreads from where it was first learned. On the simulated
-# gate, where nothing drifts, 14 runs know the spread so badly that 2 would refuse a fifth of all runs, 3 refuse 2 %.
+# gate, where nothing drifts, 14 runs know the spread so badly that 2 would refuse a fifth of all runs, 3 some 3 %.
 RESERVE = 3.0
 # A run that covers this share of the learned stroke has completed it.
 _COMPLETE = 0.95
@@ -100,9 +100,10 @@ class _Part:
             known = np.isfinite(old) & np.isfinite(new)
             moved = np.where(known, np.abs(new - np.where(known, old, 0.0)) / self.spread, 0.0)
             if moved.max(initial=0.0) > reserve:
+                place = self._place(moved == moved.max(), unit)
                 raise SignatureError(
-                    f"{self._place(moved == moved.max(), unit)} the limit would be {moved.max():.1f} spreads from the one "
-                    f"first learned, {reserve:g} are allowed",
+                    f"{place} the limit would be {moved.max():.1f} spreads from the one first learned, "
+                    f"{reserve:g} are allowed",
                     "inspect the machine there, then learn anew",
                 )
 

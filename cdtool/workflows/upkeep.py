@@ -11,8 +11,8 @@ from typing import Any
 from cdtool.errors import CdtoolError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.upkeep.advice import advice
-from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
 from cdtool.evaluation.upkeep.audit import DriftAudit
+from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
 from cdtool.evaluation.upkeep.drift import audit_drift
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
@@ -32,9 +32,13 @@ TARGET = 1e-3
 
 @dataclass(frozen=True)
 class CheckedClass:
-    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given."""
+    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given.
+
+    `signature` is what counts, `first` what was first learned.
+    """
 
     signature: FittedSignature
+    first: FittedSignature
     coverage: Coverage | None
     drift: DriftAudit | None
 
@@ -109,7 +113,7 @@ def check_signature(
     known = {(run.sha256, run.operation) for run in file.runs}
     learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
     classes, served = [], set()
-    for current, _ in signatures:
+    for current, first in signatures:
         own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
         served.update(own)
         taught, season = (
@@ -119,7 +123,10 @@ def check_signature(
         classes.append(
             CheckedClass(
                 current,
-                _tried(partial(check_coverage, taught, _rule_of(file, current), file.activation, target), taught, skipped),
+                first,
+                _tried(
+                    partial(check_coverage, taught, _rule_of(file, current), file.activation, target), taught, skipped
+                ),
                 _tried(partial(audit_drift, current, season, file.activation), season, skipped),
             )
         )

@@ -19,7 +19,7 @@ from cdtool.simulation.season import Season
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, check_complete, guarded, largest_move
 from cdtool.thresholds.signature import Signature
-from tests.thresholds.strokes import N, TIME, noise_runs, signal, stroke
+from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 CLEAN = stroke()
 TRAVEL = CLEAN["position"].values[:, 0]
@@ -38,9 +38,7 @@ def odd_run(offset: float, bump: float, place: float, seed: int):
     return signal(100.0 + noise + offset + bump * (np.abs(TRAVEL - place) < 0.02))
 
 
-ODD_RUNS = st.builds(
-    odd_run, st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 0.6), st.integers(0, 1000)
-)
+ODD_RUNS = st.builds(odd_run, st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 0.6), st.integers(0, 1000))
 
 
 @settings(max_examples=40, deadline=None)
@@ -116,7 +114,7 @@ def test_while_accelerating_the_place_is_a_time():
 def test_a_run_that_ends_early_is_refused_with_the_share_it_covered():
     short = stroke(time=TIME[:2600])
     item = signal(np.full(2600, 100.0), TIME[:2600])
-    with pytest.raises(SignatureError, match="covers 5[0-9] % of the learned stroke: not completed"):
+    with pytest.raises(SignatureError, match=r"covers 5[0-9] % of the learned stroke: not completed"):
         guarded(FIRST, FIRST, short, item)
     check_complete(FIRST, CLEAN, signal(np.full(N, 100.0)))
     by_time = Signature(alignment="time").fit(noise_runs(12))
@@ -126,7 +124,7 @@ def test_a_run_that_ends_early_is_refused_with_the_share_it_covered():
 
 def test_a_limit_that_would_be_lost_amid_the_stroke_is_refused():
     current = FIRST
-    with pytest.raises(SignatureError, match=r"at 0\.\d\d m no limit would be left"):  # noqa: PT012 - which run it is
+    with pytest.raises(SignatureError, match=r"at 0\.\d\d m no limit would be left"):
         for seed in range(12):
             item = odd_run(0.0, 0.0, 0.0, seed)
             item.status[2400:2600] = Status.GAP

@@ -11,17 +11,17 @@ def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
     """What to do, in a line, the most urgent first.
 
     A place that grows comes before everything: learned anew, an obstruction would be normal. Then drift of the whole
-    stroke, then too few runs. Alarms without a drift are left to `cdtool explain`.
+    stroke; too few runs are told where neither is, since what is learned anew is checked anew. Alarms without a drift
+    are left to `cdtool explain`.
     """
     steps = []
     if drift is not None:
         steps += _inspect(drift)
-        overall = [item.overall for item in drift.joints if item.overall is not None]
-        if overall:
+        if any(item.overall and (item.overall.outward or not item.two_sided) for item in drift.joints):
             steps.append("learn anew from the latest runs" if not steps else "then learn anew")
         elif drift.alarms and not steps:
             steps.append("look at the alarms with cdtool explain: they are no drift")
-    if coverage is not None and not coverage.enough and not any("anew" in step for step in steps):
+    if coverage is not None and not coverage.enough and (drift is None or not drift.drifts):
         steps.append(_more(coverage))
     return "; ".join(steps) if steps else "keep the signature"
 

@@ -56,6 +56,7 @@ class JointDrift:
     """
 
     joint: str
+    two_sided: bool
     axis: Axis
     unit: str
     places: FloatArray

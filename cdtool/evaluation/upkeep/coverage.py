@@ -93,10 +93,10 @@ def check_coverage(
 
     The critical factors of the n runs, each a run's maximum in spreads, are taken as a sample; the chance that the next
     one is above the safety factor is predicted with the uncertainty of so small a sample (see `Prediction`). A
-    signature of n - 1 runs is less sure than one of all n: its critical factors are some 3 % larger at 14 runs and
-    not noticeably so at 40. That is not corrected, so that the chance comes out too large rather than too small.
-    "Needs more runs" assumes that the critical factors stay as they are and only become better known. Measured on
-    simulated runs by `benchmarks/signature_coverage.py`; runs that all come from one day tell nothing of other days.
+    signature of n - 1 runs is less sure than one of all n: its critical factors are up to 3 % larger at 14 runs. That
+    is not corrected, so that the chance comes out too large rather than too small. "Needs more runs" assumes that the
+    critical factors stay as they are and only become better known. Measured on simulated runs by
+    `benchmarks/signature_coverage.py`; runs that all come from one day tell nothing of other days.
 
     `rule.sides` has to be given. Raises SignatureError where the runs are too few or differ, UsageError for a target
     that is no chance.

@@ -77,6 +77,7 @@ class _Joint:
         course = course_of(self.found.overall[:, self.joint], len(self.signature.joints))
         return JointDrift(
             joint=self.signature.joints[self.joint],
+            two_sided=not self.signature.watched,
             axis=self.found.axis,
             unit=self.unit,
             places=self.found.places,
@@ -124,9 +125,9 @@ class _Joint:
         side = 0
         if not self.signature.watched:
             # Of two limits the one counts towards which the signal goes, if it is not on its way back to the middle.
-            values = self.found.overall if place is None else self.found.pooled[:, self._index(place), :]
-            last = float(np.nanmedian(values[-max(course.n // 4, 1) :, self.joint]))
-            outward = course.change * last > 0.0
+            found = self.found.overall if place is None else self.found.pooled[:, self._index(place), :]
+            values = found[np.isfinite(found[:, self.joint]), self.joint]
+            outward = course.change * float(np.median(values[-max(course.n // 4, 1) :])) > 0.0
             side = 1 if course.change > 0.0 else -1
         left = Interval(math.inf, math.inf, math.inf)
         if course.kind == "drift" and outward:

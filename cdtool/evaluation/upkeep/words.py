@@ -51,6 +51,8 @@ def _overall(shown: Shown, item: JointDrift) -> str:
         return NOTHING_SHOWN
     if shown.outward:
         return f"drifts {_slope(trend.slope)}: {_left(shown.runs_left)}: learn anew"
+    if item.two_sided:
+        return f"drifts back to the middle of the band, {_slope(trend.slope)}"
     return f"drifts away from the limit, {_slope(trend.slope)}: contacts are noticed later: learn anew"
 
 

@@ -109,8 +109,8 @@ def _draw_course(axes: Axes, joint: JointDrift, colour: str) -> None:
         middle = 0.5 * (len(runs) - 1)
         axes.plot(runs + 1.0, trend.at(0.0) + trend.slope.value * runs, color=colour, linewidth=1.4)
         # Both bounds of the slope, about the middle of the season.
-        bounds = [trend.at(middle) + slope * (runs - middle) for slope in (trend.slope.low, trend.slope.high)]
-        axes.fill_between(runs + 1.0, *bounds, color=colour, alpha=0.13, linewidth=0)
+        low, high = (trend.at(middle) + slope * (runs - middle) for slope in (trend.slope.low, trend.slope.high))
+        axes.fill_between(runs + 1.0, low, high, color=colour, alpha=0.13, linewidth=0)
     elif joint.course.kind == "step" and step is not None:
         edge = step.run + 0.5
         levels = [step.before, step.before, step.after, step.after]
@@ -120,6 +120,7 @@ def _draw_course(axes: Axes, joint: JointDrift, colour: str) -> None:
 def _draw_map(axes: Axes, audit: DriftAudit, joint: JointDrift, reach: float) -> Any:
     """Place over run, the deviation as colour; hatched where nothing was valid."""
     from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.ticker import MaxNLocator
 
     places = audit.places
     half = 0.5 * float(places[1] - places[0]) if len(places) > 1 else 0.5
@@ -142,7 +143,7 @@ def _draw_map(axes: Axes, audit: DriftAudit, joint: JointDrift, reach: float) ->
         axes.plot([0.0], [joint.local.place], ">", color=_PLACE, markersize=8, transform=edge, clip_on=False)
     name = "travel" if audit.axis == "travel" else "time"
     axes.set_ylabel(f"{name} [{unit_label(audit.unit)}]")
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return image
 
 

@@ -63,6 +63,7 @@ def test_a_drift_of_the_whole_stroke_is_told_with_its_slope_and_the_runs_left():
 
 def test_the_runs_left_come_true():
     """A season that goes on: a typical run alarms about when the first half said it would."""
+
     def change(number: int, _: np.ndarray) -> float:
         return 0.06 * number
 
@@ -78,7 +79,7 @@ def test_what_grows_at_one_place_is_told_with_its_place_and_is_no_drift_of_the_w
     (joint,) = found.joints
     assert joint.overall is None and joint.local.outward
     assert joint.local.place == pytest.approx(0.40, abs=0.021)
-    assert any(line.startswith("grows at 0.4") or line.startswith("grows at 0.3") for line in joint.verdicts)
+    assert any(line.startswith(("grows at 0.4", "grows at 0.3")) for line in joint.verdicts)
     assert joint.verdicts[-1].endswith("inspect the machine there BEFORE learning anew")
     assert advice(None, found).startswith("inspect the machine at 0.")
     assert joint.runs[-1].local_at == pytest.approx(0.40, abs=0.041)
@@ -137,8 +138,11 @@ def test_with_two_sides_both_directions_come_nearer(sign):
 
 
 def test_with_two_sides_what_comes_back_to_the_middle_leaves_no_runs_to_count():
-    (joint,) = audited(lambda number, _: 2.0 - 0.045 * number, sides="two").joints
+    found = audited(lambda number, _: 2.0 - 0.045 * number, sides="two")
+    (joint,) = found.joints
     assert not joint.overall.outward and joint.runs_left == math.inf
+    assert joint.verdicts[-1].startswith("drifts back to the middle of the band, -0.0")
+    assert advice(None, found) == "keep the signature"
 
 
 def test_each_run_has_its_critical_factor_and_its_alarm():
