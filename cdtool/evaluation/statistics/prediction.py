@@ -4,8 +4,8 @@ Conventions: `values` (n,) are maxima, one a run (critical factors, say); what i
 kind. The prediction holds its own uncertainty: with few runs neither mean nor spread is sure.
 
 A run's maximum is taken as the sum of two parts of equal variance: what shifts the run as a whole (normal), and the
-largest of its noise (Gumbel). Alone, the normal one promises too much, the Gumbel one far too little:
-`benchmarks/signature_coverage.py` measures all three.
+largest of its noise (Gumbel). Measured by `benchmarks/signature_coverage.py`: limits for 1 in 1000 are exceeded by 0.4
+on average; by 1.8 were the maxima taken as normal, by fewer than 0.1 were they taken as Gumbel.
 """
 
 from __future__ import annotations
