@@ -14,6 +14,7 @@ from pathlib import Path
 QUESTIONS = (
     *("friction_ekf", "momentum", "robot_dynamics", "detectors"),
     *("start_up", "whole_benchmark", "reports", "interval_coverage", "compare_builds"),
+    *("mcap_reading", "csv_reading"),
     *("gate_accuracy", "arm_accuracy"),
 )
 

@@ -56,7 +56,10 @@ class ChannelSource:
 
 @dataclass(frozen=True)
 class TimeSource:
-    """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks."""
+    """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
+
+    With both a column and a rate the column counts samples: a gap in it is a gap in time.
+    """
 
     column: str | int | None = None
     factor: float = 1.0
@@ -65,14 +68,34 @@ class TimeSource:
 
 
 @dataclass(frozen=True)
+class TablePins:
+    """What `[csv]` says of how a table is written; what it does not say is found in the file.
+
+    A mark that is None, an empty text or a line that is None are not pinned; `header` and `units` False: there is none.
+    """
+
+    separator: str = ""
+    decimal: str = ""
+    thousands: str | None = None
+    encoding: str = ""
+    header: int | bool | None = None
+    units: int | bool | None = None
+    skip_lines: int = 0
+    comment: str | None = None
+    missing: tuple[str, ...] = ()
+    time_format: str = ""
+
+
+@dataclass(frozen=True)
 class ChannelMap:
-    """All channels of a log; `topics` tells the MCAP map from the map of columns."""
+    """All channels of a log; `topics` tells the MCAP map from the map of columns, `pins` is for tables of text."""
 
     time: TimeSource
     sources: tuple[ChannelSource, ...]
     joints: tuple[str, ...]
     topics: bool = False
     speed_low_pass: float = 50.0
+    pins: TablePins = TablePins()
 
     def __contains__(self, channel: str) -> bool:
         return any(source.channel == channel for source in self.sources)
@@ -104,8 +127,11 @@ def _time_source(table: Table, topics: bool) -> TimeSource:
     part = table.table("time", required=True)
     if "rate_hz" in part:
         rate = part.number("rate_hz", above=0.0)
+        counter = part.raw("column")
         part.finish()
-        return TimeSource(rate=rate)
+        if counter is None:
+            return TimeSource(rate=rate)
+        return TimeSource(column=_column(part, counter, "column"), factor=1.0 / rate, rate=rate)
     column = _column(part, part.raw("column"), "column")
     name = part.text("unit", "")
     if not name:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from cdtool.channels import ChannelMap, read_channel_map
+from cdtool.channels import ChannelMap, TablePins, read_channel_map
 from cdtool.dynamics import Gain
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
@@ -50,6 +50,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     table.finish()
     channels = root.table("channels")
     columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
+    columns = replace(columns, pins=_read_pins(root.table("csv")))
     topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
     gains = _read_gains(root.table("detectors"), len(machine.joints))
     root.finish()
@@ -88,6 +89,13 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
             raise table.fault(name, f"is {full} again", "give a detector's gains once, under one of its names")
         gains[full] = given
     return gains
+
+
+def _read_pins(table: Table) -> TablePins:
+    if not table.values:
+        return TablePins()
+    pins: TablePins = import_module("cdtool.formats.csv.pins").read_pins(table)
+    return pins
 
 
 def _registry(module: str, name: str) -> Registry:

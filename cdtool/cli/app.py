@@ -20,6 +20,7 @@ from cdtool.cli.info import info
 from cdtool.cli.learn_signature import learn_signature
 from cdtool.cli.list_known import list_known
 from cdtool.cli.plan import plan
+from cdtool.cli.recover import recover
 from cdtool.cli.report import report
 from cdtool.cli.score import score
 from cdtool.cli.signature import signature
@@ -44,6 +45,7 @@ app.command("report")(report)
 app.command("score")(score)
 app.command("compare")(compare)
 app.command("plan")(plan)
+app.command("recover")(recover)
 app.add_typer(signature, name="signature")
 app.add_typer(simulate, name="simulate")
 app.add_typer(study, name="study")

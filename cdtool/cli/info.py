@@ -72,3 +72,7 @@ def _show(item: Info) -> None:
         typer.echo(f"{finding.severity}: {plain(finding)}")
     if not item.findings:
         typer.echo("nothing odd found")
+    if item.dialect:
+        typer.echo("\nHow the table is written, to be pasted into a machine file:\n")
+        for line in item.dialect.splitlines():
+            typer.echo(plain(line))

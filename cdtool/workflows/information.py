@@ -41,21 +41,31 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class Info:
-    """A log: without a machine file its columns as they stand, with one its channels on the load side."""
+    """A log: without a machine file its columns as they stand, with one its channels on the load side.
+
+    `dialect` is how a table of text is written, as `[csv]` of a machine file; empty for other formats.
+    """
 
     source: str
     format: str
     details: Mapping[str, str]
     channels: tuple[ChannelInfo, ...]
     findings: tuple[Finding, ...]
+    dialect: str = ""
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
     """Survey a log; with a machine file also map it, cut it and check the accelerometer. Raises RecordingError."""
-    from cdtool.formats.reading import survey
+    from cdtool.formats.csv import TableSource
+    from cdtool.formats.reading import choose_format, survey
 
-    source = survey(Path(log))
-    if machine is None:
+    machine_file = machine if isinstance(machine, MachineFile) or machine is None else read_machine_file(machine)
+    if machine_file is None or not machine_file.columns.sources or (found := choose_format(Path(log))).name != "csv":
+        source = survey(Path(log))
+    else:  # a table whose dialect is pinned may not be readable without the pins
+        source = found.columns(Path(log), machine_file.columns)
+    dialect = source.dialect if isinstance(source, TableSource) else ""
+    if machine_file is None:
         clock = guess_clock(source)
         table_time = clock.time if clock else None
         channels = [
@@ -68,8 +78,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
             for channel in channels
             if channel.missing
         ]
-        return Info(str(log), source.format, source.details, tuple(channels), tuple(findings))
-    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+        return Info(str(log), source.format, source.details, tuple(channels), tuple(findings), dialect)
     recording = read_log(log, machine_file)
     channels = [
         _describe(_label(name, recording, j), series.unit, series.values[:, j], series.time)
@@ -78,7 +87,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
     ]
     findings = [*recording.findings, *_motion_findings(recording), *accelerometer_findings(recording)]
     findings += _bandwidth_findings(recording, machine_file)
-    return Info(str(log), source.format, source.details, tuple(channels), tuple(dict.fromkeys(findings)))
+    return Info(str(log), source.format, source.details, tuple(channels), tuple(dict.fromkeys(findings)), dialect)
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

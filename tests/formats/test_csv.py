@@ -71,9 +71,14 @@ def test_a_decimal_comma_is_read_as_one(log, separator):
     assert source.details["decimal mark"] == "comma"
 
 
-def test_a_point_in_a_column_with_decimal_commas_is_refused(log, machine):
-    path = log("t;i_motor;n_motor\n0;1,5;0\n1;1.234,5;0\n2;1,5;0\n")
-    with pytest.raises(RecordingError, match=r"line 3, column 'i_motor': '1\.234,5' is not a number"):
+def test_a_point_between_thousands_beside_a_decimal_comma_is_read_as_one(log, machine):
+    source = read(log("t;i_motor;n_motor\n0;1,5;0\n1;1.234,5;0\n2;1,5;0\n"), machine().columns)
+    assert values(source, "i_motor") == [1.5, 1234.5, 1.5]
+
+
+def test_a_point_at_another_place_in_a_column_with_decimal_commas_is_refused(log, machine):
+    path = log("t;i_motor;n_motor\n0;1,5;0\n1;1.23,5;0\n2;1,5;0\n")
+    with pytest.raises(RecordingError, match=r"line 3, column 'i_motor': '1\.23,5' is not a number"):
         read(path, machine().columns)
 
 
@@ -185,7 +190,7 @@ def test_a_column_number_beyond_the_file_is_an_error(log, machine):
         (b"t,a\n\x00\x01\x02\x03,\xff\n", "binary"),
         (b"\x89PNG\r\n\x1a\n1,2", "binary or markup"),
         (b"<html><body>1,2</body></html>", "binary or markup"),
-        ("t,a\n0,1\n".encode("utf-16"), "UTF-16"),
+        ("t,a\n0,1\n".encode("utf-16")[:-1] + b"\xd8", "UTF-16"),
         (b't,a\n0,"1\n2,3\n4,5\n', "cells|quotes|table"),
     ],
 )
@@ -203,7 +208,7 @@ def test_mixed_line_ends_are_never_read_silently_wrong(log):
 
 
 def test_many_rows_pass_the_blockwise_check(log, monkeypatch):
-    monkeypatch.setattr("cdtool.formats.csv_rows._BLOCK", 64)
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 64)
     lines = [f"{i},{i * 0.5}" for i in range(1000)]
     assert len(values(read(log("t,a\n" + "\n".join(lines))), "a")) == 1000
     lines[700] += ",1"

@@ -1,18 +1,19 @@
-"""MCAP: topics of messages, JSON or ROS 2 CDR. Read from the front with every CRC checked."""
+"""MCAP: topics of messages (JSON, ROS 2 CDR, ROS 1, protobuf), read piece by piece with every CRC checked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError, nearest
-from cdtool.formats.mcap.decode import Decoded, decode_topic, field_column, stamp_of, survey_columns
-from cdtool.formats.mcap.fields import header_stamp
-from cdtool.formats.mcap.read import MAGIC, Log, Topic, read_log
+from cdtool.formats.mcap.container.ahead import ahead
+from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.records import MAGIC
+from cdtool.formats.mcap.fields import parse_field
+from cdtool.formats.mcap.gathering import Gathering
+from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding
 
@@ -21,7 +22,7 @@ __all__ = ["Mcap"]
 
 @dataclass(frozen=True)
 class Mcap:
-    """MCAP logs with JSON or ROS 2 CDR messages: a column is a topic and a field, `/joint_states position[0]`."""
+    """MCAP logs: a column is a topic and a numeric field of its messages, `/joint_states position[0]`."""
 
     name: ClassVar[str] = "mcap"
     suffixes: ClassVar[tuple[str, ...]] = (".mcap",)
@@ -33,94 +34,80 @@ class Mcap:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
-        if wanted is None:
-            return self._survey(path)
-        asked = {source.topic for source in wanted.sources}
-        log = read_log(path, asked.__contains__)
-        findings = list(log.findings)
-        for source in wanted.sources:
-            if source.topic not in log.topics or not log.topics[source.topic].count:
-                known = [topic.name for topic in log.topics.values() if topic.count]
-                raise RecordingError(
-                    f"{path}: no message of topic '{source.topic}' (channel '{source.channel}')",
-                    nearest(source.topic, known),
-                )
-        decoded = {name: _decoded(path, log.topics[name], findings) for name in asked}
-        origin = self._origin(path, log, decoded, wanted)
-        columns: dict[str, Column] = {}
-        for source in wanted.sources:
-            topic = log.topics[source.topic]
-            clock, messages = wanted.time.clock, decoded[source.topic]
-            column, found = field_column(path, topic, messages, source.field, clock, origin, wanted.joints)
-            if column.name not in columns:
-                columns[column.name] = column
-                findings += found
-        return self._source(path, log, columns, findings, origin)
-
-    def _survey(self, path: Path) -> Source:
-        log = read_log(path, lambda _: True)
-        findings = list(log.findings)
-        columns: dict[str, Column] = {}
-        for topic in log.topics.values():
-            decoded = decode_topic(topic)
-            topic.messages = []
-            if decoded.failed:
-                # A topic that nobody has asked for is no loss.
-                findings.append(replace(_failure(topic, decoded), severity="warning"))
-            for item in survey_columns(topic, decoded, log.origin):
-                if isinstance(item, Finding):
-                    findings.append(item)
-                else:
-                    columns[item.name] = item
-            findings += _header_finding(topic, decoded)
-        return self._source(path, log, columns, findings, log.origin)
-
-    def _origin(self, path: Path, log: Log, decoded: dict[str, Decoded], wanted: ChannelMap) -> int:
-        # A header's clock may be another one (simulated time): its own first stamp is its origin.
-        if wanted.time.clock == "log":
-            return log.origin
-        stamps = [
-            stamp_of(*part.messages[0], wanted.time.clock, f"{path}: {name}")
-            for name, part in decoded.items()
-            if part.messages
-        ]
-        return min(stamps, default=log.origin)
-
-    def _source(self, path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
-        details = {
-            topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()
-        }
-        return Source(path, self.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))
+        return _survey(path) if wanted is None else _wanted(path, wanted)
 
 
-def _decoded(path: Path, topic: Topic, findings: list[Finding]) -> Decoded:
-    decoded = decode_topic(topic)
-    if not decoded.messages:
-        raise RecordingError(
-            f"{path}: no message of {topic.name} can be decoded: {decoded.reason}",
-            "record it as JSON or ROS 2 CDR with its message definition",
+def _wanted(path: Path, wanted: ChannelMap) -> Source:
+    texts: dict[str, list[str]] = {}
+    for source in wanted.sources:
+        fields = texts.setdefault(source.topic, [])
+        if source.field not in fields:
+            fields.append(source.field)
+    log = Log(path, texts.__contains__)
+    topics = {
+        name: Gathering(
+            f"{path}: {name}",
+            name,
+            [parse_field(text, f"{path}: {name}") for text in fields],
+            wanted.time.clock,
+            wanted.joints,
+            log.expected(name),
         )
-    if decoded.failed:
-        findings.append(_failure(topic, decoded))
-    return decoded
+        for name, fields in texts.items()
+    }
+    for piece in ahead(log.pieces()):
+        for messages in piece:
+            topics[messages.stream.channel.topic].add(messages.stream, messages.batch)
+    findings = log.findings()
+    _check_topics(path, wanted, log)
+    for name in dict.fromkeys(source.topic for source in wanted.sources):
+        decoders = topics[name].decoders
+        if not decoders.decoded:
+            raise RecordingError(
+                f"{path}: no message of {name} can be decoded: {decoders.reason}",
+                "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
+            )
+        findings += decoders.failure(name)
+    # A header's clock may be another one (simulated time): its own first stamp is its origin.
+    stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
+    origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
+    columns: dict[str, Column] = {}
+    for source in wanted.sources:
+        if f"{source.topic} {source.field}" not in columns:
+            column, found = topics[source.topic].column(texts[source.topic].index(source.field), origin)
+            columns[column.name] = column
+            findings += found
+    return _source(path, log, columns, findings, origin)
 
 
-def _failure(topic: Topic, decoded: Decoded) -> Finding:
-    return Finding(
-        f"{decoded.failed} of {topic.count} messages cannot be decoded: {decoded.reason}", topic.name, "loss"
-    )
+def _check_topics(path: Path, wanted: ChannelMap, log: Log) -> None:
+    known = [topic.name for topic in log.topics.values() if topic.count]
+    for source in wanted.sources:
+        if source.topic not in known:
+            raise RecordingError(
+                f"{path}: no message of topic '{source.topic}' (channel '{source.channel}')",
+                nearest(source.topic, known),
+            )
 
 
-def _header_finding(topic: Topic, decoded: Decoded) -> list[Finding]:
-    late = [
-        (raw.log_time - stamp) / 1e6
-        for raw, message in decoded.messages
-        if (stamp := header_stamp(message)) is not None
-    ]
-    if not late or not any(late):
-        return []
-    if not any(header_stamp(message) for _, message in decoded.messages):
-        return [Finding("the header's stamps are never set: use the log clock", topic.name, "note")]
-    low, median, high = np.percentile(late, (5, 50, 95))
-    text = f"logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
-    return [Finding(text, topic.name, "note")]
+def _survey(path: Path) -> Source:
+    log = Log(path)
+    topics: dict[str, TopicSurvey] = {}
+    for piece in ahead(log.pieces()):
+        for messages in piece:
+            name = messages.stream.channel.topic
+            topics.setdefault(name, TopicSurvey(name, log.expected(name))).add(messages.stream, messages.batch)
+    findings = log.findings()
+    columns: dict[str, Column] = {}
+    for name in log.topics:
+        for item in topics[name].found(log.origin) if name in topics else ():
+            if isinstance(item, Finding):
+                findings.append(item)
+            else:
+                columns[item.name] = item
+    return _source(path, log, columns, findings, log.origin)
+
+
+def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
+    details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
+    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))

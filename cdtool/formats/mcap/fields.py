@@ -12,7 +12,8 @@ from typing import Any
 from cdtool.errors import RecordingError, nearest
 
 _STEP = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>[^\[\]]*)\])?")
-_LONGEST_ARRAY = 16
+LONGEST_ARRAY = 16  # of a survey
+STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # of a header: ROS 2, Gazebo, ROS 1
 
 Value = float | list[float] | None
 
@@ -37,6 +38,11 @@ class Field:
     text: str
     steps: tuple[tuple[str, str | None], ...]
 
+    @property
+    def whole(self) -> bool:
+        """True for a whole array."""
+        return any(index == ":" for _, index in self.steps)
+
     def of(self, message: Any, joints: Sequence[str] = ()) -> Value:
         """Its value in one message; raises FieldMissingError."""
         value = message
@@ -49,7 +55,8 @@ class Field:
                 raise FieldMissingError(f"'{name}' is not an array", [name])
             if index == ":":
                 numbers = [_number(item, self.text) for item in value]
-                return _in_order(numbers, _element_names(parent), joints)
+                order = order_of(len(numbers), _element_names(parent), joints)
+                return numbers if order is None else [numbers[place] for place in order]
             if index.isdigit():
                 if len(value) == 0:
                     return math.nan
@@ -59,7 +66,9 @@ class Field:
                     )
                 value = value[int(index)]
                 continue
-            names = list(_member(parent, "name"))
+            if not _is_array(_member(parent, "name")):
+                raise FieldMissingError("'name' is not an array", ["name"])
+            names = _element_names(parent)
             if index not in names:
                 return None
             place = names.index(index)
@@ -94,10 +103,10 @@ def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[flo
         if full == "header.stamp":
             continue
         if _is_array(value):
-            if len(value) <= _LONGEST_ARRAY and all(_is_number(item) for item in value):
-                found[f"{full}[:]"] = [float(item) for item in value]
+            if len(value) <= LONGEST_ARRAY and all(_is_number(item) for item in value):
+                found[f"{full}[:]"] = [_float(item) for item in value]
         elif _is_number(value):
-            found[full] = float(value)
+            found[full] = _float(value)
         elif _member_names(value):
             found.update(numeric_fields(value, f"{full}."))
     return found
@@ -109,7 +118,7 @@ def header_stamp(message: Any) -> int | None:
         stamp = _member(_member(message, "header"), "stamp")
     except FieldMissingError:
         return None
-    for seconds, nanoseconds in (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs")):
+    for seconds, nanoseconds in STAMPS:
         names = _member_names(stamp)
         if seconds in names and nanoseconds in names:
             return int(_member(stamp, seconds)) * 10**9 + int(_member(stamp, nanoseconds))
@@ -122,20 +131,28 @@ def missing(where: str, text: str, fault: FieldMissingError) -> RecordingError:
 
 
 def _element_names(message: Any) -> list[str]:
-    return [str(name) for name in _member(message, "name")] if "name" in _member_names(message) else []
+    return _texts(_member(message, "name")) if "name" in _member_names(message) else []
 
 
-def _in_order(numbers: list[float], names: list[str], joints: Sequence[str]) -> list[float]:
-    """The numbers of the joints, found by their names; as they are where the message names none or there is but one."""
-    if not joints or not numbers or len(names) != len(numbers) or len(joints) == len(numbers) == 1:
-        return numbers
-    absent = [joint for joint in joints if joint not in names]
+def _texts(names: Any) -> list[str]:
+    return [str(name) for name in names] if _is_array(names) else []
+
+
+def order_of(count: int, names: Sequence[str], joints: Sequence[str]) -> list[int] | None:
+    """Which of `count` elements called `names` are those of the joints, in their order; raises FieldMissingError.
+
+    None: as they are, since the message does not name them or there is but one.
+    """
+    if not joints or not count or len(names) != count or len(joints) == count == 1:
+        return None
+    places = {name: place for place, name in reversed(list(enumerate(names)))}
+    absent = [joint for joint in joints if joint not in places]
     if absent:
         raise FieldMissingError(
             f"its messages name {', '.join(names)}, not '{absent[0]}' of machine.joints",
             advice="name machine.joints as the log does (a URDF's other names go into machine.joint_map)",
         )
-    return [numbers[names.index(joint)] for joint in joints]
+    return [places[joint] for joint in joints]
 
 
 def _member(value: Any, name: str) -> Any:
@@ -170,4 +187,11 @@ def _number(value: Any, text: str) -> float:
         return math.nan
     if not _is_number(value):
         raise FieldMissingError(f"'{text}' holds {str(value)[:40]!r}, not a number")
-    return float(value)
+    return _float(value)
+
+
+def _float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an int that is larger than any float64
+        return math.inf if value > 0 else -math.inf

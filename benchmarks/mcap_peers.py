@@ -1,0 +1,87 @@
+"""The packages that reading MCAP is timed against: each decodes message by message and picks the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.reader import make_reader
+from mcap_logs import TOPICS, WANTED, Array, protobuf_message
+
+Columns = dict[str, Array]
+
+
+def gathered(messages: Iterator[tuple[str, Any]], member: Callable[[Any, str], Any]) -> Columns:
+    """Columns of the wanted fields of (topic, decoded message); `member` gets a field of one."""
+    fields: dict[str, list[tuple[list[str], list[Any]]]] = {topic: [] for topic in TOPICS}
+    for topic, field in WANTED:
+        fields[topic].append((field.removesuffix("[:]").split("."), []))
+    for topic, message in messages:
+        for steps, values in fields[topic]:
+            value = message
+            for step in steps:
+                value = member(value, step)
+            values.append(value)
+    found = {topic: iter(columns) for topic, columns in fields.items()}
+    return {f"{topic} {field}": np.array(next(found[topic])[1], dtype=np.float64) for topic, field in WANTED}
+
+
+def by_mcap_ros2_support(path: Path) -> Columns:
+    from mcap_ros2.decoder import DecoderFactory
+
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        rows = reader.iter_decoded_messages(log_time_order=False)
+        return gathered(((channel.topic, message) for _, channel, _, message in rows), getattr)
+
+
+def by_rosbags(path: Path) -> Columns:
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([path]) as reader:
+        rows = reader.messages()
+        return gathered(((each.topic, reader.deserialize(raw, each.msgtype)) for each, _, raw in rows), getattr)
+
+
+def by_orjson(path: Path) -> Columns:
+    import orjson
+
+    with path.open("rb") as file:
+        rows = make_reader(file).iter_messages(log_time_order=False)
+        return gathered(((channel.topic, orjson.loads(row.data)) for _, channel, row in rows), dict.__getitem__)
+
+
+def by_protobuf(path: Path) -> Columns:
+    made = {topic: protobuf_message(kind)[1] for topic, (kind, _) in TOPICS.items()}
+    with path.open("rb") as file:
+        rows = make_reader(file).iter_messages(log_time_order=False)
+        return gathered(
+            ((channel.topic, made[channel.topic].FromString(row.data)) for _, channel, row in rows), getattr
+        )
+
+
+def decompression(path: Path) -> Callable[[], None]:
+    """Decompressing every chunk, held in memory already, with its package and nothing else."""
+    import lz4.frame
+    import zstandard
+
+    from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, chunk_header
+    from cdtool.formats.mcap.container.log import Log
+
+    content = path.read_bytes()
+    chunks = []
+    for at in Log(path).summary.chunks:
+        header = chunk_header(at, memoryview(content)[at : at + HEADER_LENGTH])
+        chunks.append((content[header.data : header.data + header.size], header.uncompressed_size, header.compression))
+    zstd = zstandard.ZstdDecompressor()
+
+    def run() -> None:
+        for packed, size, compression in chunks:
+            if compression == "zstd":
+                zstd.decompress(packed, max_output_size=size)
+            else:
+                lz4.frame.decompress(packed)
+
+    return run

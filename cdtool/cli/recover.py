@@ -1,0 +1,38 @@
+"""`cdtool recover`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.console import plain
+from cdtool.errors import ExitStatus
+
+
+def recover(
+    log: Annotated[Path, typer.Argument(help="A damaged or cut MCAP file.", metavar="LOG")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The clean MCAP file to write.")],
+    unverified: Annotated[
+        bool, typer.Option("--unverified", help="Also keep messages that no checksum covers, marked as such.")
+    ] = False,
+) -> None:
+    """Write what is left of a damaged MCAP file as a clean one, and say what was lost.
+
+    Ends with status 3 where something was lost or left out, 0 where the file was whole.
+
+    Example: cdtool recover log.mcap -o recovered.mcap
+    """
+    from cdtool.workflows.recovering import recover as write_what_is_left
+
+    done = write_what_is_left(log, output, unverified)
+    for finding in done.findings:
+        typer.echo(f"{finding.severity}: {plain(finding)}")
+    typer.echo(f"written: {plain(done.output)}: {done.messages} messages")
+    if done.unverified:
+        typer.echo(f"{done.unverified} of them no checksum covers: in chunks without one")
+    if done.left_out:
+        typer.echo(f"left out: {done.left_out} messages that no checksum covers (--unverified keeps them)")
+    if not done.whole:
+        raise typer.Exit(ExitStatus.INCOMPLETE)

@@ -1,0 +1,126 @@
+"""The encoding and the line ends of a text file, by its first bytes; and whether it is text at all."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from pathlib import Path
+
+from cdtool.errors import RecordingError
+from cdtool.formats.csv.text import UNIT_BYTES, Text
+
+# UTF-32 first: its mark begins with that of UTF-16.
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]")
+_OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
+
+
+def looks_like_text(sample: bytes) -> bool:
+    """False for what cannot be a table of numbers: NUL bytes that are of no wide character, markup, a known binary."""
+    head = sample[:4096]
+    if head.startswith(_OTHER_KINDS):
+        return False
+    encoding, mark = _by_mark(head)
+    if encoding is None:
+        encoding = _wide_without_mark(head)
+    if encoding in UNIT_BYTES:
+        usable = len(head) - (len(head) - mark) % UNIT_BYTES[encoding]
+        try:
+            text = codecs.getincrementaldecoder(encoding)().decode(head[mark:usable]).rstrip("\0").encode()
+        except UnicodeError:
+            return False
+    else:
+        text = head[mark:].rstrip(b"\0")  # a file system pads the end of a file that was cut by a loss of power
+    # NUL bytes between lines are what a loss of power leaves; a binary file has other control characters too.
+    first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
+    return bool(text) and not (
+        _CONTROL.search(text) or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"["))
+    )
+
+
+def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]:
+    """Encoding and line ends, and the sample as the stream has it; raises RecordingError."""
+    if not looks_like_text(sample):
+        raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "give a CSV, MCAP or MAT file")
+    found, mark = _by_mark(sample)
+    encoding = pinned or found or _wide_without_mark(sample) or _narrow(sample)
+    if pinned and found and codecs.lookup(pinned).name != found:
+        raise RecordingError(
+            f"{path}: line 1 begins with the byte order mark of {found.upper()}, [csv] encoding is '{pinned}'",
+            "correct or remove encoding in [csv]",
+        )
+    size, padding = _without_padding(path, UNIT_BYTES.get(encoding, 1))
+    stream = sample[mark : max(size, mark)]
+    if encoding in UNIT_BYTES:
+        try:
+            stream = codecs.getincrementaldecoder(encoding)().decode(stream).encode()
+        except UnicodeError as fault:
+            raise RecordingError(f"{path}: is damaged: no {encoding.upper()}", "save it anew as UTF-8") from fault
+    elif pinned:
+        _check_pinned(path, stream, encoding)
+    # One line feed at the very end does not make a file of carriage returns one of line feeds.
+    inner = stream.rstrip(b"\r\n")
+    line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
+    if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
+        line_end = b"\r"
+    return Text(path, encoding, mark, size, padding, line_end), stream
+
+
+def _by_mark(sample: bytes) -> tuple[str | None, int]:
+    return next(((name, len(mark)) for mark, name in _MARKS if sample.startswith(mark)), (None, 0))
+
+
+def _wide_without_mark(sample: bytes) -> str | None:
+    """UTF-16 without its mark: of a table nearly every second byte is NUL, and hardly any of the others."""
+    head = sample[:4096].rstrip(b"\0")
+    head += b"\0" * (len(head) % 2)
+    if len(head) < 4:
+        return None
+    even, odd = head[0::2].count(0) / (len(head) // 2), head[1::2].count(0) / (len(head) // 2)
+    if odd > 0.7 and even < 0.05:
+        return "utf-16-le"
+    return "utf-16-be" if even > 0.7 and odd < 0.05 else None
+
+
+def _narrow(sample: bytes) -> str:
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(sample)
+    except UnicodeDecodeError:
+        # Bytes 0x80 to 0x9f are letters and quotes in Windows-1252, control characters in Latin-1.
+        return "cp1252" if any(0x80 <= byte <= 0x9F for byte in set(sample)) else "latin-1"
+    return "utf-8"
+
+
+def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
+    try:
+        codecs.getincrementaldecoder(encoding)().decode(stream)
+    except UnicodeError as fault:
+        at = getattr(fault, "start", 0)
+        line = stream.count(b"\n", 0, at) + 1
+        raise RecordingError(
+            f"{path}: line {line} is not valid {encoding}, which [csv] encoding says", "correct or remove encoding"
+        ) from fault
+
+
+def _without_padding(path: Path, unit: int) -> tuple[int, int]:
+    """Where the text ends, and how many NUL bytes follow."""
+    total = path.stat().st_size
+    end = total
+    with path.open("rb") as file:
+        while end > 0:
+            start = max(0, end - (1 << 16))
+            file.seek(start)
+            kept = len(file.read(end - start).rstrip(b"\0"))
+            end = start + kept
+            if kept:
+                break
+    if unit > 1:  # the upper bytes of the last character are NUL too
+        mark = total % unit
+        end = min(total, end + (mark - end) % unit)
+    return end, total - end

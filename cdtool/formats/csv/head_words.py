@@ -1,0 +1,83 @@
+"""Words above the rows of a table: units, types, numbered names; and what the cells of a column mostly are."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from cdtool.formats.csv.cells import kind
+from cdtool.units import find_unit
+
+# Units that have no factor to SI here, and words that stand for one.
+_UNIT_WORDS = frozenset(
+    (
+        *(
+            "volt",
+            "volts",
+            "ampere",
+            "amperes",
+            "amp",
+            "amps",
+            "second",
+            "seconds",
+            "msec",
+            "newton",
+            "newtons",
+            "degree",
+        ),
+        *("degrees", "hz", "khz", "mhz", "°c", "degc", "k", "w", "kw", "bar", "mbar", "pa", "kpa", "l/min", "ohm", "-"),
+        *("db", "lsb", "inc", "incr", "digit", "digits"),
+    )
+)
+_TYPES = frozenset(
+    (
+        *("real", "lreal", "int", "dint", "lint", "sint", "uint", "udint", "usint", "bool", "byte", "word", "dword"),
+        *(
+            "float",
+            "double",
+            "float32",
+            "float64",
+            "single",
+            "string",
+            "date",
+            "boolean",
+            "integer",
+            "number",
+            "numeric",
+        ),
+        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+    )
+)
+
+
+def column_kinds(rows: Sequence[Sequence[str]], width: int) -> str:
+    """One letter a column, what most of its cells are: N, T, X, or M if all are missing."""
+    seen = [Counter(kind(row[i]) for row in rows) for i in range(width)]
+    letters = []
+    for counts in seen:
+        present = {letter: counts[letter] for letter in "NTX" if counts[letter]}
+        letters.append(max(present, key=lambda letter: present[letter]) if present else "M")
+    return "".join(letters)
+
+
+def are_numbered(cells: Sequence[str]) -> bool:
+    """`t,1,2,3`: a word, and then numbers counted up by one."""
+    rest = list(cells[1:])
+    if not cells or kind(cells[0]) not in "XM" or not rest or not all(cell.isdigit() for cell in rest):
+        return False
+    return [int(cell) for cell in rest] == list(range(int(rest[0]), int(rest[0]) + len(rest))) and int(rest[0]) < 2
+
+
+def are_types(cells: Sequence[str]) -> bool:
+    """True for a row of types, as PLCs write it below the names: `REAL;INT`."""
+    words = [cell.lower().strip("[]()") for cell in cells if cell]
+    return bool(words) and all(word in _TYPES for word in words)
+
+
+def is_unit(cell: str) -> bool:
+    """True for a unit: a known one, one of the words for units, or anything in brackets."""
+    bare = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", cell)
+    if bare is not None:
+        return kind(bare[1]) == "X" or bare[1] in ("", "1")
+    return find_unit(cell) is not None or cell.lower() in _UNIT_WORDS

@@ -1,0 +1,88 @@
+"""`[csv]` of the machine file: the parts of a table's dialect that are said instead of found."""
+
+from __future__ import annotations
+
+import codecs
+
+from cdtool.channels import TablePins
+from cdtool.formats.csv.stamps import check_pattern
+from cdtool.tables import Table
+
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "blanks": " "}
+_THOUSANDS = ("", ",", ".", "'", " ", "\u00a0", "\u202f")
+_TIME_WORDS = ("", "number", "excel")
+
+
+def read_pins(table: Table) -> TablePins:
+    """The pins of `[csv]`; raises ConfigurationError naming the key."""
+    separator = _one_of(table, "separator", {**_SEPARATORS, **{mark: mark for mark in _SEPARATORS.values()}})
+    decimal = _one_of(table, "decimal", {",": ",", ".": ".", "comma": ",", "point": "."})
+    thousands = table.text("thousands") if "thousands" in table else None
+    if thousands is not None and thousands not in _THOUSANDS:
+        raise table.fault("thousands", f"is {thousands!r}", '",", ".", "\'", a blank, or "" for none')
+    if decimal and thousands == decimal:
+        raise table.fault("thousands", f"is {thousands!r}, as decimal is", "a number has one decimal mark")
+    pins = TablePins(
+        separator=separator,
+        decimal=decimal,
+        thousands=thousands,
+        encoding=_encoding(table),
+        header=_line(table, "header"),
+        units=_line(table, "units"),
+        skip_lines=table.whole("skip_lines", 0, minimum=0),
+        comment=table.text("comment") if "comment" in table else None,
+        missing=table.texts("missing", ()),
+        time_format=_time_format(table),
+    )
+    if pins.header is False and isinstance(pins.units, int) and pins.units is not False:
+        raise table.fault("units", f"is {pins.units} beside header = false", "a row of units follows a header")
+    table.finish()
+    return pins
+
+
+def _one_of(table: Table, name: str, meaning: dict[str, str]) -> str:
+    if name not in table:
+        return ""
+    given = table.text(name)
+    if given not in meaning:
+        words = ", ".join(repr(word) for word in meaning)
+        raise table.fault(name, f"is {given!r}", f"one of {words}")
+    return meaning[given]
+
+
+def _line(table: Table, name: str) -> int | bool | None:
+    value = table.raw(name)
+    if value is None or value is False:
+        return value
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise table.fault(name, f"is {value!r}", "the number of its line, counted from 1, or false")
+    return value
+
+
+def _encoding(table: Table) -> str:
+    name = table.text("encoding", "")
+    if not name:
+        return ""
+    try:
+        known = codecs.lookup(name).name
+        b"1,2\n".decode(known)
+        narrow = "1,2\n".encode(known) == b"1,2\n"
+    except (LookupError, UnicodeError, AssertionError):
+        raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
+    # The numbers are read byte by byte: they have to be ASCII, or of the encodings that are recoded.
+    known = {"iso8859-1": "latin-1"}.get(known, known)
+    if not narrow and known not in ("utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"):
+        raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
+    return known
+
+
+def _time_format(table: Table) -> str:
+    value = table.text("time_format", "")
+    if value in _TIME_WORDS:
+        return value
+    problem = check_pattern(value) if "%" in value else "is no layout"
+    if problem:
+        raise table.fault(
+            "time_format", f"is '{value}': {problem}", "number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f"
+        )
+    return value

@@ -1,0 +1,178 @@
+"""Columns of dates and times of day: which way they are written, by all their cells in the sample.
+
+A layout is written as for `strptime`: `%d.%m.%Y %H:%M:%S.%f`, with `%f` for any number of digits and `%z` for a zone.
+`03.04.2025` is the third of April, as it is wherever points are used; `03/04/2025` and `03-04-2025` may be the fourth
+of March: unless a day above 12 decides, they are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from cdtool.formats.csv import stamp_kernel as steps
+from cdtool.formats.csv.cells import MISSING, STAMP_LIKE
+from cdtool.recording import FloatArray
+
+_FIELDS = {
+    "%Y": steps.YEAR,
+    "%y": steps.SHORT_YEAR,
+    "%m": steps.MONTH,
+    "%d": steps.DAY,
+    "%H": steps.HOUR,
+    "%I": steps.HOUR,
+    "%M": steps.MINUTE,
+    "%S": steps.SECOND,
+    "%f": steps.FRACTION,
+    "%z": steps.ZONE,
+    "%b": steps.MONTH_NAME,
+    "%p": steps.HALF_DAY,
+}
+_DATES = (
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
+    *("%d-%b-%Y", "%d/%b/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y%m%d"),
+)
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
+_LOOKED = 200
+NS = 1_000_000_000
+_DAY = 86400 * NS
+
+
+@dataclass(frozen=True)
+class Layout:
+    """One way to write a stamp; `dated` if it has a day, `timed` if it has an hour."""
+
+    pattern: str
+
+    @property
+    def dated(self) -> bool:
+        """True if the stamps name a day."""
+        return "%d" in self.pattern
+
+    @property
+    def timed(self) -> bool:
+        """True if the stamps name a time of day."""
+        return "%H" in self.pattern or "%I" in self.pattern
+
+    @property
+    def program(self) -> list[int]:
+        """The steps that the kernel takes, ended by 0; raises ValueError for a pattern it cannot follow."""
+        return _program(self.pattern)
+
+    def read(self, text: str) -> int | None:
+        """Nanoseconds since 1970 (of a time of day: since midnight), or None if the text is written another way."""
+        raw = text.strip(" \t\r").encode("utf-8", errors="replace")
+        data = np.frombuffer(raw + bytes(16), dtype=np.uint8)
+        value, end = steps.read_stamp(data, 0, _compiled(self.pattern))
+        return int(value) if end == len(raw) else None
+
+
+@cache
+def _compiled(pattern: str) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    return np.array(_program(pattern), dtype=np.int64)
+
+
+@cache
+def _program(pattern: str) -> list[int]:
+    program: list[int] = []
+    for part in re.findall(r"[.,]%f|%.|T| +|.", pattern):
+        if part in (".%f", ",%f"):
+            program.append(steps.POINT_FRACTION)
+        elif part in _FIELDS:
+            program.append(_FIELDS[part])
+        elif (part.startswith("%") and part != "%%") or (len(part.encode()) > 1 and part.strip()):
+            raise ValueError(f"'{part}' is not known")
+        elif part == "T" or not part.strip():
+            program.append(steps.DATE_GAP)
+        else:
+            program.append(ord(part[-1]))
+    if len(program) >= steps.STEPS:
+        raise ValueError("too long")
+    return program + [0] * (steps.STEPS - len(program))
+
+
+def check_pattern(pattern: str) -> str:
+    """What is wrong with a pinned layout; empty if nothing is."""
+    try:
+        _program(pattern)
+    except ValueError as fault:
+        return str(fault)
+    fields = re.findall(r"%.", pattern)
+    missing = [name for name in ("%m", "%d") if "%b" not in fields and name not in fields] if "%Y" in fields else []
+    return f"{missing[0]} is missing" if missing else "" if fields else "names no field"
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """The layouts that every cell of a column fits: none (words), one, or two that mean different days."""
+
+    layouts: tuple[Layout, ...]
+    example: str = ""
+
+    @property
+    def layout(self) -> Layout | None:
+        """The layout, if it is certain."""
+        return self.layouts[0] if len(self.layouts) == 1 else None
+
+    @property
+    def readings(self) -> str:
+        """The two readings, for a message."""
+        shown = []
+        for layout in self.layouts:
+            value = layout.read(self.example)
+            day = np.datetime64((value or 0) // NS, "s").astype("datetime64[D]")
+            shown.append(f"{day} ({layout.pattern})")
+        return f"'{self.example}' is {' or '.join(shown)}"
+
+
+def find_layout(cells: Sequence[str], pinned: str = "") -> Stamped:
+    """The layout of a column by its cells."""
+    texts = [cell for cell in dict.fromkeys(cells) if cell not in MISSING]
+    if not texts or not (pinned or STAMP_LIKE.fullmatch(texts[0])):
+        return Stamped(())
+    fitting = [Layout(pinned)] if pinned else [item for item in _known() if item.read(texts[0]) is not None]
+    # All days decide between two orders of day and month; some times of day are enough.
+    first_of_day = {text.split()[0]: text for text in texts} if len(fitting) > 1 else {}
+    looked = [*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values()]
+    for text in looked:
+        fitting = [item for item in fitting if item.read(text) is not None]
+    different: dict[tuple[int | None, ...], Layout] = {}
+    for item in fitting:
+        different.setdefault(tuple(item.read(text) for text in looked), item)
+    example = next((text for text in looked if len({item.read(text) for item in different.values()}) > 1), texts[0])
+    return Stamped(tuple(different.values()), example)
+
+
+@cache
+def _known() -> tuple[Layout, ...]:
+    patterns = [*_TIMES, *(date for date in _DATES if date != "%Y%m%d")]
+    for date in _DATES:
+        for time in _TIMES:
+            patterns += [f"{date} {time}", f"{date} {time}%z"]
+    return tuple(Layout(pattern) for pattern in patterns)
+
+
+def over_midnight(
+    stamps: np.ndarray[tuple[int], np.dtype[np.int64]], known: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> int:
+    """Count a day on at each midnight that times of day pass, in place; returns how many there were.
+
+    A step back by more than half a day is a midnight; a smaller one is left, and told with the clock.
+    """
+    rows = np.flatnonzero(known)
+    passed = np.cumsum(np.diff(stamps[rows], prepend=stamps[rows[:1]]) < -_DAY // 2)
+    stamps[rows] += passed * _DAY
+    return int(passed[-1]) if len(passed) else 0
+
+
+def seconds_since(
+    stamps: np.ndarray[tuple[int], np.dtype[np.int64]], known: np.ndarray[tuple[int], np.dtype[np.bool_]], origin: int
+) -> FloatArray:
+    """Seconds after `origin` [ns], the difference taken in whole nanoseconds; NaN where there is no stamp."""
+    values = np.full(len(stamps), np.nan)
+    values[known] = (stamps[known] - origin) / NS
+    return values

@@ -1,0 +1,213 @@
+"""The columns of one table as float64: numbers as they stand, stamps as seconds; and what was lost or skipped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.channels import ChannelMap
+from cdtool.errors import RecordingError
+from cdtool.formats.csv.cells import kind, split_line
+from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.last_line import RECENT, is_whole
+from cdtool.formats.csv.odd_lines import OddLines, not_numeric
+from cdtool.formats.csv.row_kernel import MISSING_STAMP
+from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.stamps import NS, over_midnight, seconds_since
+from cdtool.recording import Finding, FloatArray
+
+# Days since 1899-12-30, as Excel counts them, of 1970; and of the years 2000 to 2100.
+_EXCEL_1970, _EXCEL_FIRST, _EXCEL_LAST = 25569.0, 36526.0, 73051.0
+# A clock in seconds that stands there and steps by less than this would sample at more than 500 kHz.
+_EXCEL_STEP = 2e-6
+_DAY_S = 86400.0
+
+
+@dataclass
+class Table:
+    """`stamped` are the columns that were dates or times of day; `origin` [s] is taken off those with a date.
+
+    `unbroken`: every line from the first row on is a row.
+    """
+
+    values: dict[str, FloatArray]
+    findings: list[Finding]
+    origin: float = 0.0
+    stamped: set[str] = field(default_factory=set)
+    unbroken: bool = True
+
+
+def read_table(
+    path: Path, dialect: Dialect, keys: Sequence[str], clock: str | None, wanted: ChannelMap | None
+) -> Table:
+    """The columns `keys`; `clock` is the one that the machine file calls the time. Raises RecordingError."""
+    survey = wanted is None
+    place = {name: i for i, name in enumerate(dialect.names)}
+    numeric, stamps, left_out = _sorted_out(path, dialect, [place[key] for key in keys], clock, survey)
+    dates = {column: date for column in stamps if (date := _date_beside(path, dialect, column)) is not None}
+    read = sorted({*stamps, *dates.values()})
+    odd = OddLines(path, dialect, survey, left_out=left_out)
+    reader = RowReader(path, dialect, numeric, read)
+    rows = reader.read(odd)
+    findings = odd.findings(rows.line(rows.count - 1))
+    if not reader.ended and not odd.cut_line:
+        findings += _judge_last_line(dialect, rows, numeric, read)
+    if odd.cut_line or dialect.text.padding:
+        line = odd.cut_line or rows.line(rows.count)
+        findings.insert(0, Finding(f"the last line ({line}) is cut off: dropped", severity="loss"))
+    if dialect.text.padding:
+        text = f"the file ends in {dialect.text.padding} NUL bytes: was the power lost?"
+        findings.append(Finding(text, severity="loss"))
+    named = dialect.names
+    values = {named[column]: rows.numbers[k] for k, column in enumerate(numeric) if column not in odd.left_out}
+    table = Table(values, findings, unbroken=not len(rows.not_rows))
+    _add_stamps(table, dialect, rows, read, dates)
+    if survey and not table.values:
+        raise RecordingError(f"{path}: no column holds numbers only", str(findings[0]) if findings else "")
+    if clock is not None and wanted is not None:
+        _set_clock(path, table, clock, wanted)
+    table.values = {key: table.values[key] for key in named if key in table.values}
+    return table
+
+
+def _sorted_out(
+    path: Path, dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool
+) -> tuple[list[int], list[int], dict[int, Finding]]:
+    """Columns of numbers, columns of stamps, and those that a survey leaves out."""
+    numeric, stamps, left_out = [], [], {}
+    for column in columns:
+        name, found = dialect.names[column], dialect.stamped.get(column)
+        if found is None or not (survey or name == clock):
+            if survey and column in dialect.words:
+                words = dialect.words[column]
+                left_out[column] = not_numeric(name, words.line, words.text)
+            else:
+                numeric.append(column)
+        elif found.layout is None:
+            text = f"column '{name}': {found.readings}"
+            timed = found.layouts[0].timed or _clock_beside(dialect, column) is not None
+            if not survey or timed:
+                raise RecordingError(f"{path}: {text}", "pin time_format in [csv] of the machine file")
+            left_out[column] = Finding(f"{text}: left out; pin time_format in [csv]")
+        else:
+            stamps.append(column)
+    return numeric, stamps, left_out
+
+
+def _clock_beside(dialect: Dialect, column: int) -> int | None:
+    """The column of times of day next to one of days."""
+    for other in (column + 1, column - 1):
+        found = dialect.stamped.get(other)
+        if found is not None and found.layouts[0].timed and not found.layouts[0].dated:
+            return other
+    return None
+
+
+def _date_beside(path: Path, dialect: Dialect, column: int) -> int | None:
+    """The column of days next to one of times of day; raises RecordingError if its days may be read in two ways."""
+    layout = dialect.stamped[column].layouts[0]
+    if layout.dated or not layout.timed:
+        return None
+    for other in (column - 1, column + 1):
+        found = dialect.stamped.get(other)
+        if found is None or not found.layouts[0].dated or found.layouts[0].timed:
+            continue
+        if found.layout is None:
+            raise RecordingError(
+                f"{path}: column '{dialect.names[other]}': {found.readings}",
+                "pin time_format in [csv] of the machine file",
+            )
+        return other
+    return None
+
+
+def _add_stamps(table: Table, dialect: Dialect, rows: Rows, read: Sequence[int], dates: dict[int, int]) -> None:
+    """Stamps -> seconds since the first of them that has a date, or since midnight."""
+    origin: int | None = None
+    used = set(dates.values())
+    for column in read:
+        if column in used:
+            continue
+        name, layout = dialect.names[column], dialect.stamped[column].layouts[0]
+        stamps = rows.stamps[read.index(column)].copy()
+        known = stamps != MISSING_STAMP
+        dated = layout.dated or column in dates
+        text = ""
+        if column in dates:
+            days = rows.stamps[read.index(dates[column])]
+            known &= days != MISSING_STAMP
+            stamps[known] += days[known]
+            text = f"joined with the days of column '{dialect.names[dates[column]]}'; "
+        elif not layout.dated and (nights := over_midnight(stamps, known)):
+            text = f"passes midnight {nights} times; "
+        if dated and origin is None and known.any():
+            origin = int(stamps[known][0])
+        start = origin if dated and origin is not None else 0
+        since = f"{np.datetime64(start, 'ns')}" if dated else "midnight"
+        text += f"written as {layout.pattern}; in s since {since}"
+        table.findings.append(Finding(text, name, "note"))
+        table.values[name] = seconds_since(stamps, known, start)
+        table.stamped.add(name)
+    table.origin = (origin or 0) / NS
+
+
+def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None:
+    """Hold the machine file's unit against what the clock's column is."""
+    if clock in table.stamped:
+        if wanted.time.factor != 1.0:
+            raise RecordingError(
+                f"{path}: column '{clock}' holds dates or times of day, which are read in s",
+                'say unit = "s" in [channels] time',
+            )
+        return
+    values = table.values[clock]
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return
+    if wanted.pins.time_format == "excel":
+        table.origin = (float(finite[0]) - _EXCEL_1970) * _DAY_S
+        table.values[clock] = (values - finite[0]) * _DAY_S
+        return
+    steps = np.diff(finite)
+    step = float(np.median(steps)) if len(steps) else 0.0
+    in_days = _EXCEL_FIRST < finite[0] < _EXCEL_LAST and 0.0 < step < _EXCEL_STEP
+    if in_days and wanted.time.factor == 1.0 and not wanted.pins.time_format:
+        raise RecordingError(
+            f"{path}: column '{clock}' starts at {finite[0]:.9g} in steps of {step:.3g}: days of Excel, or s?",
+            'pin time_format = "excel" or "number" in [csv] of the machine file',
+        )
+
+
+def _judge_last_line(dialect: Dialect, rows: Rows, numeric: Sequence[int], stamps: Sequence[int]) -> list[Finding]:
+    """A plain last line without its end: keep it, keep it and say so, or drop it."""
+    last = dialect.width - 1
+    if rows.count < 1 or dialect.trailing or last not in (*numeric, *stamps):
+        return []
+    *others, unfinished = dialect.text.tail()
+    if not unfinished.strip():
+        return []
+    above = []
+    for raw in reversed(others[1:] if len(others) > 1 else others):
+        cells = split_line(dialect.text.decode(raw), dialect.separator)
+        if len(cells) == dialect.width and kind(cells[-1]) != "X":
+            above.append(cells[-1])
+        if len(above) == RECENT:
+            break
+    text = dialect.text.decode(unfinished).rstrip()
+    cell = '"' if text.endswith('"') else split_line(text, dialect.separator)[-1]
+    whole, certain = is_whole(cell, above[: rows.count - 1])
+    line = rows.line(rows.count - 1)
+    if whole and (certain or not dialect.text.padding):
+        if certain:
+            return []
+        return [Finding(f"the last line ({line}) has no line end: its last cell '{cell}' is taken to be whole")]
+    rows.count -= 1
+    rows.numbers, rows.stamps = rows.numbers[:, :-1], rows.stamps[:, :-1]
+    rows.not_rows = np.append(rows.not_rows, line)
+    if dialect.text.padding:
+        return []
+    text = f"the last line ({line}) has no line end, and '{cell}' may be cut off: dropped"
+    return [Finding(text, severity="loss")]

@@ -1,0 +1,187 @@
+"""Messages with a schema: fields resolved against it once, then found and picked batch by batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.formats.mcap.batch import Batch
+from cdtool.formats.mcap.columns.gathered import Gathered, IntArray
+from cdtool.formats.mcap.columns.picking import WHOLE, Plan, nowhere, pick
+from cdtool.formats.mcap.columns.slots import Found, Place
+from cdtool.formats.mcap.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError
+from cdtool.formats.mcap.layouts.layout import Layout, Member, Message, Number, Schema, Text
+
+_MOST_FIELDS = 4096
+_NO_MEMBERS = Layout("", ())  # of a number or text
+_LATEST = 9_223_372_035  # s: an int64 of ns holds no more
+
+
+class Finder(Protocol):
+    """One encoding: where the places of a batch's messages are."""
+
+    def find(self, batch: Batch, places: tuple[Place, ...]) -> Found:
+        """The places, each asked for once."""
+        ...
+
+
+@dataclass
+class TypedDecoder:
+    """A Decoder (gathered.py) for messages whose schema tells every field."""
+
+    schema: Schema
+    finder: Finder
+    _plans: dict[Field, Plan | FieldMissingError] = field(default_factory=dict)
+
+    def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema tells them, whatever the messages are)
+        """Every numeric field but the header's stamp, in the order of the schema; of arrays those that may be short."""
+        found = []
+        for name in _numeric_names(self.schema, self.schema.root, "", ()):
+            found.append(name)
+            if len(found) >= _MOST_FIELDS:
+                break
+        return found
+
+    def gather(
+        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+    ) -> Gathered:
+        """The wanted fields of all messages; one that the schema does not have is absent in all, with its fault."""
+        plans = [self.plan(each) for each in wanted]
+        stamp = self.stamp_places() if stamps else ()
+        places = dict.fromkeys(place for plan in plans if isinstance(plan, Plan) for place in plan.places)
+        found = self.finder.find(batch, (*places, *(place for place in stamp if place not in places)))
+        picked = tuple(
+            pick(plan, found, joints) if isinstance(plan, Plan) else nowhere(len(batch), plan) for plan in plans
+        )
+        if not stamps:
+            return Gathered(picked, found.status, found.reason)
+        times, there = stamp_times(found, stamp)
+        return Gathered(picked, found.status, found.reason, times, there)
+
+    def names(self, batch: Batch, field: Field) -> list[str]:
+        """What the first ten messages call the elements of the field's array, sorted."""
+        plan = self.plan(field)
+        place = plan.names if isinstance(plan, Plan) else None
+        if place is None:
+            return []
+        found = self.finder.find(batch, (place,))
+        return sorted({name for row in np.flatnonzero(found.status == 0)[:10] for name in found.names[place].of(row)})
+
+    def plan(self, field: Field) -> Plan | FieldMissingError:
+        """The field's place, or why the schema has none."""
+        if field not in self._plans:
+            try:
+                self._plans[field] = resolve(field, self.schema)
+            except FieldMissingError as fault:
+                self._plans[field] = fault
+        return self._plans[field]
+
+    def stamp_places(self) -> tuple[Place, ...]:
+        """Seconds and nanoseconds of the header's stamp; empty where the schema has none."""
+        header = self.schema.root.member("header")
+        stamp = self._inner(header, "stamp")
+        for names in STAMPS:
+            parts = [self._inner(stamp, name) for name in names]
+            if all(part is not None and isinstance(part.kind, Number) and part.array is None for part in parts):
+                return tuple(("header", "stamp", name) for name in names)
+        return ()
+
+    def _inner(self, member: Member | None, name: str) -> Member | None:
+        if member is None or member.array is not None or not isinstance(member.kind, Message):
+            return None
+        return self.schema.nested(member.kind).member(name)
+
+
+def resolve(field: Field, schema: Schema) -> Plan:
+    """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
+    layout = schema.root
+    place: Place = ()
+    arrays: list[tuple[Place, int]] = []
+    last = len(field.steps) - 1
+    for i, (name, index) in enumerate(field.steps):
+        member = layout.member(name)
+        if member is None:
+            raise FieldMissingError(f"there is no '{name}'", layout.names)
+        parent, place = place, (*place, name)
+        if index is not None and member.array is None:
+            raise FieldMissingError(f"'{name}' is not an array", [name])
+        if index == WHOLE or (i == last and index is not None):
+            names = _names_place(layout, parent) if index == WHOLE or not index.isdigit() else None
+            if index != WHOLE and not index.isdigit() and names is None:
+                problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
+                raise FieldMissingError(problem, layout.names)
+            _require_number(field, member)
+            return Plan(field, place, index, tuple(arrays), names)
+        if member.array is not None and index is None:
+            raise FieldMissingError(
+                f"'{field.text}' is an array" if i == last else f"there is no '{field.steps[i + 1][0]}'",
+                [f"{field.text}[0]", f"{field.text}[:]"] if i == last else (),
+            )
+        if index is not None:
+            if not index.isdigit():
+                raise FieldMissingError(
+                    f"'{name}[{index}]' is a message found by a name", advice="give the element's number instead"
+                )
+            arrays.append((place, int(index)))
+            place = (*place, int(index))
+        if i == last:
+            _require_number(field, member)
+            return Plan(field, place, None, tuple(arrays))
+        layout = schema.nested(member.kind) if isinstance(member.kind, Message) else _NO_MEMBERS
+    raise FieldMissingError(f"'{field.text}' names nothing")
+
+
+def _require_number(field: Field, member: Member) -> None:
+    if isinstance(member.kind, Text):
+        raise FieldMissingError(f"'{field.text}' holds a text, not a number")
+    if isinstance(member.kind, Message):
+        raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
+
+
+def _names_place(layout: Layout, parent: Place) -> Place | None:
+    member = layout.member("name")
+    if member is None or member.array is None or not isinstance(member.kind, Text):
+        return None
+    return (*parent, "name")
+
+
+def _numeric_names(schema: Schema, layout: Layout, prefix: str, above: tuple[str, ...]) -> Iterator[str]:
+    if layout.name in above:  # protobuf's messages may hold themselves
+        return
+    for member in layout.members:
+        full = f"{prefix}{member.name}"
+        if full == "header.stamp":
+            continue
+        if isinstance(member.kind, Number):
+            if member.array is None:
+                yield full
+            elif (member.array.length or 0) <= LONGEST_ARRAY:
+                yield f"{full}[:]"
+        elif isinstance(member.kind, Message) and member.array is None:
+            yield from _numeric_names(schema, schema.nested(member.kind), f"{full}.", (*above, layout.name))
+
+
+def stamp_times(found: Found, places: tuple[Place, ...]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
+    """(n,) ns of seconds and nanoseconds at `places`, and where both are there; exact, as seconds below 2^53 are."""
+    n = len(found.status)
+    times = np.zeros(n, dtype=np.int64)
+    if not places:
+        return times, np.zeros(n, dtype=np.bool_)
+    seconds, nanoseconds = (found.slots[place] for place in places)
+    if found.whole and seconds.uniform == nanoseconds.uniform == 1:
+        rows = None
+    else:
+        rows = np.flatnonzero((found.status == 0) & (seconds.count == 1) & (nanoseconds.count == 1))
+    whole, rest = (slot.numbers(rows, 0, 1)[:, 0] for slot in (seconds, nanoseconds))
+    usable = (np.abs(whole) <= _LATEST) & (np.abs(rest) <= 2**53)
+    if rows is None and usable.all():
+        return whole.astype(np.int64) * 10**9 + rest.astype(np.int64), usable
+    rows = (np.arange(n) if rows is None else rows)[usable]
+    there = np.zeros(n, dtype=np.bool_)
+    there[rows] = True
+    times[rows] = whole[usable].astype(np.int64) * 10**9 + rest[usable].astype(np.int64)
+    return times, there

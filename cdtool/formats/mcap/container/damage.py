@@ -1,0 +1,7 @@
+"""What is wrong with a file, as the readers of its parts raise it."""
+
+from __future__ import annotations
+
+
+class DamageError(Exception):
+    """Bytes that cannot be what they claim to be; the text is the reason a user sees."""

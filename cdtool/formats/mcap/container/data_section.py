@@ -1,0 +1,263 @@
+"""The data section (section "Data Section" of the specification), from the front to its end, whatever is damaged.
+
+What fails its CRC is lost as a whole. After bytes that cannot be a record the next chunk is looked for: in the summary
+where its CRC fits, else by its looks. Of a chunk that the file's end cuts off, what can be decompressed is given, as
+covered by no CRC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from cdtool.formats.mcap.container import walk_kernel as why
+from cdtool.formats.mcap.container.attachments import check_attachment
+from cdtool.formats.mcap.container.chunks import (
+    HEADER_LENGTH,
+    LARGEST,
+    LARGEST_SHARE,
+    ChunkHeader,
+    Decompressor,
+    check_crc,
+    chunk_header,
+)
+from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.definitions import Definitions
+from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.losses import Loss, Losses
+from cdtool.formats.mcap.container.records import (
+    MAGIC,
+    PREFIX,
+    Attachment,
+    Channel,
+    Chunk,
+    DataEnd,
+    Footer,
+    Message,
+    MessageIndex,
+    Metadata,
+    Schema,
+)
+from cdtool.formats.mcap.container.resync import next_chunk
+from cdtool.formats.mcap.container.room import Piece, Room, Walked
+from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.walk_kernel import Bytes
+
+_SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
+_OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
+_NO_KIND = "a record of kind 0, which there is not"
+_REASONS = {
+    why.NO_KIND: _NO_KIND,
+    why.TOO_LONG: "a record claims more bytes than its chunk has left",
+    why.SHORT_MESSAGE: "a message shorter than its header",
+}
+
+
+class DataSection:
+    """Its `pieces`, and what was met on the way: chunks by their places, extras, the end record, what is lost.
+
+    `extras` are (opcode, place, length) of whole attachments and metadata; `other_times` counts chunks whose header
+    tells other times than their messages.
+    """
+
+    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, skip: Mapping[int, object]) -> None:
+        self.losses = Losses()
+        self.chunks: dict[int, ChunkHeader] = {}
+        self.extras: list[tuple[int, int, int]] = []
+        self.end: DataEnd | None = None
+        self.end_at = 0
+        self.other_times = 0
+        self.room = Room(definitions)
+        self._file, self._summary, self._skip = file, summary, skip
+        self._following = dict(pairwise(sorted(summary.chunks)))
+        self._decompressor = Decompressor()
+        self._window = _SMALLEST_WINDOW
+        self._scratch = np.empty(0, np.uint8)
+        self._taken = 0, 0  # bytes of chunks so far, compressed and not
+        self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
+
+    def pieces(self) -> Iterator[Piece]:
+        """All messages that can be had."""
+        yield from self._records()
+        yield from self.room.flush()
+
+    def _records(self) -> Iterator[Piece]:
+        at = len(MAGIC)
+        if bytes(self._file.read(0, at)) != MAGIC:
+            self.losses.add(Loss(0, min(at, self._file.size), "the file does not begin as an MCAP file"))
+            self.losses.stopped = self._file.size <= at
+        while not self.losses.stopped and self.end is None:
+            self.end_at = at
+            head = self._file.read(at, HEADER_LENGTH)
+            try:
+                if not len(head):
+                    raise DamageError("the file ends without an end record")
+                header = chunk_header(at, head)
+                opcode = self._kind(head, header)
+                if opcode == Chunk.opcode and header is not None and header.data + header.size > self._file.size:
+                    yield from self._cut_chunk(header)
+                    return
+                length = self._length(at, head)
+                if opcode == Footer.opcode:
+                    return
+                if opcode in _OUTSIDE_CHUNKS:
+                    at = yield from self._outside_chunks(at, length)
+                elif opcode == Chunk.opcode and header is not None:
+                    yield from self._chunk(header)
+                    at = self._behind(header)
+                else:
+                    self._other(opcode, at, length, head)
+                    at += length
+            except DamageError as fault:
+                at = self._resume(at, str(fault))
+
+    def _kind(self, head: memoryview, header: ChunkHeader | None) -> int:
+        opcode = head[0]
+        if opcode != Chunk.opcode and header is not None and header.consistent:
+            self.losses.add(Loss(header.at, 1, f"a chunk is marked as a record of kind {opcode}"))
+            return Chunk.opcode
+        if opcode == Chunk.opcode and header is None and len(head) == HEADER_LENGTH:
+            raise DamageError("a chunk's compression has no name that there is")
+        return opcode
+
+    def _length(self, at: int, head: memoryview) -> int:
+        """Length of the record at `at`, prefix included; raises DamageError where it cannot be."""
+        left = self._file.size - at - PREFIX
+        if left < 0:
+            raise DamageError(f"the file ends within a record: {left + PREFIX} bytes are left")
+        length = int.from_bytes(head[1:PREFIX], "little")
+        if head[0] == 0:
+            raise DamageError(_NO_KIND)
+        if length > left:
+            raise DamageError(f"a record claims {length} bytes where {left} are left")
+        return PREFIX + length
+
+    def _resume(self, at: int, reason: str) -> int:
+        found = self._summary.next_chunk(at + 1)
+        if found is None:
+            found = next_chunk(self._file, at + 1)
+        behind = self._file.size if found is None else found
+        self.losses.stopped = found is None
+        self.losses.add(Loss(at, behind - at, reason))
+        return behind
+
+    def _chunk(self, header: ChunkHeader) -> Iterator[Piece]:
+        self._lost = None
+        self.chunks[header.at] = header
+        if header.at in self._skip:
+            return
+        covered = header.uncompressed_crc != 0
+        try:
+            header.check()
+            self._bound(header)
+            if not self.room.fits(header.uncompressed_size, covered):
+                yield from self.room.renew(header.uncompressed_size, covered)
+            content = self.room.take(header.uncompressed_size)
+            if header.compression:
+                self._decompressor.fill(header, self._packed(header.data, header.size), content)
+            else:
+                self._file.read_into(header.data, content)
+                check_crc(header, content)
+        except DamageError as fault:
+            self._lost = self.losses.add(self._loss_of(header, str(fault)))
+            return
+        walked = yield from self.room.walk(len(content))
+        self._note(walked, header.at, len(content))
+        if walked.why == why.DONE and walked.times is not None:
+            self.other_times += walked.times != (header.message_start_time, header.message_end_time)
+
+    def _bound(self, header: ChunkHeader) -> None:
+        """Raise DamageError where the chunks together become more than any sensor's data: many small bombs."""
+        size, claimed = self._taken[0] + header.size, self._taken[1] + header.uncompressed_size
+        if claimed > LARGEST + LARGEST_SHARE * size:
+            raise DamageError(f"chunks of {size} bytes in all claim to become {claimed}: not decompressed")
+        self._taken = size, claimed
+
+    def _behind(self, header: ChunkHeader) -> int:
+        """The next place to look at: the next chunk, where a verified summary has only message indexes before it."""
+        end, index = header.at + header.length, self._summary.chunks.get(header.at)
+        if self._lost is None and index is not None and self._summary.verified and same_figures(index, header):
+            following = self._following.get(header.at)
+            if following == end + index.message_index_length:
+                return following
+        return end
+
+    def _cut_chunk(self, header: ChunkHeader) -> Iterator[Piece]:
+        """A chunk that the end of the file cuts off: what lies before the cut."""
+        left = self._file.size - header.data
+        loss = self._loss_of(header, f"the file ends within a chunk: {left} of {header.size} bytes")
+        loss.size, loss.time = self._file.size - header.at, None
+        if not header.consistent:
+            raise DamageError(f"a record claims {header.length - PREFIX} bytes where {left} are left")
+        header.check()
+        self.losses.stopped = True
+        self.losses.add(loss)
+        yield from self.room.renew(header.uncompressed_size, covered=False)
+        content = self.room.take(header.uncompressed_size)
+        packed = self._packed(header.data, left)
+        if header.compression:
+            try:
+                left = self._decompressor.fill_what_there_is(header, packed, content)
+            except DamageError as fault:
+                loss.reason = str(fault)
+                return
+        else:
+            content[:left] = packed
+        yield from self.room.walk(left)
+
+    def _outside_chunks(self, at: int, length: int) -> Generator[Piece, None, int]:
+        """Schemas, channels and messages outside of chunks, as many as a window holds; gives the place behind them."""
+        if length > LARGEST:
+            raise DamageError(f"a record claims {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
+        window = self._file.array(at, max(self._window, length))
+        walked = yield from self.room.take_window(window)
+        self._note(walked, at, len(window))
+        self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.at > len(window) else _SMALLEST_WINDOW
+        if walked.why == why.SHORT_MESSAGE:
+            return self._resume(at + walked.at, _REASONS[walked.why])
+        return at + walked.at
+
+    def _note(self, walked: Walked, at: int, size: int) -> None:
+        """What is wrong with records in a chunk or window at byte `at`."""
+        for fault in walked.faults:
+            self.losses.add(Loss(at, 0, f"a definition: {fault}"))
+        if at in self.chunks and walked.why in _REASONS:
+            self.losses.add(Loss(at, size - walked.at, f"in a chunk: {_REASONS[walked.why]}"))
+
+    def _other(self, opcode: int, at: int, length: int, head: memoryview) -> None:
+        if opcode == MessageIndex.opcode:
+            if self._lost is not None and length >= PREFIX + 6:
+                self._lost.messages = (self._lost.messages or 0) + int.from_bytes(head[11:15], "little") // 16
+            return
+        self._lost = None
+        body = at + PREFIX
+        if opcode == DataEnd.opcode:
+            self.end = DataEnd.read(self._file.read(body, min(length - PREFIX, 64)))
+        elif opcode in (Attachment.opcode, Metadata.opcode):
+            try:
+                if opcode == Attachment.opcode:
+                    check_attachment(self._file, at, length)
+                else:
+                    Metadata.read(self._file.read(body, min(length - PREFIX, LARGEST)))
+            except DamageError as fault:
+                self.losses.add(Loss(at, length, str(fault)))
+            else:
+                self.extras.append((opcode, at, length))
+
+    def _loss_of(self, header: ChunkHeader, reason: str) -> Loss:
+        # The header may be what is damaged: the index's figures count where its CRC fits.
+        known = self._summary.chunks.get(header.at) if self._summary.verified else None
+        span = (header.message_start_time, header.message_end_time)
+        if known is not None:
+            span = (known.message_start_time, known.message_end_time)
+        usable = known is not None or span[0] <= span[1] < 1 << 63
+        return Loss(header.at, header.length, reason, 1, None, span if usable else None)
+
+    def _packed(self, at: int, size: int) -> Bytes:
+        """Compressed bytes of the file, in memory that is used again."""
+        if size > len(self._scratch):
+            self._scratch = np.empty(max(size, 1 << 20), np.uint8)
+        self._file.read_into(at, self._scratch[:size])
+        return self._scratch[:size]

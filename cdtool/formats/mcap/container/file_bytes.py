@@ -1,0 +1,61 @@
+"""A file as bytes at places: read, never mapped, so that a file that shrinks or a lost drive is an error, no crash."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from cdtool.formats.mcap.container.checksums import crc32
+from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.walk_kernel import Bytes
+
+_PIECE = 1 << 20
+
+
+class FileBytes:
+    """`size` bytes, read where they are asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb", buffering=0)
+        self.size = self._file.seek(0, 2)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def read(self, at: int, length: int) -> memoryview:
+        """Up to `length` bytes from `at`, fewer only at the file's end."""
+        return self.array(at, length).data
+
+    def array(self, at: int, length: int) -> Bytes:
+        """The same as an array of its own."""
+        room = np.empty(max(0, min(length, self.size - at)), np.uint8)
+        self.read_into(at, room)
+        return room
+
+    def read_into(self, at: int, room: Bytes) -> None:
+        """Fill `room` from `at` on; raises DamageError where the file ends before."""
+        self._file.seek(at)
+        view, filled = room.data, 0
+        while filled < len(view):
+            got = self._file.readinto(view[filled:])
+            if not got:
+                raise DamageError("the file became shorter while it was read")
+            filled += got
+
+    def crc(self, at: int, end: int) -> int:
+        """CRC-32 of the bytes from `at` to `end`."""
+        crc, room = 0, np.empty(_PIECE, np.uint8)
+        while at < end:
+            piece = room[: min(_PIECE, end - at)]
+            self.read_into(at, piece)
+            crc = crc32(piece, crc)
+            at += len(piece)
+        return crc

@@ -1,0 +1,219 @@
+"""A log: its messages piece by piece, and afterwards what was found: what is lost, unverified, or told otherwise."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.batch import Batch
+from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.data_section import DataSection
+from cdtool.formats.mcap.container.definitions import Definitions, Stream
+from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.losses import Loss
+from cdtool.formats.mcap.container.room import Piece
+from cdtool.formats.mcap.container.skim import skippable
+from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.recording import Finding
+
+
+@dataclass(frozen=True)
+class Messages:
+    """Messages of one channel; `covered`: a CRC covers them and what their ids mean."""
+
+    stream: Stream
+    batch: Batch
+    covered: bool
+
+
+@dataclass
+class Topic:
+    """All channels of one topic: what they say of themselves, and how many messages there are."""
+
+    name: str
+    schema: str
+    encoding: str
+    count: int = 0
+
+
+class Log:
+    """An MCAP file. `pieces()` has to be run through once; then `topics`, `origin`, `count` and `findings()` hold.
+
+    `wanted` says which topics are asked for: of others messages are counted only, and chunks without any wanted one are
+    passed over where the summary proves right. Without `use_index` every chunk is read, from the front. Unless it is
+    `strict`, a file of which nothing is left, or whose values are known to be wrong, is no error but a finding.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        wanted: Callable[[str], bool] | None = None,
+        use_index: bool = True,
+        strict: bool = True,
+    ) -> None:
+        self.path = path
+        self._strict = strict
+        self._wanted = wanted or (lambda _: True)
+        self._file = FileBytes(path)
+        self.summary = read_summary(self._file)
+        self._skip = skippable(self._file, self.summary, self._wanted) if use_index and wanted else {}
+        self._definitions = Definitions(self.summary)
+        self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
+        self.counts: Counter[int] = Counter()
+        self.topics: dict[str, Topic] = {}
+        self.origin = 0
+        self.unverified = 0
+
+    def pieces(self) -> Iterator[tuple[Messages, ...]]:
+        """The wanted messages, piece of memory by piece of memory in the file's order, channel by channel in each.
+
+        Raises RecordingError where nothing can be had, or where a CRC tells that values are wrong but not which.
+        """
+        with self._file:
+            try:
+                for piece in self.section.pieces():
+                    yield tuple(self._usable(piece))
+                self._finish()
+            except (OSError, DamageError) as fault:  # a lost drive, or a file that shrinks while it is read
+                raise RecordingError(f"{self.path}: cannot be read to its end: {fault}", "read a copy of it") from fault
+
+    @property
+    def count(self) -> int:
+        """Messages that were read."""
+        return sum(self.counts.values())
+
+    def expected(self, topic: str) -> int:
+        """How many messages of a topic the summary foretells; 0 where nothing can be relied on."""
+        summary = self.summary
+        if not summary.verified or summary.statistics is None:
+            return 0
+        counts = summary.statistics.channel_message_counts
+        return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
+
+    def _usable(self, piece: Piece) -> Iterator[Messages]:
+        lost = self.section.losses.messages
+        for channel, batch in piece.batches:
+            if channel in piece.cuts:
+                kept = int(np.searchsorted(batch.start, piece.cuts[channel]))
+                if kept < len(batch):
+                    lost[self._definitions.ambiguous[channel]] += len(batch) - kept
+                batch = batch.first(kept)
+                if not kept:
+                    continue
+            try:
+                stream = self._definitions.stream(channel)
+            except DamageError as fault:
+                lost[str(fault)] += len(batch)
+                continue
+            self.counts[channel] += len(batch)
+            covered = piece.covered and stream.covered
+            self.unverified += 0 if covered else len(batch)
+            if self._wanted(stream.channel.topic):
+                yield Messages(stream, batch, covered)
+
+    def _finish(self) -> None:
+        section = self.section
+        for place in self._skip.keys() & section.chunks.keys():
+            self.counts.update(self._skip[place])
+        for stream in self._definitions.streams():
+            name = stream.channel.topic
+            schema = stream.schema.name if stream.schema is not None else "no schema"
+            topic = self.topics.setdefault(name, Topic(name, schema, stream.channel.message_encoding))
+            topic.count += self.counts[stream.channel.id]
+        self.origin = section.room.first_time or 0
+        self._check_data_crc()
+        if self._strict and not self.count and section.losses:
+            self._raise_nothing_left()
+
+    def _check_data_crc(self) -> None:
+        stated = self.section.end.data_section_crc if self.section.end is not None else 0
+        if not stated:
+            return
+        if self._file.crc(0, self.section.end_at) == stated:
+            self.unverified = 0
+        elif self._strict and self.unverified:
+            raise RecordingError(
+                f"{self.path}: the checksum of the data does not fit: values are damaged, and none can be told right",
+                "copy the file anew from its source",
+            )
+        elif self.unverified or not self.section.losses:
+            text = "the checksum of the data section does not fit"
+            text += "" if self.unverified else " (those of the chunks with messages do)"
+            self.section.losses.add(Loss(self.section.end_at, 0, text))
+
+    def _raise_nothing_left(self) -> None:
+        losses = self.section.losses
+        place = losses.places[0] if losses.places else Loss(8, 0, next(iter(losses.messages)))
+        reason = " ".join(place.reason.split())[:200]
+        raise RecordingError(
+            f"{self.path}: damaged at byte {place.at}, before its first message: {reason}",
+            "copy the file anew from its source; no message in it can be read",
+        )
+
+    def findings(self) -> list[Finding]:
+        """What is lost, then what the summary tells otherwise, then what no checksum covers."""
+        section, statistics = self.section, self.summary.statistics
+        found = section.losses.findings(self.count, self.origin)
+        if self.summary.problem and not section.losses.stopped:
+            text = f"the summary is damaged ({self.summary.problem}): the {self.count} messages were read without it"
+            found.append(Finding(text, severity="loss"))
+        if statistics is not None and statistics.message_count != self.count:
+            text = f"the file's summary says {statistics.message_count} messages, {self.count} were read"
+            found.append(Finding(text, severity="loss"))
+        found += self._disagreements()
+        if self.unverified:
+            text = f"{self.unverified} of {self.count} messages carry no checksum: unverified"
+            found.append(Finding(text, severity="note"))
+        if not self.count:
+            found.append(Finding("holds no message"))
+        return found
+
+    def _disagreements(self) -> list[Finding]:
+        """The summary against the data, where nothing is lost that would explain a difference."""
+        section, summary = self.section, self.summary
+        if section.losses or summary.problem:
+            return []
+        found = []
+        chunks = section.chunks
+        if summary.chunks:
+            missing = len(chunks.keys() - summary.chunks.keys())
+            absent = len(summary.chunks.keys() - chunks.keys())
+            both = chunks.keys() & summary.chunks.keys()
+            other = sum(not same_figures(summary.chunks[at], chunks[at]) for at in both)
+            for number, what in (
+                (missing, "are not in its index"),
+                (absent, "of its index are not there"),
+                (other, "have other sizes or times than its index says"),
+            ):
+                if number:
+                    found.append(Finding(f"the summary disagrees with the data: {number} chunks {what}"))
+        if section.other_times:
+            found.append(Finding(f"{section.other_times} chunks claim other times than their messages have"))
+        statistics = summary.statistics
+        if statistics is not None and statistics.channel_message_counts:
+            stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+            read = {channel: count for channel, count in self.counts.items() if count}
+            if stated != read and statistics.message_count == self.count:
+                found.append(Finding("the summary disagrees with the data: other message counts by channel"))
+        return found + self._other_definitions()
+
+    def _other_definitions(self) -> list[Finding]:
+        known = {stream.channel.id: stream for stream in self._definitions.streams()}
+        differing = [
+            channel.topic
+            for channel in self.summary.channels.values()
+            if channel.id in known
+            and (
+                known[channel.id].channel != channel
+                or (
+                    (schema := known[channel.id].schema) is not None
+                    and self.summary.schemas.get(schema.id, schema) != schema
+                )
+            )
+        ]
+        return [Finding("the summary defines it otherwise than the data", topic) for topic in differing]

@@ -1,0 +1,76 @@
+"""What of a file could not be read: where, why, how many bytes, chunks, messages and seconds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from cdtool.recording import Finding
+
+_LISTED = 10
+
+
+@dataclass
+class Loss:
+    """A place of the file that is lost: `size` bytes from byte `at`.
+
+    `messages`: how many of them its indexes name (None: nothing tells). `time`: their log times' span [ns].
+    """
+
+    at: int
+    size: int
+    reason: str
+    chunks: int = 0
+    messages: int | None = None
+    time: tuple[int, int] | None = None
+
+    def described(self, origin: int) -> str:
+        """What is lost, in words; times in seconds after `origin` [ns]."""
+        what = "a chunk of " if self.chunks else ""
+        parts = [f"{what}{self.size} bytes lost"]
+        if self.messages is not None:
+            parts.append(f"{self.messages} messages")
+        if self.time is not None:
+            start, end = ((stamp - origin) / 1e9 for stamp in self.time)
+            parts.append(f"{end - start:.3f} s from {start:.3f} s on")
+        return ", ".join(parts)
+
+
+@dataclass
+class Losses:
+    """All that was lost of a file; `stopped` where nothing behind the last place could be read."""
+
+    places: list[Loss] = field(default_factory=list)
+    messages: Counter[str] = field(default_factory=Counter)
+    stopped: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.places or self.messages)
+
+    def add(self, loss: Loss) -> Loss:
+        """Take a place that is lost."""
+        self.places.append(loss)
+        return loss
+
+    def findings(self, count: int, origin: int) -> list[Finding]:
+        """One finding a place (the first ones, then how many more), one a reason for single messages."""
+        last = self.places[-1] if self.stopped and self.places else None
+        found = [self._finding(loss, loss is last, count, origin) for loss in self.places[:_LISTED]]
+        rest = self.places[_LISTED:]
+        if rest:
+            known = sum(loss.messages or 0 for loss in rest)
+            text = f"damaged at {len(rest)} more places: {sum(loss.size for loss in rest)} bytes"
+            text += f" and {sum(loss.chunks for loss in rest)} chunks lost, {known} messages that indexes name"
+            found.append(Finding(text, severity="loss"))
+            if last is not None:
+                found.append(self._finding(last, True, count, origin))
+        for reason, lost in self.messages.items():
+            found.append(Finding(f"{reason}: {lost} messages lost", severity="loss"))
+        return found
+
+    def _finding(self, loss: Loss, final: bool, count: int, origin: int) -> Finding:
+        where = f"damaged at byte {loss.at} ({' '.join(loss.reason.split())[:200]})"
+        if final:
+            behind = f"; {loss.described(origin)}" if loss.size else ""
+            return Finding(f"{where}: only the {count} messages before it were read{behind}", severity="loss")
+        return Finding(f"{where}: {loss.described(origin)}", severity="loss")

@@ -1,0 +1,118 @@
+"""The end of a file (sections "Footer", "Summary Section", "Summary Offset Section"): what it says of the data.
+
+It is checked against its CRC here, and against the data by `log`. A summary without a CRC is held to be a hint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from cdtool.formats.mcap.container.checksums import crc32
+from cdtool.formats.mcap.container.chunks import LARGEST, ChunkHeader
+from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.records import (
+    KINDS,
+    MAGIC,
+    PREFIX,
+    Channel,
+    ChunkIndex,
+    Footer,
+    Record,
+    Schema,
+    Statistics,
+)
+
+_FOOTER = PREFIX + 20  # a footer is never extended
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The summary's records; `problem` says why there are none, `verified` that their CRC fits."""
+
+    footer: Footer | None = None
+    records: tuple[Record, ...] = ()
+    verified: bool = False
+    problem: str = ""
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: dict[int, ChunkIndex] = field(default_factory=dict)
+    statistics: Statistics | None = None
+
+    def next_chunk(self, at: int) -> int | None:
+        """Where the first chunk from byte `at` on begins, if that can be trusted."""
+        return min((place for place in self.chunks if place >= at), default=None) if self.verified else None
+
+
+def read_summary(file: FileBytes) -> Summary:
+    """What stands behind the data; raises nothing: what is wrong is its `problem`."""
+    footer = None
+    try:
+        footer, at = _footer(file)
+        if not footer.summary_start:
+            return Summary(footer)
+        start = footer.summary_start
+        if not len(MAGIC) <= start <= at or at - start > LARGEST:
+            raise DamageError(f"the footer names byte {start} as the summary's start")
+        section = file.read(start, at - start)
+        crc = crc32(file.read(at, PREFIX + 16), crc32(section))
+        if footer.summary_crc and crc != footer.summary_crc:
+            raise DamageError("the checksum of the summary does not fit")
+        records = tuple(parsed(section))
+    except DamageError as fault:
+        return Summary(footer, problem=str(fault))
+    counts = [record for record in records if isinstance(record, Statistics)]
+    return Summary(
+        footer,
+        records,
+        verified=bool(footer.summary_crc),
+        schemas={record.id: record for record in records if isinstance(record, Schema) and record.id},
+        channels={record.id: record for record in records if isinstance(record, Channel)},
+        chunks={record.chunk_start_offset: record for record in records if isinstance(record, ChunkIndex)},
+        statistics=counts[0] if counts else None,
+    )
+
+
+def same_figures(index: ChunkIndex, header: ChunkHeader) -> bool:
+    """The index of a chunk tells what the chunk's own header tells."""
+    return (
+        index.chunk_length == header.length
+        and index.compressed_size == header.size
+        and index.uncompressed_size == header.uncompressed_size
+        and index.compression == header.compression
+        and index.message_start_time == header.message_start_time
+        and index.message_end_time == header.message_end_time
+    )
+
+
+def parsed(section: memoryview) -> Iterator[Record]:
+    """The known records of a piece of a file, one after the other; raises DamageError."""
+    at = 0
+    while at < len(section):
+        opcode, length = framed(section[at:])
+        if opcode in KINDS:
+            yield KINDS[opcode].read(section[at + PREFIX : at + PREFIX + length])
+        at += PREFIX + length
+
+
+def framed(rest: memoryview) -> tuple[int, int]:
+    """Opcode and content length of the record with which `rest` begins; raises DamageError where it is not whole."""
+    if len(rest) < PREFIX:
+        raise DamageError(f"the file ends within a record: {len(rest)} bytes are left")
+    opcode, length = rest[0], int.from_bytes(rest[1:PREFIX], "little")
+    if opcode == 0:
+        raise DamageError("a record of kind 0, which there is not")
+    if length > len(rest) - PREFIX:
+        raise DamageError(f"a record claims {length} bytes where {len(rest) - PREFIX} are left")
+    return opcode, length
+
+
+def _footer(file: FileBytes) -> tuple[Footer, int]:
+    at = file.size - _FOOTER - len(MAGIC)
+    end = file.read(max(0, at), file.size)
+    if at < len(MAGIC) or bytes(end[-len(MAGIC) :]) != MAGIC:
+        raise DamageError("the file does not end as an MCAP file")
+    if end[0] != Footer.opcode or framed(end[: -len(MAGIC)])[1] != _FOOTER - PREFIX:
+        raise DamageError("the file does not end with a footer")
+    return Footer.read(end[PREFIX:]), at

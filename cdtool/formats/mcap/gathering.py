@@ -1,0 +1,210 @@
+"""The wanted fields of one topic, gathered batch by batch into columns."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.batch import Batch
+from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError, decoder_for
+from cdtool.formats.mcap.columns.gathered import ABSENT, DECODED, OTHER_JOINTS
+from cdtool.formats.mcap.container.definitions import Stream
+from cdtool.formats.mcap.fields import Field, FieldMissingError, missing
+from cdtool.formats.mcap.rows import Rows
+from cdtool.formats.source import Column
+from cdtool.recording import Finding, FloatArray
+
+Stamps = npt.NDArray[np.uint64]
+
+
+class Decoders:
+    """One decoder a channel, made when its first messages come; what cannot be decoded is counted, with a reason."""
+
+    def __init__(self) -> None:
+        self._made: dict[int, Decoder | UndecodableError] = {}
+        self.decoded = 0
+        self.failed = 0
+        self.reason = ""
+
+    def of(self, stream: Stream, batch: Batch) -> Decoder | None:
+        """The decoder of a channel; None, and its messages counted, where there is none."""
+        number = stream.channel.id
+        if number not in self._made:
+            schema = stream.schema
+            described = (schema.encoding, schema.name, schema.data) if schema is not None else ("", "", b"")
+            try:
+                self._made[number] = decoder_for(stream.channel.message_encoding, *described)
+            except UndecodableError as fault:
+                self._made[number] = fault
+        made = self._made[number]
+        if isinstance(made, UndecodableError):
+            self._fail(len(batch), str(made))
+            return None
+        return made
+
+    def keep(self, gathered: Gathered) -> npt.NDArray[np.bool_]:
+        """Which messages of a batch were decoded; the others are counted."""
+        whole: npt.NDArray[np.bool_] = gathered.status == DECODED
+        count = int(np.count_nonzero(whole))
+        self.decoded += count
+        if count < len(whole):
+            self._fail(len(whole) - count, gathered.reason)
+        return whole
+
+    def _fail(self, count: int, reason: str) -> None:
+        self.failed += count
+        self.reason = self.reason or " ".join(reason.split())[:200]
+
+    def failure(self, topic: str, severity: str = "loss") -> list[Finding]:
+        """The finding about messages that could not be decoded."""
+        if not self.failed:
+            return []
+        text = f"{self.failed} of {self.failed + self.decoded} messages cannot be decoded: {self.reason}"
+        return [Finding(text, topic, "warning" if severity == "warning" else "loss")]
+
+
+class _Field:
+    """One field's values of all decoded messages; `elsewhere` marks those that name other joints only."""
+
+    def __init__(self, field: Field, expected: int) -> None:
+        self.field = field
+        self.rows = Rows(expected)
+        self.elsewhere: Rows | None = None
+        self.widths: Counter[int] = Counter()
+        self.names: list[str] = []
+
+    def add(self, picked: Picked, whole: npt.NDArray[np.bool_], all_whole: bool) -> None:
+        values, count, state = picked.values, picked.count, picked.state
+        if not all_whole:
+            values, count, state = values[whole], None if count is None else count[whole], state[whole]
+        other = state == OTHER_JOINTS
+        if self.elsewhere is None and other.any():
+            self.elsewhere = Rows(0, np.bool_)
+            self.elsewhere.append(np.zeros(self.rows.count, np.bool_))
+        if self.elsewhere is not None:
+            self.elsewhere.append(other)
+            count = None if count is None else count[~other]
+        if count is not None:
+            found = tally(count)
+            if not self.widths.keys() - {0} and (widths := found.keys() - {0}):
+                self.rows.widen(next(width for width in found if width in widths))
+            self.widths.update(found)
+        self.rows.append(values)
+
+
+class Gathering:
+    """The fields that are wanted of a topic; `where` begins its errors, `joints` order whole arrays by their names.
+
+    `expected` messages are foretold.
+    """
+
+    def __init__(
+        self, where: str, topic: str, fields: Sequence[Field], clock: str, joints: Sequence[str], expected: int = 0
+    ) -> None:
+        self.where, self.topic = where, topic
+        self.clock, self.joints = clock, joints
+        self.decoders = Decoders()
+        self._fields = [_Field(field, expected) for field in fields]
+        self._wanted = list(fields)
+        self._stamps = Rows(expected, np.uint64)
+        self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
+
+    @property
+    def first_stamp(self) -> int | None:
+        """Time [ns] of the first message, by the chosen clock."""
+        return int(self._stamps.values[0]) if self._stamps.count else None
+
+    def add(self, stream: Stream, batch: Batch) -> None:
+        """Take a batch; raises RecordingError where a field or the header's stamp is not there."""
+        decoder = self.decoders.of(stream, batch)
+        if decoder is None:
+            return
+        try:
+            gathered = decoder.gather(batch, self._wanted, self.joints, stamps=self.clock == "header")
+        except FieldMissingError as fault:
+            raise missing(self.where, self._absent(decoder, batch), fault) from fault
+        whole = self.decoders.keep(gathered)
+        all_whole = bool(whole.all())
+        stamps = self._stamps_of(batch, gathered, whole)
+        self._stamps.append(stamps if all_whole else stamps[whole])
+        for field, picked in zip(self._fields, gathered.picked, strict=True):
+            if picked.fault is not None and bool(np.any(whole & (picked.state == ABSENT))):
+                raise missing(self.where, field.field.text, picked.fault)
+            field.add(picked, whole, all_whole)
+            if field.elsewhere is not None and not field.names:
+                field.names = decoder.names(batch, field.field)
+
+    def column(self, index: int, origin: int) -> tuple[Column, list[Finding]]:
+        """The field of that number as a column, sorted by the chosen clock; raises RecordingError."""
+        field = self._fields[index]
+        text, values, time = field.field.text, field.rows.values, self._stamps.values
+        name = f"{self.topic} {text}"
+        findings = []
+        there = ~field.elsewhere.values if field.elsewhere is not None else None
+        if there is not None:
+            if not there.any():
+                raise missing(self.where, text, FieldMissingError("no message names this joint", field.names))
+            left_out = len(there) - int(np.count_nonzero(there))
+            findings.append(Finding(f"{left_out} messages name other joints only: left out", name, "note"))
+        empty = field.widths.pop(0, 0)
+        if len(field.widths) > 1:
+            found = ", ".join(f"{width} in {count}" for width, count in field.widths.most_common())
+            raise RecordingError(
+                f"{self.where}: the length of field '{text}' varies: {found} messages",
+                "name one element, e.g. position[0]",
+            )
+        if empty:
+            findings.append(Finding(f"{empty} messages hold an empty array: NaN", name))
+            if not field.widths:
+                values = np.full((len(values), 1), np.nan)
+        if there is not None:
+            return column_of(name, values[there], *in_order(time[there], origin)), findings
+        if self._clock is None:
+            self._clock = in_order(time, origin)
+        return column_of(name, values, *self._clock), findings
+
+    def _stamps_of(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> Stamps:
+        if self.clock == "log":
+            return batch.log_time
+        if self.clock == "publish":
+            return batch.publish_time
+        if gathered.stamps is None or gathered.has_stamp is None or not bool(np.all(gathered.has_stamp[whole])):
+            raise RecordingError(
+                f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
+            )
+        return gathered.stamps.astype(np.uint64)
+
+    def _absent(self, decoder: Decoder, batch: Batch) -> str:
+        """The field that the schema does not have."""
+        for field in self._wanted:
+            try:
+                decoder.gather(batch.first(1), [field], self.joints)
+            except FieldMissingError:
+                return field.text
+        return self._wanted[0].text
+
+
+def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:
+    """How often each count occurs, in the order of their first ones."""
+    if len(counts) and (counts == counts[0]).all():
+        return Counter({int(counts[0]): len(counts)})
+    return Counter(counts.tolist())
+
+
+def in_order(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
+    """Times [s] after `origin` [ns] in ascending order, and the order; None where they are in order as they stand."""
+    # The difference is taken between integers: an epoch in ns has more digits than a float64.
+    time = (stamps - np.uint64(origin % 2**64)).view(np.int64) / 1e9
+    if np.all(time[1:] >= time[:-1]):
+        return time, None
+    order = np.argsort(time, kind="stable")
+    return time[order], order
+
+
+def column_of(name: str, values: FloatArray, time: FloatArray, order: npt.NDArray[np.intp] | None) -> Column:
+    """A column in the order of its times."""
+    return Column(name, values if order is None else values[order], time)

@@ -1,0 +1,64 @@
+"""Small files and what can be read of them, for the tests of the container."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.container.log import Log
+from cdtool.recording import Finding
+
+COMPRESSIONS = ("none", "lz4", "zstd")
+Message = tuple[str, int, bytes]
+
+
+def small_file(
+    path: Path, compression: str = "none", messages: int = 24, chunk_size: int = 500, **options
+) -> list[Message]:
+    """A file of two topics in several chunks; gives its messages: topic, log time, payload."""
+    sent = []
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType[compression.upper()], chunk_size=chunk_size, **options)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in ("/a", "/b")}
+        for i in range(messages):
+            topic = "/b" if i % 3 == 2 else "/a"
+            payload = b"\x00\x01\x00\x00" + struct.pack("<d", i / 7)
+            writer.add_message(channels[topic], 10**9 + i * 10**6, payload, 10**9 + i * 10**6, i)
+            sent.append((topic, 10**9 + i * 10**6, payload))
+        writer.finish()
+    return sent
+
+
+def read(path: Path, **options) -> tuple[list[Message], list[Finding], Log]:
+    """All messages in the order of the file, findings, the log; nothing but RecordingError may be raised."""
+    log = Log(path, **options)
+    found = []
+    for piece in log.pieces():
+        rows = [
+            (int(batch.start[i]), item.stream.channel.topic, int(batch.log_time[i]), _payload(batch, i))
+            for item in piece
+            for batch in [item.batch]
+            for i in range(len(batch))
+        ]
+        found += [row[1:] for row in sorted(rows)]
+    return found, log.findings(), log
+
+
+def read_or_refused(path: Path) -> tuple[list[Message], list[str]]:
+    """Messages and findings; of a refused file no message and the error."""
+    try:
+        found, findings, _ = read(path)
+    except RecordingError as fault:
+        assert str(path) in fault.message
+        assert "\n" not in str(fault)
+        return [], [str(fault)]
+    return found, [str(finding) for finding in findings if finding.severity != "note"]
+
+
+def _payload(batch, i: int) -> bytes:
+    return batch.data[batch.start[i] : batch.start[i] + batch.length[i]].tobytes()

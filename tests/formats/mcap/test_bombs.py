@@ -1,0 +1,131 @@
+"""Sizes that lie and bombs: refused soon, in little memory."""
+
+from __future__ import annotations
+
+import functools
+import json
+import struct
+import subprocess
+import sys
+import zlib
+
+import lz4.frame
+import pytest
+import zstandard
+
+from cdtool.formats.mcap.container.records import MAGIC
+from tests.formats.mcap.small_files import read_or_refused
+
+MEBIBYTE = 1 << 20
+_CHILD = """
+import json, resource, sys, time
+from pathlib import Path
+import numpy, zstandard, lz4.frame
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.container.log import Log
+def run(path):
+    try:
+        log = Log(Path(path))
+        for _ in log.pieces():
+            pass
+        return [str(finding) for finding in log.findings()]
+    except RecordingError as fault:
+        return [str(fault)]
+run(sys.argv[1])
+base, begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+found = run(sys.argv[2])
+print(json.dumps([found, time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base]))
+"""
+
+
+def record(opcode, body):
+    return struct.pack("<BQ", opcode, len(body)) + body
+
+
+def chunk(packed, size, compression, crc=0, times=(0, 0)):
+    name = compression.encode()
+    head = struct.pack("<QQQI", *times, size, crc) + struct.pack("<I", len(name)) + name
+    return record(6, head + struct.pack("<Q", len(packed)) + packed)
+
+
+def one_message():
+    channel = record(4, struct.pack("<HHI", 1, 0, 2) + b"/a" + struct.pack("<I", 4) + b"json" + struct.pack("<I", 0))
+    return channel + record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}")
+
+
+def file_of(path, *records):
+    header = record(1, struct.pack("<II", 0, 0))
+    path.write_bytes(MAGIC + header + b"".join(records) + record(15, bytes(4)) + record(2, bytes(20)) + MAGIC)
+    return path
+
+
+def packed(compression, content):
+    return zstandard.ZstdCompressor().compress(content) if compression == "zstd" else lz4.frame.compress(content)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize("stated", [0, 1, 30, 10**6, 10**9, 2**40, 2**64 - 1])
+def test_a_chunk_that_is_not_as_large_as_it_claims_is_lost_and_the_next_is_read(tmp_path, compression, stated):
+    content = one_message()
+    path = file_of(
+        tmp_path / "lie.mcap",
+        chunk(packed(compression, content), stated, compression),
+        chunk(packed(compression, content), len(content), compression, zlib.crc32(content)),
+    )
+    found, findings = read_or_refused(path)
+    assert found == [("/a", 0, b"{}")]
+    assert "damaged at byte" in findings[0]
+
+
+@functools.cache
+def zeros(compression):
+    """300 MiB of zeros in some kilobytes (zstd) or a megabyte (lz4)."""
+    if compression == "zstd":
+        maker = zstandard.ZstdCompressor().compressobj()
+        parts = [maker.compress(bytes(MEBIBYTE)) for _ in range(300)]
+    else:
+        maker = lz4.frame.LZ4FrameCompressor()
+        parts = [maker.begin(), *(maker.compress(bytes(MEBIBYTE)) for _ in range(300))]
+    return b"".join([*parts, maker.flush()])
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize("stated", [8 * MEBIBYTE, 120 * MEBIBYTE, 300 * MEBIBYTE])
+def test_a_bomb_is_refused_in_less_than_five_seconds_and_300_megabytes(tmp_path, compression, stated):
+    bomb = file_of(tmp_path / "bomb.mcap", *[chunk(zeros(compression), stated, compression)] * 3)
+    small = file_of(
+        tmp_path / "small.mcap",
+        *(chunk(packed(kind, one_message()), len(one_message()), kind) for kind in ("zstd", "lz4")),
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", _CHILD, str(small), str(bomb)], capture_output=True, text=True, check=True
+    )
+    found, seconds, kilobytes = json.loads(done.stdout)
+    assert "damaged at byte" in found[0]
+    assert seconds < 5.0
+    assert kilobytes < 300_000
+
+
+def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
+    """Each is small enough, together they would be a hundred times the file and more."""
+    content = one_message() + record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}") * 400_000
+    bomb = file_of(tmp_path / "bomb.mcap", *[chunk(packed("zstd", content), len(content), "zstd")] * 60)
+    small = file_of(tmp_path / "small.mcap", chunk(packed("zstd", one_message()), len(one_message()), "zstd"))
+    done = subprocess.run(
+        [sys.executable, "-c", _CHILD, str(small), str(bomb)], capture_output=True, text=True, check=True
+    )
+    found, seconds, kilobytes = json.loads(done.stdout)
+    assert any("in all" in text for text in found)
+    assert seconds < 5.0
+    assert kilobytes < 300_000
+
+
+@pytest.mark.parametrize("opcode", [4, 5, 9, 12, 0x90])
+@pytest.mark.parametrize("length", [2**20, 2**40, 2**63, 2**64 - 1])
+def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opcode, length):
+    content = one_message()
+    good = chunk(content, len(content), "", zlib.crc32(content))
+    path = file_of(tmp_path / "lie.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
+    found, findings = read_or_refused(path)
+    assert found == [("/a", 0, b"{}")] * 2
+    assert f"claims {length} bytes" in findings[0]

@@ -1,0 +1,163 @@
+"""Cut and flipped files: true values or none, never a traceback, and every loss said."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+
+from cdtool.formats.mcap.container.log import Log
+from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, small_file
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_file_cut_at_any_byte_gives_true_messages_and_says_that_it_is_cut(tmp_path, compression):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression, messages=14)
+    whole = path.read_bytes()
+    before = 0
+    for cut in range(len(whole)):
+        path.write_bytes(whole[:cut])
+        found, findings = read_or_refused(path)
+        assert found == sent[: len(found)], cut
+        assert any("damaged" in text for text in findings), cut
+        assert len(found) >= before, cut  # a longer piece never gives fewer messages
+        before = len(found)
+    assert before == len(sent)
+
+
+def test_of_an_uncompressed_file_every_whole_message_before_the_cut_is_given(tmp_path):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path)
+    whole = path.read_bytes()
+    ends = [whole.index(payload) + len(payload) for _, _, payload in sent]
+    for cut in range(ends[0], ends[-1] + 1):
+        path.write_bytes(whole[:cut])
+        assert len(read_or_refused(path)[0]) == np.searchsorted(ends, cut, side="right"), cut
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("flip", [0x01, 0xFF])
+def test_any_flipped_byte_gives_true_messages_only_and_what_is_missing_is_said(tmp_path, compression, flip):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression, messages=14)
+    whole = path.read_bytes()
+    for at in range(len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ flip]) + whole[at + 1 :])
+        found, findings = read_or_refused(path)
+        assert set(found) <= set(sent), at
+        assert found == sent or findings, at
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compression):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression)
+    whole = bytearray(path.read_bytes())
+    chunks = sorted(Log(path).summary.chunks.values(), key=lambda index: index.chunk_start_offset)
+    hit = chunks[2]
+    whole[hit.chunk_start_offset + hit.chunk_length - 12] ^= 0x5A
+    path.write_bytes(whole)
+    found, findings, log = read(path)
+    lost = len(sent) - len(found)
+    assert 0 < lost < 12
+    assert set(found) < set(sent)
+    assert [loss.chunks for loss in log.section.losses.places] == [1]
+    assert f"a chunk of {hit.chunk_length} bytes lost, {lost} messages, " in str(findings[0])
+    seconds = (hit.message_end_time - hit.message_start_time) / 1e9
+    assert f"{seconds:.3f} s from {(hit.message_start_time - 10**9) / 1e9:.3f} s on" in str(findings[0])
+    assert any(f"says {len(sent)} messages, {len(found)} were read" in str(finding) for finding in findings)
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_the_next_chunk_is_found_without_a_summary_too(tmp_path, compression):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression)
+    chunks = sorted(Log(path).summary.chunks)
+    whole = bytearray(path.read_bytes()[:-60])
+    whole[chunks[1] + 5] ^= 0x10  # its length: now beyond the end of the file
+    path.write_bytes(whole)
+    found, _, log = read(path)
+    assert log.summary.problem
+    assert set(found) < set(sent)
+    assert found[-1] == sent[-1]
+
+
+def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_path):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path)
+    last = max(Log(path).summary.chunks)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: whole.index(sent[-1][2], last) + 3])
+    found, findings, log = read(path)
+    assert found == sent[:-1]
+    assert 0 < log.unverified < len(found)
+    assert f"{log.unverified} of {len(found)} messages carry no checksum: unverified" in str(findings[-1])
+
+
+def test_a_lost_definition_is_taken_from_the_summary(tmp_path):
+    """The package's writer defines channels in the first chunk only."""
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, "zstd")
+    whole = bytearray(path.read_bytes())
+    whole[min(Log(path).summary.chunks) + 70] ^= 0xFF
+    path.write_bytes(whole)
+    found, _, log = read(path)
+    assert len(found) > len(sent) / 2
+    assert found == sent[-len(found) :]
+    assert log.unverified == 0
+
+
+def test_without_a_definition_messages_are_lost_and_counted(tmp_path):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, "zstd", repeat_channels=False)
+    whole = bytearray(path.read_bytes())
+    first = min(Log(path).summary.chunks)
+    whole[first + 70] ^= 0xFF
+    path.write_bytes(whole)
+    _, findings = read_or_refused(path)
+    assert "before its first message" in findings[0]
+    assert len(sent) == 24
+
+
+def test_messages_that_no_checksum_covers_are_counted(tmp_path):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, enable_crcs=False)
+    found, findings, log = read(path)
+    assert found == sent
+    assert log.unverified == len(sent)
+    assert [str(finding) for finding in findings] == [
+        f"{len(sent)} of {len(sent)} messages carry no checksum: unverified"
+    ]
+
+
+def test_a_message_shorter_than_its_header_ends_what_can_be_trusted(tmp_path):
+    path = tmp_path / "log.mcap"
+    small_file(path, use_chunking=False)
+    whole = path.read_bytes()
+    record = struct.pack("<BQ", 5, 34)
+    at = whole.index(record, whole.index(record) + 1)
+    path.write_bytes(whole[: at + 1] + struct.pack("<Q", 3) + whole[at + 9 :])
+    found, findings = read_or_refused(path)
+    assert len(found) == 1
+    assert "a message shorter than its header" in findings[0]
+
+
+def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
+    from mcap.writer import Writer
+
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.add_attachment(1, 2, "note.txt", "text/plain", b"calibrated on Monday")
+        channel = writer.register_channel("/a", "json", 0)
+        writer.add_message(channel, 5, b"{}", 5)
+        writer.finish()
+    assert not read(path)[1]
+    path.write_bytes(path.read_bytes().replace(b"Monday", b"Friday"))
+    found, findings, _ = read(path)
+    assert len(found) == 1
+    assert "the checksum of an attachment does not fit" in str(findings[0])
+    assert findings[0].severity == "loss"

@@ -1,0 +1,83 @@
+"""Ids that change their meaning or have none: messages are lost and counted, never read by another schema."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import pytest
+
+from tests.formats.mcap.small_files import read, read_or_refused
+from tests.formats.mcap.test_bombs import chunk, file_of, record
+
+
+def text(value):
+    return struct.pack("<I", len(value)) + value
+
+
+def schema(number, content):
+    return record(3, struct.pack("<H", number) + text(b"T") + text(b"ros2msg") + text(content))
+
+
+def channel(number, topic, schema_id=1):
+    return record(4, struct.pack("<HH", number, schema_id) + text(topic) + text(b"cdr") + struct.pack("<I", 0))
+
+
+def message(number, time):
+    return record(5, struct.pack("<HIQQ", number, 0, time, time) + b"payload")
+
+
+def verified(*records):
+    content = b"".join(records)
+    times = [int.from_bytes(item[15:23], "little") for item in records if item[0] == 5]
+    return chunk(content, len(content), "", zlib.crc32(content), (min(times), max(times)))
+
+
+DEFINED = (schema(1, b"float64 data"), channel(1, b"/a"), channel(2, b"/b", 0))
+
+
+@pytest.mark.parametrize("change", [schema(1, b"float32 data"), channel(1, b"/c"), channel(1, b"/a", 0)])
+@pytest.mark.parametrize("apart", [False, True], ids=["in one chunk", "in two chunks"])
+def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_go_on(tmp_path, change, apart):
+    before = (*DEFINED, message(1, 1), message(2, 2), message(1, 3))
+    behind = (change, message(1, 4), message(2, 5), message(1, 6))
+    chunks = (verified(*before), verified(*behind)) if apart else (verified(*before, *behind),)
+    found, findings = read_or_refused(file_of(tmp_path / "redefined.mcap", *chunks))
+    assert [time for _, time, _ in found] == [1, 2, 3, 5]
+    assert [topic for topic, _, _ in found] == ["/a", "/b", "/a", "/b"]
+    assert "is defined twice, differently: 2 messages lost" in findings[0]
+
+
+def test_the_same_definition_again_is_none(tmp_path):
+    again = (*DEFINED, message(1, 1))
+    found, findings = read_or_refused(file_of(tmp_path / "again.mcap", verified(*again), verified(*again)))
+    assert len(found) == 2
+    assert not findings
+
+
+def test_a_channel_that_is_not_there_loses_its_messages_only(tmp_path):
+    path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, message(1, 1), message(7, 2), message(7, 3)))
+    found, findings = read_or_refused(path)
+    assert [time for _, time, _ in found] == [1]
+    assert findings == ["a message names channel 7, which is not there: 2 messages lost"]
+
+
+def test_a_schema_that_is_not_there_loses_its_messages_only(tmp_path):
+    path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, channel(3, b"/c", 9), message(1, 1), message(3, 2)))
+    found, findings = read_or_refused(path)
+    assert [time for _, time, _ in found] == [1]
+    assert findings == ["channel '/c' names schema 9, which is not there: 1 messages lost"]
+
+
+def test_a_schema_with_the_id_0_is_ignored(tmp_path):
+    found, findings = read_or_refused(
+        file_of(tmp_path / "zero.mcap", verified(schema(0, b""), *DEFINED, message(2, 1)))
+    )
+    assert len(found) == 1
+    assert not findings
+
+
+def test_a_definition_outside_of_chunks_leaves_its_messages_unverified(tmp_path):
+    path = file_of(tmp_path / "outside.mcap", *DEFINED, verified(message(1, 1), message(2, 2)))
+    found, _, log = read(path)
+    assert len(found) == log.unverified == 2

@@ -1,0 +1,95 @@
+"""Reading in pieces: bounded memory, one piece ahead, many messages, files that vanish."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.container import messages as table
+from cdtool.formats.mcap.container import room
+from cdtool.formats.mcap.container.ahead import ahead
+from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.log import Log
+from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("most", [1, 7, 10**5])
+@pytest.mark.parametrize("joined", [1, 900, 10**6])
+def test_however_small_the_pieces_are_the_messages_are_the_same(tmp_path, monkeypatch, compression, most, joined):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression)
+    monkeypatch.setattr(table, "MOST_MESSAGES", most)
+    monkeypatch.setattr(room, "_JOINED", joined)
+    found, findings, _ = read(path)
+    assert found == sent
+    assert not findings
+
+
+@pytest.mark.parametrize("most", [1, 5, 10**5])
+def test_messages_outside_of_chunks_are_read_window_by_window(tmp_path, monkeypatch, most):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, messages=3000, use_chunking=False)
+    monkeypatch.setattr(table, "MOST_MESSAGES", most)
+    assert path.stat().st_size > 65536  # more than one window
+    assert read(path)[0] == sent
+
+
+def test_a_message_larger_than_a_window_is_read_whole(tmp_path):
+    path = tmp_path / "log.mcap"
+    large = np.random.default_rng(0).bytes(200_000)
+    for chunking in (False, True):
+        with path.open("wb") as file:
+            writer = Writer(file, use_chunking=chunking, compression=CompressionType.ZSTD)
+            writer.start()
+            channel = writer.register_channel("/a", "raw", 0)
+            for i, content in enumerate((b"small", large, b"", large[:100_000], b"small")):
+                writer.add_message(channel, i, content, i)
+            writer.finish()
+        assert [len(payload) for _, _, payload in read(path)[0]] == [5, 200_000, 0, 100_000, 5]
+
+
+def test_headers_of_messages_are_read_where_they_stand(tmp_path):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/a", "raw", 0)
+        for i in range(5):
+            writer.add_message(channel, 100 + i, b"x" * i, 2**63 + i, 2**32 - 1 - i)
+        writer.finish()
+    ((item,),) = Log(path).pieces()
+    assert item.batch.log_time.tolist() == [100 + i for i in range(5)]
+    assert item.batch.publish_time.tolist() == [2**63 + i for i in range(5)]
+    assert item.batch.sequence.tolist() == [2**32 - 1 - i for i in range(5)]
+    assert item.batch.length.tolist() == list(range(5))
+
+
+def test_one_ahead_gives_the_same_items_and_the_same_error():
+    def items():
+        yield from range(5)
+        raise RecordingError("the drive is lost")
+
+    found = []
+    with pytest.raises(RecordingError, match="the drive is lost"):
+        for item in ahead(items()):
+            found.append(item)
+    assert found == list(range(5))
+
+
+@pytest.mark.parametrize("use_chunking", [True, False])
+def test_a_file_that_shrinks_while_it_is_read_is_one_clear_error(tmp_path, monkeypatch, use_chunking):
+    path = tmp_path / "log.mcap"
+    small_file(path, use_chunking=use_chunking)
+    log = Log(path)
+    whole = FileBytes.read_into
+
+    def shrink(self, at, content):
+        path.write_bytes(b"")
+        whole(self, at, content)
+
+    monkeypatch.setattr(FileBytes, "read_into", shrink)
+    with pytest.raises(RecordingError, match="became shorter while it was read"):
+        list(log.pieces())

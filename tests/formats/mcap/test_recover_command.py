@@ -1,0 +1,38 @@
+"""The exit statuses of `cdtool recover`."""
+
+from __future__ import annotations
+
+import typer
+from typer.testing import CliRunner
+
+from cdtool.cli.recover import recover
+from cdtool.errors import ExitStatus
+from tests.formats.mcap.small_files import small_file
+
+APP = typer.Typer()
+APP.command()(recover)
+
+
+def run(*arguments):
+    return CliRunner().invoke(APP, [str(argument) for argument in arguments])
+
+
+def test_a_whole_file_ends_with_status_0(tmp_path):
+    small_file(tmp_path / "log.mcap")
+    done = run(tmp_path / "log.mcap", "-o", tmp_path / "out.mcap")
+    assert done.exit_code == 0
+    assert "24 messages" in done.output
+
+
+def test_a_cut_file_ends_with_status_3_and_says_what_is_lost_and_left_out(tmp_path):
+    sent = small_file(tmp_path / "log.mcap")
+    whole = (tmp_path / "log.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: whole.index(sent[-1][2])])
+    done = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap")
+    assert done.exit_code == ExitStatus.INCOMPLETE
+    assert "loss: damaged at byte" in done.output
+    assert "(--unverified keeps them)" in done.output
+    kept = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap", "--unverified")
+    assert kept.exit_code == ExitStatus.INCOMPLETE
+    assert f"{len(sent) - 1} messages" in kept.output
+    assert "left out" not in kept.output

@@ -1,0 +1,167 @@
+"""cdtool recover: what is left, byte for byte; what was damaged is never stamped as good."""
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+from mcap.reader import make_reader
+
+from cdtool.errors import RecordingError, UsageError
+from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.records import Attachment
+from cdtool.workflows.recovering import recover
+from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
+
+
+def said(path):
+    with path.open("rb") as file:
+        return next(item.metadata for item in make_reader(file).iter_metadata() if item.name == "cdtool.recovered")
+
+
+def by_the_package(path):
+    """Messages as the mcap package's seeking reader gives them, every CRC checked."""
+    with path.open("rb") as file:
+        rows = make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in rows]
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_whole_file_comes_out_whole(tmp_path, compression):
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source, compression)
+    done = recover(source, output)
+    assert done.whole
+    assert (done.messages, done.unverified, done.left_out) == (len(sent), 0, 0)
+    found, findings, log = read(output)
+    assert found == by_the_package(output) == sent
+    assert not findings
+    assert log.summary.verified
+    assert said(output)["source_sha256"] == hashlib.sha256(source.read_bytes()).hexdigest()
+    assert said(output)["lost"] == "nothing"
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_what_a_damaged_chunk_held_is_not_in_the_output_and_is_said(tmp_path, compression):
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source, compression)
+    whole = bytearray(source.read_bytes())
+    hit = sorted(Log(source).summary.chunks.values(), key=lambda index: index.chunk_start_offset)[1]
+    whole[hit.chunk_start_offset + hit.chunk_length - 9] ^= 0x21
+    source.write_bytes(whole)
+    done = recover(source, output)
+    assert not done.whole
+    found, findings, _ = read(output)
+    assert found == by_the_package(output)
+    assert set(found) < set(sent)
+    assert len(found) == done.messages
+    assert not findings
+    assert f"a chunk of {hit.chunk_length} bytes lost" in said(output)["lost"]
+
+
+@pytest.mark.parametrize("keep", [False, True], ids=["left out", "kept"])
+def test_messages_of_a_cut_chunk_are_left_out_or_kept_without_a_checksum(tmp_path, keep):
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source)
+    whole = source.read_bytes()
+    source.write_bytes(whole[: whole.index(sent[-1][2], max(Log(source).summary.chunks)) + 3])
+    left = read(source)[2].unverified
+    done = recover(source, output, unverified=keep)
+    found, _, log = read(output)
+    assert not done.whole
+    assert found == sent[: len(sent) - 1 - (0 if keep else left)]
+    assert (done.unverified, done.left_out) == ((left, 0) if keep else (0, left))
+    assert log.unverified == done.unverified
+    assert said(output)["unverified"].startswith(f"{done.unverified} messages kept")
+
+
+def test_without_any_checksum_nothing_is_kept_unless_it_is_asked_for(tmp_path):
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source, use_chunking=False)
+    with pytest.raises(RecordingError, match=r"no checksum covers any of its 24 messages \(--unverified keeps them"):
+        recover(source, output)
+    assert not output.exists()
+    assert recover(source, output, unverified=True).whole
+    found, findings, log = read(output)
+    assert found == sent
+    assert log.unverified == len(sent)
+    assert not log.summary.verified
+    assert "24 of 24 messages carry no checksum" in str(findings[0])
+
+
+def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source, use_chunking=False, enable_data_crcs=True)
+    assert recover(source, output).whole
+    assert read(output)[2].unverified == 0
+    source.write_bytes(source.read_bytes().replace(sent[5][2], sent[6][2]))
+    with pytest.raises(RecordingError, match="no checksum covers"):
+        recover(source, output)
+    done = recover(source, output, unverified=True)
+    assert not done.whole
+    assert "the checksum of the data section does not fit" in said(output)["lost"]
+    assert read(output)[2].unverified == len(sent)
+
+
+def test_what_a_checksum_covered_is_still_covered_behind_what_none_did(tmp_path):
+    """Channels are then defined in a chunk without a checksum first, and again in one with it."""
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    sent = small_file(source)
+    whole = bytearray(source.read_bytes())
+    first = min(Log(source).summary.chunks)
+    whole[first + 33 : first + 37] = bytes(4)  # the first chunk's CRC: there is none
+    source.write_bytes(whole)
+    unverified = read(source)[2].unverified
+    assert 0 < unverified < len(sent)
+    recover(source, output, unverified=True)
+    found, _, log = read(output)
+    assert found == sent
+    assert log.unverified == unverified
+
+
+def test_attachments_and_metadata_are_kept(tmp_path):
+    from mcap.writer import Writer
+
+    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    with source.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.add_attachment(1, 2, "note.bin", "application/octet-stream", b"\x00\x01" * 700_000)
+        writer.add_metadata("machine", {"name": "gate"})
+        writer.add_message(writer.register_channel("/a", "json", 0), 5, b"{}", 5)
+        writer.finish()
+    assert recover(source, output).whole
+    with output.open("rb") as file:
+        reader = make_reader(file)
+        (attachment,) = reader.iter_attachments()
+        assert (attachment.name, attachment.data, attachment.log_time) == ("note.bin", b"\x00\x01" * 700_000, 2)
+        assert {item.name: item.metadata for item in reader.iter_metadata()}["machine"] == {"name": "gate"}
+    assert [opcode for opcode, _, _ in read(output)[2].section.extras].count(Attachment.opcode) == 1
+
+
+def test_the_same_file_gives_the_same_bytes(tmp_path):
+    source = tmp_path / "log.mcap"
+    small_file(source, "zstd")
+    outputs = [tmp_path / "1.mcap", tmp_path / "2.mcap"]
+    for output in outputs:
+        recover(source, output)
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_wrong_names_are_one_clear_error(tmp_path):
+    source = tmp_path / "log.mcap"
+    small_file(source)
+    with pytest.raises(UsageError, match="is the file to recover from"):
+        recover(source, source)
+    with pytest.raises(UsageError, match=r"let it end in \.mcap"):
+        recover(source, tmp_path / "out.txt")
+    with pytest.raises(UsageError, match="no folder"):
+        recover(source, tmp_path / "none" / "out.mcap")
+    with pytest.raises(RecordingError, match="no such file"):
+        recover(tmp_path / "none.mcap", tmp_path / "out.mcap")
+    (tmp_path / "table.csv").write_text("1,2\n")
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
+        recover(tmp_path / "table.csv", tmp_path / "out.mcap")
+    (tmp_path / "dust.mcap").write_bytes(bytes(200))
+    with pytest.raises(RecordingError, match="no message can be recovered"):
+        recover(tmp_path / "dust.mcap", tmp_path / "out.mcap")

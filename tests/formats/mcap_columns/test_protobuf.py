@@ -1,0 +1,285 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdtool.formats.mcap.columns import UndecodableError, decoder_for
+from tests.formats.mcap_columns.batches import batch_of, fields_of, same
+
+descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
+from google.protobuf import descriptor_pool, message_factory  # noqa: E402
+from google.protobuf.message import DecodeError  # noqa: E402
+
+Field = descriptor_pb2.FieldDescriptorProto
+KINDS = {
+    "double": st.floats(),
+    "float": st.floats(width=32),
+    "int32": st.integers(-(2**31), 2**31 - 1),
+    "sint32": st.integers(-(2**31), 2**31 - 1),
+    "sfixed32": st.integers(-(2**31), 2**31 - 1),
+    "int64": st.integers(-(2**63), 2**63 - 1),
+    "sint64": st.integers(-(2**63), 2**63 - 1),
+    "sfixed64": st.integers(-(2**63), 2**63 - 1),
+    "uint32": st.integers(0, 2**32 - 1),
+    "fixed32": st.integers(0, 2**32 - 1),
+    "uint64": st.integers(0, 2**64 - 1),
+    "fixed64": st.integers(0, 2**64 - 1),
+    "bool": st.booleans(),
+    "enum": st.sampled_from([0, 1, 7]),
+}
+
+
+def add(message, name, number, kind, *, repeated=False, optional=False, oneof=None, packed=None, inner=""):
+    field = message.field.add(name=name, number=number, type=getattr(Field, f"TYPE_{kind.upper()}"))
+    field.label = Field.LABEL_REPEATED if repeated else Field.LABEL_OPTIONAL
+    if kind in ("message", "group", "enum"):
+        field.type_name = inner or ".pkg.Mode"
+    if packed is not None:
+        field.options.packed = packed
+    if oneof is not None:
+        field.oneof_index = oneof
+    if optional:
+        field.proto3_optional = True
+        field.oneof_index = len(message.oneof_decl)
+        message.oneof_decl.add(name=f"_{name}")
+
+
+def thing(syntax="proto3", packed=None):
+    """A file with every type of number, alone, optional and repeated, nested, in a oneof and in a map."""
+    file = descriptor_pb2.FileDescriptorProto(name="thing.proto", package="pkg")
+    if syntax == "proto3":
+        file.syntax = syntax
+    mode = file.enum_type.add(name="Mode")
+    for name, number in (("OFF", 0), ("ON", 1), ("UP", 7)):
+        mode.value.add(name=name, number=number)
+    inner = file.message_type.add(name="Inner")
+    outer = file.message_type.add(name="Outer")
+    for message in (inner, outer):
+        message.oneof_decl.add(name="choice")
+        add(message, "left", 60, "double", oneof=0)
+        add(message, "right", 61, "message", oneof=0, inner=".pkg.Leaf")
+        add(message, "other", 62, "string", oneof=0)
+        for i, kind in enumerate(KINDS):
+            add(message, f"one_{kind}", 1 + i, kind)
+            add(message, f"many_{kind}", 20 + i, kind, repeated=True, packed=packed)
+        add(message, "name", 70, "string", repeated=True)
+        if syntax == "proto3":
+            add(message, "maybe", 80, "double", optional=True)
+    leaf = file.message_type.add(name="Leaf")
+    add(leaf, "x", 1, "double")
+    add(leaf, "y", 2000, "sint32")
+    add(outer, "inner", 90, "message", inner=".pkg.Inner")
+    add(outer, "inners", 91, "message", repeated=True, inner=".pkg.Inner")
+    add(outer, "again", 92, "message", inner=".pkg.Outer")
+    entry = outer.nested_type.add(name="TableEntry")
+    entry.options.map_entry = True
+    add(entry, "key", 1, "string")
+    add(entry, "value", 2, "double")
+    add(outer, "table", 93, "message", repeated=True, inner=".pkg.Outer.TableEntry")
+    return file
+
+
+def made(file, name="pkg.Outer"):
+    """The decoder of cdtool and the class of the package."""
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    data = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+    return decoder_for("protobuf", "protobuf", name, data), message_factory.GetMessageClass(
+        pool.FindMessageTypeByName(name)
+    )
+
+
+CASES = {
+    "proto3": made(thing()),
+    "proto3 unpacked": made(thing(packed=False)),
+    "proto2": made(thing("proto2")),
+    "proto2 packed": made(thing("proto2", packed=True)),
+}
+
+
+def leaves():
+    return st.fixed_dictionaries({}, optional={"x": st.floats(), "y": st.integers(-(2**31), 2**31 - 1)})
+
+
+def contents(proto3, depth=0):
+    numbers = {f"one_{kind}": values for kind, values in KINDS.items()}
+    numbers |= {f"many_{kind}": st.lists(values, max_size=3) for kind, values in KINDS.items()}
+    numbers |= {"name": st.lists(st.text("aé", max_size=3), max_size=3)}
+    choice = st.one_of(
+        st.fixed_dictionaries({"left": st.floats()}),
+        st.fixed_dictionaries({"right": leaves()}),
+        st.fixed_dictionaries({"other": st.text(max_size=3)}),
+        st.just({}),
+    )
+    if proto3:
+        numbers["maybe"] = st.floats()
+    if depth == 0:
+        inner = contents(proto3, 1)
+        numbers |= {"inner": inner, "inners": st.lists(inner, max_size=2), "again": inner}
+        numbers["table"] = st.dictionaries(st.text(max_size=2), st.floats(), max_size=2)
+    some = st.lists(st.sampled_from(sorted(numbers)), unique=True, max_size=8)
+    return st.tuples(
+        some.flatmap(lambda names: st.fixed_dictionaries({name: numbers[name] for name in names})), choice
+    ).map(lambda both: both[0] | both[1])
+
+
+def expected(message, field):
+    """What the package says of a field: NaN where it tells that it is not there."""
+    for i, (name, index) in enumerate(field.steps):
+        descriptor = message.DESCRIPTOR.fields_by_name[name]
+        last = i == len(field.steps) - 1
+        if index is None and descriptor.has_presence and not message.HasField(name):
+            return [] if field.whole else math.nan
+        message = getattr(message, name)
+        if index == ":":
+            return [float(value) for value in message]
+        if index is not None:
+            if int(index) >= len(message):
+                return None if len(message) else [] if field.whole else math.nan
+            message = message[int(index)]
+        if last:
+            return float(message)
+    raise AssertionError
+
+
+def assert_as_the_package(decoder, kind, payloads, wanted):
+    messages = []
+    for payload in payloads:
+        try:
+            messages.append(kind.FromString(payload))
+        except DecodeError:
+            messages.append(None)
+    wanted = fields_of(*wanted)
+    gathered = decoder.gather(batch_of(payloads), wanted)
+    for row, message in enumerate(messages):
+        if message is None or gathered.status[row]:
+            continue
+        for field, picked in zip(wanted, gathered.picked, strict=True):
+            value = expected(message, field)
+            if value is None:
+                assert picked.state[row] == 2
+            elif isinstance(value, list):
+                assert picked.count[row] == len(value)
+                if len(value) == picked.values.shape[1]:
+                    assert same(picked.values[row], value), (field.text, picked.values[row], value)
+            else:
+                assert picked.state[row] == 0 and same([picked.values[row]], [value]), (
+                    field.text,
+                    picked.values[row],
+                    value,
+                )
+    return gathered, messages
+
+
+MORE = ("inners[0].one_double", "inners[1].many_float[:]", "inners[0].right.x", "many_int32[1]", "again.inner.one_bool")
+
+
+@pytest.mark.parametrize("case", CASES)
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_random_messages_read_as_the_package_reads_them(case, data):
+    decoder, kind = CASES[case]
+    drawn = data.draw(st.lists(contents("proto3" in case), min_size=1, max_size=4))
+    payloads = [kind(**content).SerializeToString() for content in drawn]
+    wanted = (*decoder.fields(None), *MORE)
+    gathered, _ = assert_as_the_package(decoder, kind, payloads, wanted)
+    assert not gathered.status.any()
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_messages_that_come_in_parts_are_merged_and_the_last_one_wins(data):
+    """Messages written one after another are one (protobuf.dev, "Encoding", "Last One Wins")."""
+    decoder, kind = CASES[data.draw(st.sampled_from(sorted(CASES)))]
+    parts = data.draw(st.lists(contents(False), min_size=2, max_size=3))
+    payload = b"".join(kind(**part).SerializeToString() for part in parts)
+    gathered, _ = assert_as_the_package(decoder, kind, [payload, payload], (*decoder.fields(None), *MORE))
+    assert not gathered.status.any()
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_a_message_cut_at_any_byte_is_damaged_or_what_the_package_makes_of_it(data):
+    decoder, kind = CASES["proto3"]
+    payload = kind(**data.draw(contents(True))).SerializeToString()
+    pieces = [payload[:cut] for cut in range(len(payload))]
+    wanted = (*decoder.fields(None), *MORE)
+    gathered, messages = assert_as_the_package(decoder, kind, [payload, *pieces], wanted)
+    # Cut between two fields, it is a message, as far as anyone can tell; cut within one, it is none.
+    assert [bool(status) for status in gathered.status] == [message is None for message in messages]
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_flipped_bytes_give_what_the_package_makes_of_them_or_damage(data):
+    decoder, kind = CASES["proto3"]
+    payload = bytearray(kind(**data.draw(contents(True))).SerializeToString() or b"\x08\x01")
+    for _ in range(data.draw(st.integers(1, 3))):
+        payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
+    assert_as_the_package(decoder, kind, [bytes(payload)], (*decoder.fields(None), *MORE))
+
+
+def test_an_omitted_number_is_zero_where_its_absence_means_that_and_else_nan():
+    decoder, kind = CASES["proto3"]
+    payloads = [kind(inner={}).SerializeToString(), b"", kind(maybe=0.0, left=0.0).SerializeToString()]
+    wanted = fields_of("one_double", "inner.one_double", "maybe", "left", "right.x")
+    values = [picked.values for picked in decoder.gather(batch_of(payloads), wanted).picked]
+    nan = math.nan
+    table = [[0, 0, 0], [0, nan, nan], [nan, nan, 0], [nan, nan, 0], [nan] * 3]
+    assert all(same(found, row) for found, row in zip(values, table, strict=True))
+    old, kind = CASES["proto2"]
+    assert np.isnan(old.gather(batch_of([b""]), fields_of("one_double")).picked[0].values).all()
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"\x08", "end within a field"),
+        (b"\x09\0\0\0", "end within a field"),
+        (b"\x0a" + b"\xff" * 11, "end within a field"),
+        (b"\xd2\x05\x05\x09\0", "end within a field"),
+        (b"\x08\x01", "written as another type"),
+        (b"\x0d\0\0\0\0", "written as another type"),
+        (b"\x00\x01", "no protobuf"),
+        (b"\x0c", "no protobuf"),
+        (b"\x0f\x01", "no protobuf"),
+    ],
+)
+def test_damage_is_told(payload, reason):
+    gathered = CASES["proto3"][0].gather(batch_of([payload]), fields_of("one_double", "inner.one_double"))
+    assert gathered.status.tolist() == [1]
+    assert reason in gathered.reason
+    assert np.isnan(gathered.picked[0].values).all()
+
+
+def test_elements_that_alternate_with_those_of_another_field_stay_in_order():
+    decoder, _ = CASES["proto3"]
+    payload = b"".join(
+        b"\xa1\x01" + np.float64(i).tobytes() + b"\xad\x01" + np.float32(-i).tobytes() for i in range(200)
+    )
+    first, second = decoder.gather(batch_of([payload] * 3), fields_of("many_double[:]", "many_float[:]")).picked
+    assert (first.values == np.arange(200)).all() and (second.values == -np.arange(200)).all()
+
+
+def test_elements_are_found_by_their_names_also_where_these_change():
+    decoder, kind = CASES["proto3"]
+    rows = [(["x", "y"], [1, 2]), (["y", "x"], [2, 1]), (["y"], [2])]
+    for order in ([0, 0, 0], [0, 1, 0], [0, 1, 2]):
+        payloads = [kind(name=rows[i][0], many_int32=rows[i][1]).SerializeToString() for i in order]
+        found = decoder.gather(batch_of(payloads), fields_of("many_int32[x]", "many_int32[y]"), ("x", "y"))
+        assert found.picked[1].values.tolist() == [2] * 3
+        assert found.picked[0].state.tolist() == [int(i == 2) for i in order]
+    payloads = [kind(name=rows[i][0], many_int32=rows[i][1]).SerializeToString() for i in (0, 1)]
+    whole = decoder.gather(batch_of(payloads), fields_of("many_int32[:]"), ("y", "x")).picked[0]
+    assert whole.values.tolist() == [[2, 1]] * 2
+    assert decoder.names(batch_of(payloads), fields_of("many_int32[:]")[0]) == ["x", "y"]
+
+
+@pytest.mark.parametrize("data", [b"\xff", b"\x0a\xff\x01", b"", b"\x08\x01", b"\x0a\x02\x22\x05"])
+def test_descriptors_that_are_damaged_are_refused(data):
+    with pytest.raises(UndecodableError, match=r"descriptors (are damaged|do not have)"):
+        decoder_for("protobuf", "protobuf", "pkg.Outer", data)

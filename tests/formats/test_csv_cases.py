@@ -1,0 +1,60 @@
+"""Every awkward table is read right, to the bit, or refused in one line; what is skipped or lost is said."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from cdtool.channels import ChannelMap, TimeSource
+from cdtool.errors import RecordingError
+from cdtool.formats.csv import Csv
+from cdtool.formats.csv.pins import read_pins
+from cdtool.tables import Table
+from tests.formats.csv_cases import Case, cases
+
+SEEDS = (1, 2, 3)
+NAMES = [case.name for case in cases(0)]
+
+
+def pinned(case: Case, names: list[str]) -> ChannelMap | None:
+    """A map that asks for all columns, as a machine file with these pins would."""
+    if not case.pins:
+        return None
+    from cdtool.channels import ChannelSource
+
+    pins = read_pins(Table(tomllib.loads(case.pins), "machine.toml", "csv."))
+    sources = tuple(ChannelSource(f"c{i}", (name,)) for i, name in enumerate(names[1:]))
+    return ChannelMap(TimeSource(column=names[0]), sources, ("axis",), pins=pins)
+
+
+def read(case: Case, folder):
+    path = folder / "log.csv"
+    path.write_bytes(case.content)
+    names = list(case.columns or {"t": [], "a": [], "b": []})
+    return Csv().columns(path, pinned(case, names))
+
+
+def check(case: Case, folder) -> None:
+    if case.columns is None:
+        with pytest.raises(RecordingError) as fault:
+            read(case, folder)
+        assert case.said in str(fault.value)
+        assert "\n" not in str(fault.value) and fault.value.message.startswith(str(folder / "log.csv"))
+        return
+    source = read(case, folder)
+    assert list(source.columns) == list(case.columns)
+    for name, truth in case.columns.items():
+        assert np.array_equal(source.columns[name].values, truth, equal_nan=True), name
+    assert case.said in " ".join(map(str, source.findings))
+
+
+def test_there_are_at_least_eighty_cases_each_with_a_name_of_its_own():
+    assert len(set(NAMES)) == len(NAMES) >= 80
+
+
+@pytest.mark.parametrize("number", range(len(NAMES)), ids=NAMES)
+def test_a_case_is_read_as_a_careful_person_would_read_it(tmp_path, number):
+    for seed in SEEDS:
+        check(cases(seed)[number], tmp_path)

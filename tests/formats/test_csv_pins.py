@@ -1,0 +1,118 @@
+"""`[csv]` of the machine file: what it says replaces what is found, and is held against the file."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.formats.csv import Csv
+from cdtool.formats.csv.last_line import is_whole
+from cdtool.formats.reading import read_recording
+from tests.formats.conftest import COLUMNS
+
+ROWS = "t;i_motor;n_motor\n" + "".join(f"{10 * i};{i % 7 + 1},{i % 9}25;{i}\n" for i in range(20))
+
+
+def pinned(text: str) -> str:
+    return COLUMNS + "[csv]\n" + text + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("separators = 3", "csv.separators: unknown key.*did you mean separator"),
+        ('separator = "x"', "csv.separator: is 'x'.*comma"),
+        ('decimal = ";"', "csv.decimal: is ';'"),
+        ('thousands = "_"', "csv.thousands: is '_'"),
+        ('decimal = ","\nthousands = ","', "csv.thousands: is ',', as decimal is"),
+        ('encoding = "klingon"', "csv.encoding: is 'klingon'.*utf-8"),
+        ('encoding = "cp037"', "csv.encoding: is 'cp037'"),
+        ("header = true", "csv.header: is True.*number of its line"),
+        ("header = 0", "csv.header: is 0"),
+        ("header = false\nunits = 2", "csv.units: is 2 beside header = false"),
+        ("skip_lines = -1", "csv.skip_lines: is -1"),
+        ('missing = "ok"\ncomment = 3', "csv.comment: is 3"),
+        ('time_format = "%Q"', "csv.time_format: is '%Q'.*not known"),
+        ('time_format = "%Y-%m"', "csv.time_format: .*%d is missing"),
+        ('time_format = "days"', "csv.time_format: is 'days'"),
+    ],
+)
+def test_a_wrong_pin_is_one_line_that_names_the_key(machine, text, words):
+    with pytest.raises(ConfigurationError, match=words) as fault:
+        machine(pinned(text))
+    assert "\n" not in str(fault.value)
+
+
+def test_a_pinned_mark_decides_what_the_file_leaves_open(log, machine):
+    path = log(ROWS)
+    with pytest.raises(RecordingError, match=r"'1,025' is 1\.025 \(decimal comma\) or 1025 \(thousands\)"):
+        Csv().columns(path, machine().columns)
+    decimal = Csv().columns(path, machine(pinned('decimal = ","')).columns)
+    thousands = Csv().columns(path, machine(pinned('decimal = "."\nthousands = ","')).columns)
+    assert decimal.columns["i_motor"].values[3] == 4.325
+    assert thousands.columns["i_motor"].values[3] == 4325.0
+
+
+def test_what_info_prints_can_be_pasted_and_reads_the_same(log, machine):
+    path = log("rig 4\n\nt;i_motor;n_motor\nms;A;rad/s\n" + ROWS.partition("\n")[2].replace("25;", "5;"))
+    found = cdtool.info(path)
+    assert tomllib.loads(found.dialect)["csv"]["header"] == 3
+    again = cdtool.info(path, machine=machine(COLUMNS + found.dialect + "\n"))
+    assert again.dialect == found.dialect
+    assert again.channels[0].samples == 20
+
+
+def test_info_with_a_machine_file_needs_its_pins_only(log, machine):
+    assert cdtool.info(log(ROWS), machine=machine(pinned('decimal = ","'))).channels[0].samples == 20
+
+
+def test_a_counter_with_a_rate_is_a_clock_with_its_gaps(log, machine):
+    rows = "n,i_motor,n_motor\n" + "".join(f"{i if i < 10 else i + 5},1,{i}\n" for i in range(20))
+    clock = COLUMNS.replace('time = { column = "t", unit = "ms" }', 'time = { column = "n", rate_hz = 500 }')
+    recording = read_recording(log(rows), machine(clock))
+    assert np.allclose(recording["speed"].time, [0.002 * (i if i < 10 else i + 5) for i in range(20)])
+    assert any("gaps" in finding.message for finding in recording.findings)
+
+
+def test_days_of_excel_are_refused_as_seconds_and_read_where_pinned(log, machine):
+    rows = "t,i_motor,n_motor\n" + "".join(f"{45750.5 + i * 0.001 / 86400:.12f},1,{i}\n" for i in range(20))
+    seconds = COLUMNS.replace('"ms"', '"s"')
+    with pytest.raises(RecordingError, match="days of Excel, or s"):
+        read_recording(log(rows), machine(seconds))
+    recording = read_recording(log(rows), machine(seconds + '[csv]\ntime_format = "excel"\n'))
+    assert recording["speed"].time == pytest.approx(np.arange(20) * 0.001, abs=1e-6)
+    assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
+
+
+def test_dates_are_a_clock_in_seconds_whose_origin_is_kept(log, machine):
+    rows = "t,i_motor,n_motor\n" + "".join(f"2025-04-03T12:00:00.{i:03d}Z,1,{i}\n" for i in range(20))
+    recording = read_recording(log(rows), machine(COLUMNS.replace('"ms"', '"s"')))
+    assert recording["speed"].time.tolist() == [i / 1000 for i in range(20)]
+    assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
+    with pytest.raises(RecordingError, match="holds dates or times of day"):
+        read_recording(log(rows), machine())
+
+
+@pytest.mark.parametrize(
+    ("cell", "above", "expected"),
+    [
+        ("1.250", ["3.125", "-0.500"], (True, True)),
+        ("1.25", ["3.125", "-0.500"], (False, False)),
+        ("12", ["8.5", "7.25"], (False, False)),
+        ("1.25", ["3.125", "0.5"], (True, False)),
+        ("123", ["121", "122"], (True, True)),
+        ("12", ["121", "122"], (False, False)),
+        ("12", ["121", "9"], (True, False)),
+        ("1.5e-0", ["1.5e-03", "2.5e-03"], (False, False)),
+        ("1.5", ["1.5e-03", "2.5e-03"], (False, False)),
+        ("", ["1", "2"], (False, False)),
+        ('"', ["1", "22"], (True, True)),
+        ("1", [], (True, False)),
+    ],
+)
+def test_a_last_number_is_believed_by_the_digits_of_those_above(cell, above, expected):
+    assert is_whole(cell, above) == expected
