@@ -28,16 +28,20 @@ def observe_velocity(
 ) -> None:
     """res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
 
-    K^(1/2) M^-1 K^(1/2) is symmetric: its eigenvectors V and eigenvalues w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
+    K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
     A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
     of the slowest mode without a sample it starts anew.
     """
     joints = balance.shape[1]
-    root = np.sqrt(gains)
+    root = np.zeros(joints)
+    for j in range(joints):
+        root[j] = np.sqrt(gains[j])
     value = np.zeros(joints)
     impulse = np.zeros(joints)
     target = np.zeros(joints)
     modes = np.zeros(joints)
+    mean_inertia = np.zeros((joints, joints))
+    scaled = np.zeros((joints, joints))
     started = False
     elapsed = 0.0
     settled = 0.0
@@ -54,14 +58,15 @@ def observe_velocity(
                 status[k, j] = 3
             continue
         if started:
-            mean_inertia = 0.5 * (inertia[k] + inertia[last])
-            scaled = np.linalg.inv(mean_inertia)
             for i in range(joints):
                 for j in range(joints):
-                    scaled[i, j] *= root[i] * root[j]
-            rates, vectors = np.linalg.eigh(scaled)
-            if elapsed * rates[0] > 3.0:
-                value[:] = 0.0
+                    mean_inertia[i, j] = 0.5 * (inertia[k, i, j] + inertia[last, i, j])
+                    scaled[i, j] = mean_inertia[i, j] / (root[i] * root[j])
+            periods, vectors = np.linalg.eigh(scaled)
+            slowest = periods[joints - 1]
+            if elapsed > 3.0 * slowest:
+                for i in range(joints):
+                    value[i] = 0.0
                 settled = 0.0
             else:
                 for i in range(joints):
@@ -73,18 +78,18 @@ def observe_velocity(
                     modes[mode] = 0.0
                     for i in range(joints):
                         modes[mode] += vectors[i, mode] * target[i]
-                    modes[mode] *= -np.expm1(-rates[mode] * elapsed)
+                    modes[mode] *= -np.expm1(-elapsed / periods[mode])
                 for i in range(joints):
                     change = 0.0
                     for mode in range(joints):
                         change += vectors[i, mode] * modes[mode]
                     value[i] += root[i] * change
-                settled += elapsed * rates[0]
+                settled += elapsed / slowest
         started = True
-        impulse[:] = 0.0
         elapsed = 0.0
         last = k
         for j in range(joints):
+            impulse[j] = 0.0
             residual[k, j] = value[j]
             if missing[k]:
                 status[k, j] = 3
