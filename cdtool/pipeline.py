@@ -15,9 +15,9 @@ from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
 from cdtool.operations import Operation
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, exceedance
+from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
-from cdtool.thresholds.contract import checked_evaluation
+from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Detection:
         if self.threshold is None or self.signal is None:
             return np.full(self.statistic.values.shape, -np.inf)
         recording = self.operation.recording.without_ground_truth()
-        return exceedance(self.threshold, recording, self.signal)[1]
+        return checked_exceedance(self.threshold, recording, self.signal)[1]
 
     @property
     def leading(self) -> int:
@@ -146,8 +146,8 @@ def _inner_band(
     """The band within which an alarm is armed again; None without hysteresis."""
     if not activation.hysteresis:
         return None
-    narrower = threshold.with_safety_factor((1.0 - activation.hysteresis) * threshold.safety_factor)
-    return narrower.evaluate(recording, signal)[1]
+    narrower = checked_factor(threshold, (1.0 - activation.hysteresis) * threshold.safety_factor)
+    return checked_evaluation(narrower, recording, signal)[1]
 
 
 def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:

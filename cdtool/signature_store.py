@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -14,8 +15,10 @@ from cdtool.activation import Activation
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
 from cdtool.machine_file import fingerprint
+from cdtool.operations import HOW_TO_CUT
 from cdtool.plain_text import counted, digits
 from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
 SCHEMA_VERSION = 3
@@ -37,17 +40,20 @@ class FactorOrigin:
     """Where a safety factor comes from: the rule's default, a hand, or a false-alarm budget.
 
     With a budget: its text, the impact-free operations that the factor was set on, and the alarms it gives on them.
+    `added`: runs that a signature was updated with since.
     """
 
     by: Literal["default", "hand", "budget"] = "default"
     budget: str | None = None
     operations: int = 0
     alarms: int = 0
+    added: int = 0
 
     def __str__(self) -> str:
         if self.by != "budget":
             return "by default" if self.by == "default" else "set by hand"
-        return f"set for {self.budget} on {counted(self.operations, 'operation')}, {counted(self.alarms, 'alarm')}"
+        set_on = f"set for {self.budget} on {counted(self.operations, 'operation')}, {counted(self.alarms, 'alarm')}"
+        return f"{set_on}, before {counted(self.added, 'run')} more" if self.added else set_on
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,7 @@ class SignatureFile:
 
     `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
     first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
+    `operations`: how the logs were cut.
     """
 
     machine: str
@@ -70,12 +77,28 @@ class SignatureFile:
     current: tuple[FittedThreshold, ...]
     first: tuple[FittedThreshold, ...]
     runs: tuple[LearnedRun, ...]
+    operations: str = "whole"
     source: str = ""
 
     @property
     def threshold(self) -> str:
         """The threshold's name."""
         return str(self.rule.name)
+
+    @property
+    def learns_limits(self) -> bool:
+        """Whether the runs decide the limits, and no hand."""
+        return not getattr(self.rule, "limits", ())
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The rule's settings that differ from its defaults, its safety factor apart."""
+        plain = asdict(type(self.rule)())
+        return {
+            name: value
+            for name, value in asdict(self.rule).items()
+            if value != plain[name] and name not in ("safety_factor", "signature")
+        }
 
     @property
     def described(self) -> str:
@@ -130,10 +153,10 @@ def read_signature(path: str | Path) -> SignatureFile:
     """Read and check a signature file; raises SignatureError."""
     file = Path(path)
     try:
-        values = json.loads(file.read_text(encoding="utf-8"))
+        values = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse)
     except FileNotFoundError:
         raise SignatureError(f"{file}: no such file", "make it with cdtool learn-signature") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as fault:
+    except (OSError, ValueError, RecursionError) as fault:
         raise SignatureError(
             f"{file}: not a signature file: {fault}", "make one with cdtool learn-signature"
         ) from fault
@@ -148,7 +171,7 @@ def read_signature(path: str | Path) -> SignatureFile:
         return _from_json(values, str(file))
     except UsageError as fault:
         raise SignatureError(f"{file}: {fault.message}", fault.hint) from fault
-    except (KeyError, IndexError, TypeError, ValueError) as fault:
+    except Exception as fault:  # whatever wrong values provoke, plug-in thresholds included
         raise SignatureError(f"{file}: damaged signature file: {fault!r}", "learn it again") from fault
 
 
@@ -159,8 +182,10 @@ def update_signature(path: str | Path, change: Callable[[SignatureFile], Signatu
     file = Path(path)
     try:
         with FileLock(f"{file}.lock", timeout=_LOCK_SECONDS):
-            changed = change(read_signature(file))
-            write_signature(file, changed)
+            stored = read_signature(file)
+            changed = change(stored)
+            if changed is not stored:
+                write_signature(file, changed)
             return changed
     except Timeout as fault:
         raise SignatureError(f"{file}: locked by another process", f"remove {file}.lock if none runs") from fault
@@ -170,7 +195,8 @@ def with_run(signature: SignatureFile, index: int, updated: FittedThreshold, run
     """The file with the class at `index` replaced and the run noted; the first signature stays."""
     current = list(signature.current)
     current[index] = updated
-    return replace(signature, current=tuple(current), runs=(*signature.runs, run))
+    origin = replace(signature.origin, added=signature.origin.added + 1)
+    return replace(signature, current=tuple(current), runs=(*signature.runs, run), origin=origin)
 
 
 def _to_json(signature: SignatureFile) -> dict[str, Any]:
@@ -187,6 +213,7 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "threshold": rule_to_dict(signature.rule),
         "safety_factor_set": asdict(signature.origin),
         "activation": asdict(signature.activation),
+        "operations": signature.operations,
         "runs": [asdict(run) for run in signature.runs],
         "current": [fitted_to_dict(signature.rule, item) for item in signature.current],
         "first": [fitted_to_dict(signature.rule, item) for item in signature.first],
@@ -195,21 +222,54 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
 
 def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
     rule = rule_from_dict(values["threshold"])
+    current, first = (tuple(fitted_from_dict(rule, item) for item in values[name]) for name in ("current", "first"))
+    joints = tuple(map(str, values["joints"]))
+    _check_fitted(current, first, joints)
     return SignatureFile(
         machine=str(values["machine"]["name"]),
         machine_fingerprint=str(values["machine"]["fingerprint"]),
         detector=str(values["detector"]["name"]),
         gains={str(name): _gain(value) for name, value in values["detector"]["gains"].items()},
         unit=str(values["unit"]),
-        joints=tuple(map(str, values["joints"])),
+        joints=joints,
         rule=rule,
-        origin=FactorOrigin(**values["safety_factor_set"]),
-        activation=Activation(**values["activation"]),
-        current=tuple(fitted_from_dict(rule, item) for item in values["current"]),
-        first=tuple(fitted_from_dict(rule, item) for item in values["first"]),
+        origin=_origin(values["safety_factor_set"]),
+        activation=_activation(values["activation"]),
+        current=current,
+        first=first,
         runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
+        operations=known("operations", values["operations"], HOW_TO_CUT),
         source=source,
     )
+
+
+def _check_fitted(current: Sequence[FittedThreshold], first: Sequence[FittedThreshold], joints: Sequence[str]) -> None:
+    if not current or len(current) != len(first):
+        raise ValueError(f"{len(current)} current thresholds, {len(first)} first ones")
+    for item in (*current, *first):
+        if not 0.0 < item.safety_factor < math.inf:
+            raise ValueError(f"safety factor {item.safety_factor}")
+        motion = getattr(item, "motion", None)
+        if motion is not None and not (motion.direction in (-1, 1) and 0.0 < motion.nominal_speed < math.inf):
+            raise ValueError(f"class of motion {motion}")
+        if getattr(item, "joints", tuple(joints)) != tuple(joints):
+            raise ValueError(f"joints {joints} beside a signature of others")
+
+
+def _origin(values: Mapping[str, Any]) -> FactorOrigin:
+    known("safety_factor_set", values["by"], ("default", "hand", "budget"))
+    return FactorOrigin(**values)
+
+
+def _activation(values: Mapping[str, Any]) -> Activation:
+    debounce, latch = values["debounce"], values["latch"]
+    if isinstance(debounce, bool) or not isinstance(debounce, int | None) or not isinstance(latch, bool):
+        raise ValueError(f"activation {dict(values)}")
+    return Activation(debounce, float(values["rearm"]), float(values["hysteresis"]), latch)
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is no number of JSON")
 
 
 def _gain(value: Any) -> Gain:

@@ -242,6 +242,22 @@ def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old
     assert "Traceback" not in done.err
 
 
+@pytest.mark.parametrize("method", ["with_safety_factor", "to_dict"])
+def test_a_threshold_whose_other_methods_fail_is_one_line_too(install, tmp_path, method):
+    broken = f"class Fitted(FittedLimit):\n    def {method}(self, *given): return 1 / 0\n"
+    install(THRESHOLD.replace("class Fitted(FittedLimit):\n", broken), group="thresholds")
+    learn = ("learn-signature", GATE / "free/03.csv", GATE / "free/04.csv", "-m", GATE / "machine.toml")
+    done = cdtool(*learn, "-d", "gm", "-t", "odd", "-o", tmp_path / "s.json")
+    if method == "with_safety_factor":
+        assert done.status == 0, done.err
+        for command in (("detect", LOG, "--hysteresis", 0.2), ("explain", LOG)):
+            done = cdtool(*command, "-m", GATE / "machine.toml", "-s", tmp_path / "s.json")
+            assert done.status == 2 and "threshold Fitted fails: ZeroDivisionError" in done.err, done.err
+    else:
+        assert done.status == 2 and "threshold odd cannot be stored: ZeroDivisionError" in done.err, done.err
+    assert "Traceback" not in done.err
+
+
 def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_path):
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError("deep inside")

@@ -140,3 +140,62 @@ def test_an_update_that_fails_changes_nothing(tmp_path, learned):
     with pytest.raises(SignatureError, match="no"):
         update_signature(path, change)
     assert path.read_bytes() == old
+
+
+def _set(values, path, value):
+    for key in path[:-1]:
+        values = values[key]
+    values[path[-1]] = value
+
+
+CURVE = ("current", 0, "by_position")
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("detector", "gains"), None),
+        (("threshold", "settings"), None),
+        (("threshold", "rule"), ["a"]),
+        (("current",), []),
+        (("first",), []),
+        (("joints",), ["a", "b"]),
+        (("operations",), "sometimes"),
+        (("safety_factor_set", "by"), "x"),
+        (("activation", "debounce"), 2.5),
+        (("activation", "debounce"), True),
+        (("activation", "hysteresis"), 3.0),
+        (("current", 0, "safety_factor"), -3.0),
+        (("current", 0, "safety_factor"), float("nan")),
+        (("current", 0, "nominal_speed"), 0.0),
+        (("current", 0, "direction"), 7),
+        ((*CURVE, "step"), 0),
+        ((*CURVE, "count"), []),
+        ((*CURVE, "count"), [[1.0], [2.0]]),
+        ((*CURVE, "mean", 0), [float("nan")]),
+        ((*CURVE, "squares", 0), [-1.0]),
+    ],
+    ids=lambda item: ".".join(map(str, item)) if isinstance(item, tuple) else None,
+)
+def test_a_wrong_value_in_the_file_is_one_clear_error(tmp_path, learned, path, value):
+    file = tmp_path / "s.json"
+    write_signature(file, learned)
+    values = json.loads(file.read_text())
+    _set(values, path, value)
+    file.write_text(json.dumps(values))
+    with pytest.raises(SignatureError, match=r"s\.json: "):
+        read_signature(file)
+
+
+def test_deeply_nested_rubbish_is_one_clear_error(tmp_path):
+    (tmp_path / "s.json").write_text("[" * 100_000)
+    with pytest.raises(SignatureError, match="not a signature file"):
+        read_signature(tmp_path / "s.json")
+
+
+def test_an_update_without_a_change_leaves_the_file_alone(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    before = path.stat()
+    update_signature(path, lambda file: file)
+    assert path.stat().st_ino == before.st_ino

@@ -76,6 +76,7 @@ def learn_signature(
     Example: cdtool learn-signature free/*.csv --machine machine.toml --detector feekf -o gate.feekf.json
     """
     from cdtool.machine_file import read_machine_file
+    from cdtool.plain_text import counted
     from cdtool.signature_store import write_signature
     from cdtool.thresholds.signature import ENOUGH_RUNS
     from cdtool.workflows.learning import learn_signature as learn
@@ -100,9 +101,9 @@ def learn_signature(
         )
     write_signature(output, learned.signature)
     for motion, runs in learned.runs:
-        if runs < ENOUGH_RUNS:
-            which = f"runs {motion.described}" if motion else "runs"
-            text = f"{runs} {which}, fewer than {ENOUGH_RUNS}: its limits are less sure"
+        if runs < ENOUGH_RUNS and learned.signature.learns_limits:
+            which = f" {motion.described}" if motion else ""
+            text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less sure"
             typer.echo(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
     _show(learned, output, as_json)

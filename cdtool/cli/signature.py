@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
-from cdtool.cli.options import JobsOption, JsonOption, MachineOption, OperationsOption, figure_name
+from cdtool.cli.options import JobsOption, JsonOption, MachineOption, figure_name
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import ExitStatus, UsageError
 
@@ -29,6 +29,9 @@ def _signature() -> None:
 
 
 FileArgument = Annotated[Path, typer.Argument(help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")]
+CutOption = Annotated[
+    str | None, typer.Option("--operations", help="How to cut a log into strokes. Default: as for learning.")
+]
 PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw.")]
 
 
@@ -39,18 +42,18 @@ def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = Fals
     Example: cdtool signature show gate.feekf.json --plot signature.png
     """
     from cdtool.signature_store import read_signature
+    from cdtool.workflows.upkeep import signatures_in
 
     drawn = figure_name(plot) if plot else None
     stored = read_signature(file)
+    pairs = signatures_in(stored) if drawn else ()
     if as_json:
         print_json(file_as_json(stored))
     else:
         show_file(stored)
     if drawn:
         from cdtool.report.plots.signature_plot import plot_signature
-        from cdtool.workflows.upkeep import signatures_in
 
-        pairs = signatures_in(stored)
         plot_signature(
             [current for current, _ in pairs], [first for _, first in pairs], stored.unit, stored.detector, drawn
         )
@@ -66,7 +69,7 @@ def check(
         typer.Argument(help="Impact-free recordings: those learned from, and those since, in order.", metavar="LOG..."),
     ],
     machine: MachineOption,
-    operations: OperationsOption = "whole",
+    operations: CutOption = None,
     target: Annotated[
         float, typer.Option("--target", help="Chance of a false alarm in an operation that the runs have to show.")
     ] = 1e-3,
@@ -86,6 +89,8 @@ def check(
     """
     from cdtool.workflows.upkeep import check_signature
 
+    if plot is not None and not plot.is_dir():
+        figure_name(plot)
     with progress("reading runs") as advance:
         checked = check_signature(
             file, logs, machine, operations=operations, target=target, jobs=jobs, progress=advance
@@ -113,7 +118,7 @@ def update(
     file: FileArgument,
     logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings to add.", metavar="LOG...")],
     machine: MachineOption,
-    operations: OperationsOption = "whole",
+    operations: CutOption = None,
     forget: Annotated[
         float | None, typer.Option("--forget", help="Forget old runs: effective number of runs, 20 to 50.")
     ] = None,

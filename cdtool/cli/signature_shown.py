@@ -28,7 +28,8 @@ def show_file(stored: SignatureFile) -> None:
     gains = ", ".join(f"{name} {value}" for name, value in stored.gains.items()) or "none"
     typer.echo(f"machine: {plain(stored.machine)}")
     typer.echo(f"detector: {plain(stored.detector)}, gains: {plain(gains)}; unit {plain(stored.unit)}")
-    typer.echo(f"threshold: {plain(stored.described)}")
+    settings = "".join(f"; {name} {value}" for name, value in stored.settings.items())
+    typer.echo(f"threshold: {plain(stored.described)}{plain(settings)}")
     typer.echo(f"activation: {_activation(stored)}")
     typer.echo(f"joints: {plain(', '.join(stored.joints))}")
     typer.echo(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
@@ -45,7 +46,7 @@ def show_file(stored: SignatureFile) -> None:
                 (item.motion.described, plain(joint.joint), grown, item.sides, stroke, number(joint.spread, 3), moved)
             )
     if rows:
-        columns = [("class", "left"), ("joint", "left"), ("runs", "right"), ("sides", "left")]
+        columns = [("class", "left"), ("joint", "left"), ("effective\nruns", "right"), ("sides", "left")]
         columns += [("limits from\nto, travel", "right"), (f"spread\n{stored.unit}", "right")]
         table([*columns, ("limits moved since\nfirst learned, spreads", "right")], rows)
 

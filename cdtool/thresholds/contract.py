@@ -11,8 +11,8 @@ import numpy as np
 
 from cdtool.detection import Band, Signal
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
-from cdtool.recording import Recording
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.base import FittedThreshold, exceedance
 
 _HINT = "a fault of the threshold: see docs/own-detector.md"
 
@@ -48,6 +48,26 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
         # NaN crosses no limit: it would be a threshold that sees nothing and does not say so.
         raise RecordingError(f"{recording.name}: threshold {name} gives NaN where it says that it judges", _HINT)
     return statistic, band
+
+
+def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold:
+    """`threshold.with_safety_factor`; raises SignatureError where it fails."""
+    try:
+        return threshold.with_safety_factor(factor)
+    except CdtoolError:
+        raise
+    except Exception as fault:
+        raise SignatureError(f"threshold {type(threshold).__name__} fails: {_place(fault)}", _HINT) from fault
+
+
+def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
+    """`base.exceedance`; raises SignatureError where the threshold fails."""
+    try:
+        return exceedance(threshold, recording, signal)
+    except CdtoolError:
+        raise
+    except Exception as fault:
+        raise SignatureError(f"threshold {type(threshold).__name__} fails: {_place(fault)}", _HINT) from fault
 
 
 def _place(fault: Exception) -> str:

@@ -126,8 +126,14 @@ class Curve:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`."""
-        arrays = (np.array(values[name], dtype=np.float64) for name in ("count", "mean", "squares"))
-        return cls(float(values["step"]), float(values["window"]), *arrays)
+        count, mean, squares = (np.array(values[name], dtype=np.float64) for name in ("count", "mean", "squares"))
+        step, window = float(values["step"]), float(values["window"])
+        alike = count.ndim == 2 and count.size and count.shape == mean.shape == squares.shape
+        if not (alike and np.isfinite((count, mean, squares)).all() and min(count.min(), squares.min()) >= 0.0):
+            raise ValueError(f"a curve of counts {count.shape}, means {mean.shape} and squares {squares.shape}")
+        if not 0.0 < step <= window < math.inf:
+            raise ValueError(f"a curve with step {step} and window {window}")
+        return cls(step, window, count, mean, squares)
 
     @property
     def enough(self) -> float:

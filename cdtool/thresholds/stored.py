@@ -35,7 +35,12 @@ def fitted_to_dict(rule: Any, fitted: Any) -> dict[str, Any]:
             f"threshold {rule.name} makes {type(fitted).__name__}, which its `fitted` does not name",
             "a fault of the threshold: see docs/own-detector.md",
         )
-    return {"fitted": type(fitted).__name__, **fitted.to_dict()}
+    try:
+        return {"fitted": type(fitted).__name__, **fitted.to_dict()}
+    except Exception as fault:
+        raise SignatureError(
+            f"threshold {rule.name} cannot be stored: {fault!r}", "a fault of the threshold: see docs/own-detector.md"
+        ) from fault
 
 
 def fitted_from_dict(rule: Any, values: Mapping[str, Any]) -> Any:

@@ -86,7 +86,9 @@ def detect(
         thresholds = (Limit.given(limit),)
         raised_by = Activation()
         described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
-    raised_by = raised_by.changed(activation or {})
+    stored_one, raised_by = raised_by, raised_by.changed(activation or {})
+    if raised_by != stored_one and signature is not None:
+        described += ", with another activation than that of the file"
     recording, parts = load_operations(Path(log), machine_file, operations)
     detections = tuple(
         detect_operation(part, machine_file.machine, instance, thresholds, raised_by, joints) for part in parts

@@ -59,7 +59,13 @@ def signals_of(
     """
     skipped: list[Skipped] = []
     pairs: list[Pair] = []
+    seen: dict[tuple[str, int], str] = {}
     for operation in operations:
+        run = (operation.recording.digest, operation.number)
+        if run[0] and run in seen:
+            skipped.append(Skipped(operation.name, f"holds the same bytes as {seen[run]}: counts once"))
+            continue
+        seen[run] = operation.name
         try:
             pairs.append((operation, run_detector(operation, machine, detector, watched)))
         except CdtoolError as fault:
@@ -67,7 +73,7 @@ def signals_of(
     if not pairs:
         reasons = [*unread, *skipped]
         reason = f"; first reason: {reasons[0].reason}" if reasons else ""
-        raise SignatureError(f"no run to learn {detector.name} from{reason}", "check with cdtool info")
+        raise SignatureError(f"no run that {detector.name} can be used on{reason}", "check with cdtool info")
     return pairs, skipped
 
 

@@ -39,7 +39,7 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
     own = [item for item in fields(rule) if item.name != "signature"]
     settings = {item.name: _value(table, item) for item in own if item.name in table}
     table.finish()
-    if "limits" in settings and "safety_factor" in settings:
+    if "limits" in settings and ("safety_factor" in settings or signature.safety_factor is not None):
         raise table.fault("safety_factor", "is given beside limits set by hand", "leave one of the two out")
     if "safety_factor" not in settings and signature.safety_factor is not None:
         settings["safety_factor"] = signature.safety_factor

@@ -17,6 +17,7 @@ from cdtool.evaluation.upkeep.drift import audit_drift
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
+from cdtool.plain_text import counted
 from cdtool.signature_store import SignatureFile, read_signature, update_signature, with_run
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
@@ -26,8 +27,8 @@ from cdtool.workflows.fitting import Pair, signals_of
 from cdtool.workflows.learning import learned_run
 from cdtool.workflows.runs import Progress, load_runs
 
-# The chance of a false alarm in an operation that the runs have to show.
-TARGET = 1e-3
+# The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
+TARGET, LEAST_TARGET = 1e-3, 1e-9
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
     """
     pairs = []
     for current, first in zip(file.current, file.first, strict=True):
-        if not (isinstance(current, FittedSignature) and isinstance(first, FittedSignature)):
+        if not isinstance(file.rule, Signature) or not all(
+            isinstance(item, FittedSignature) for item in (current, first)
+        ):
             raise SignatureError(
                 f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
                 "such a threshold is not updated run by run: learn it again with learn-signature",
@@ -88,7 +91,7 @@ def check_signature(
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
     *,
-    operations: str = "whole",
+    operations: str | None = None,
     target: float = TARGET,
     jobs: int = 1,
     progress: Progress | None = None,
@@ -97,21 +100,26 @@ def check_signature(
 
     Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is the
     chance of a false alarm in an operation that they have to show. In the second, taken in the order given, drift is
-    looked for. Which log is which is told by its bytes. Raises SignatureError where the file does not belong or holds
-    no signature, CdtoolError where nothing can be read.
+    looked for. Which log is which is told by its bytes. `operations`: how logs are cut; as for learning where None.
+    Raises SignatureError where the file does not belong or holds no signature, or logs are cut otherwise; CdtoolError
+    where nothing can be read.
     """
-    if not 0.0 < target < 1.0:
-        raise UsageError(f"target is {target:g}", "the chance of a false alarm in an operation, above 0 and below 1")
+    if not LEAST_TARGET <= target < 1.0:
+        raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     file = read_signature(path)
     signatures = signatures_in(file)
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
-    runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
+    cut = _cut(file, operations)
+    runs = load_runs([Path(log) for log in logs], machine_file, cut, jobs=jobs, progress=progress)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
     known = {(run.sha256, run.operation) for run in file.runs}
     learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
+    if 0 < sum(learned) < len(file.runs):
+        some = f"{sum(learned)} of the {len(file.runs)} runs that it was learned from are given"
+        skipped.append(Skipped(str(path), f"{some}: coverage is that of a signature of these alone"))
     classes, served = [], set()
     for current, first in signatures:
         own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
@@ -151,7 +159,7 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
     try:
         return work()
     except SignatureError as fault:
-        skipped.append(Skipped(f"{len(pairs)} runs, {pairs[0][0].name} first", fault.message))
+        skipped.append(Skipped(f"{counted(len(pairs), 'run')}, {pairs[0][0].name} first", str(fault)))
         return None
 
 
@@ -160,7 +168,7 @@ def update_with_runs(
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
     *,
-    operations: str = "whole",
+    operations: str | None = None,
     forget: float | None = None,
     cap: float = CAP,
     reserve: float = RESERVE,
@@ -175,9 +183,14 @@ def update_with_runs(
     """
     if forget is not None and not forget > 1.0:
         raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
+    for name, value in (("cap", cap), ("reserve", reserve)):
+        if not value > 0.0:
+            raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    detector = machine_file.detector(read_signature(path).detector)
-    runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
+    stored = read_signature(path)
+    detector = machine_file.detector(stored.detector)
+    cut = _cut(stored, operations)
+    runs = load_runs([Path(log) for log in logs], machine_file, cut, jobs=jobs, progress=progress)
     added: list[str] = []
     refused = list(runs.skipped)
 
@@ -193,6 +206,16 @@ def update_with_runs(
         return file
 
     return Updated(update_signature(path, change), tuple(added), tuple(refused))
+
+
+def _cut(file: SignatureFile, operations: str | None) -> str:
+    """How logs are cut: as for learning, since a stroke cut otherwise would be taken for another one."""
+    if operations not in (None, file.operations):
+        raise SignatureError(
+            f"{file.source}: learned from logs cut by '{file.operations}', not by '{operations}'",
+            "leave --operations out, or learn another signature",
+        )
+    return file.operations
 
 
 def _with_operation(

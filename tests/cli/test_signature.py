@@ -50,7 +50,9 @@ def test_show_tells_what_the_file_holds(signature, tmp_path):
 def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
     path = tmp_path / "cusum.json"
     free = logs_of(gate_folder)
-    learned = cdtool("learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "-t", "cusum", "-o", path)
+    learned = cdtool(
+        "learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "-t", "cusum", "-o", path
+    )
     assert learned.status == 0 and "cusum, safety factor 15 by default" in learned.out, learned.err
     done = cdtool("signature", "show", path)
     assert done.status == 0 and "threshold: cusum, safety factor 15 by default" in done.out
@@ -78,7 +80,7 @@ def test_a_stricter_target_needs_more_runs(signature, gate_folder):
     assert needed == sorted(needed) and needed[0] < needed[-1]
 
 
-def test_a_quiet_season_shows_no_drift_and_a_drifting_one_says_what_and_where(signature, gate_folder, seasons, tmp_path):
+def test_a_quiet_season_shows_no_drift_and_another_says_what_and_where(signature, gate_folder, seasons, tmp_path):
     quiet = check(signature, gate_folder, *logs_of(seasons / "quiet"))
     assert quiet.status == 0 and "no drift shown" in quiet.out, quiet.out + quiet.err
     picture = tmp_path / "drift.png"
@@ -109,7 +111,8 @@ def test_a_growing_obstruction_is_refused_before_it_is_learned(signature, gate_f
     ("options", "said"),
     [
         (("--forget", 0.5), "forget is 0.5"),
-        (("--cap", 0), "cap is 0"),
+        (("--cap", 0), "error: cap is 0"),
+        (("--cap", "nan"), "error: cap is nan"),
         (("--reserve", -1), "reserve is -1"),
     ],
 )
@@ -124,7 +127,79 @@ def test_wrong_names_and_targets_are_one_line(signature, gate_folder, tmp_path):
     assert "no such file" in cdtool("signature", "show", tmp_path / "none.json").err
     wrong = check(signature, gate_folder, *free, "--target", 2)
     assert wrong.status == 2 and "target is 2" in wrong.err
+    assert "target is 1e-60" in check(signature, gate_folder, *free, "--target", 1e-60).err
     plot = check(signature, gate_folder, *free, "--plot", tmp_path / "d.png")
     assert plot.status == 2 and "no log is new" in plot.err
     other = cdtool("signature", "check", signature, gate_folder / "none.csv", "-m", gate_folder / "machine.toml")
     assert other.status == 2 and other.err.count("Traceback") == 0
+
+
+def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path):
+    free = logs_of(gate_folder)
+    machine = ("-m", gate_folder / "machine.toml")
+    few = cdtool("learn-signature", *free[:5], *free[:5], *machine, "-d", "gm", "-o", tmp_path / "few.json")
+    assert few.status == 2 and "5 impact-free runs of one class" in few.err
+    twin = tmp_path / "twin.csv"
+    twin.write_bytes(free[2].read_bytes())
+    done = cdtool("learn-signature", *free, twin, *machine, "-d", "gm", "-o", tmp_path / "s2.json")
+    assert done.status == 3 and "twin.csv: holds the same bytes as" in done.err
+    assert len(json.loads((tmp_path / "s2.json").read_text())["runs"]) == len(free)
+    once, twice = (
+        json.loads(check(signature, gate_folder, *logs, "--json").out)["classes"][0]["coverage"]
+        for logs in (free, [*free, *free])
+    )
+    assert once == twice
+
+
+def test_some_of_the_runs_learned_from_are_no_verdict_on_all(gate_folder, signature):
+    done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
+    assert done.status == 3 and "4 of the 11 runs that it was learned from are given" in done.err
+    done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
+    assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing could be judged" in done.out
+
+
+def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
+    path, machine = tmp_path / "cut.json", ("-m", gate_folder / "machine.toml")
+    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--operations", "motion", "-o", path)
+    assert cdtool(*learn).status == 0
+    again = cdtool("signature", "update", path, *logs_of(gate_folder), *machine)
+    assert again.status == 2 and "in the signature already" in again.err
+    other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--operations", "whole")
+    assert other.status == 2 and "learned from logs cut by 'motion', not by 'whole'" in other.err
+
+
+def test_what_a_budget_was_set_on_is_not_claimed_for_something_else(gate_folder, tmp_path):
+    path, machine = tmp_path / "b.json", ("-m", gate_folder / "machine.toml")
+    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--force", "-o", path)
+    done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--debounce", 5)
+    assert done.status == 0 and "set for 1/5op on 11 operations" in done.out, done.err
+    log = gate_folder / "holdout" / "01.csv"
+    assert "another activation" not in cdtool("detect", log, *machine, "-s", path).out
+    assert (
+        "with another activation than that of the file"
+        in cdtool("detect", log, *machine, "-s", path, "--debounce", 1).out
+    )
+    updated = cdtool("signature", "update", path, log, *machine)
+    shown = cdtool("signature", "show", path).out
+    assert ("before 1 run more" in shown) == (updated.status == 0)
+
+
+def test_hand_set_limits_leave_no_room_for_a_factor_and_need_no_runs(gate_folder, tmp_path):
+    (log, *_), machine = logs_of(gate_folder), ("-m", gate_folder / "machine.toml")
+    learn = (
+        "learn-signature",
+        log,
+        *machine,
+        "-d",
+        "gm",
+        "-t",
+        "limit",
+        "--set",
+        "limits=400",
+        "-o",
+        tmp_path / "l.json",
+    )
+    done = cdtool(*learn)
+    assert done.status == 0 and "limit 400 N set by hand" in done.out and "less sure" not in done.err
+    refused = cdtool(*learn, "-k", 3)
+    assert refused.status == 2 and "beside limits set by hand" in refused.err

@@ -14,6 +14,8 @@ def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
     stroke; too few runs are told where neither is, since what is learned anew is checked anew. Alarms without a drift
     are left to `cdtool explain`.
     """
+    if coverage is None and drift is None:
+        return "nothing could be judged"
     steps = []
     if drift is not None:
         steps += _inspect(drift)
