@@ -3,6 +3,9 @@
 What a command does, a notebook does in one line:
 
     cdtool.read("run.csv", "machine.toml")                              -> Recording
+    cdtool.init("run.csv")                                              -> a draft of machine.toml
+    cdtool.convert("run.csv", "run.parquet", "machine.toml")            -> what was written
+    cdtool.recover("damaged.mcap", "clean.mcap")                        -> what was left and what was lost
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
@@ -29,11 +32,14 @@ if TYPE_CHECKING:
     from cdtool.version import __version__
     from cdtool.workflows.benchmark import benchmark
     from cdtool.workflows.comparing import compare
+    from cdtool.workflows.converting import convert
     from cdtool.workflows.detection import detect
+    from cdtool.workflows.drafting import init
     from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
     from cdtool.workflows.learning import learn_signature
     from cdtool.workflows.planning import plan
+    from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
     from cdtool.workflows.study import study_sensors
@@ -50,6 +56,9 @@ _API = {
     "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
+    "convert": "cdtool.workflows.converting:convert",
+    "init": "cdtool.workflows.drafting:init",
+    "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
@@ -63,12 +72,15 @@ __all__ = [
     "benchmark",
     "check_signature",
     "compare",
+    "convert",
     "detect",
     "explain",
     "info",
+    "init",
     "learn_signature",
     "plan",
     "read",
+    "recover",
     "score",
     "simulate_arm",
     "simulate_gate",

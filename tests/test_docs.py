@@ -47,6 +47,7 @@ COMMANDS = {
     "docs/own-detector.md": 1,
     "docs/comparing.md": 7,
     "docs/study.md": 2,
+    "docs/containers.md": 4,
 }
 EXAMPLES = {
     "docs/python.md": 10,

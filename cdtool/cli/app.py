@@ -14,9 +14,11 @@ import typer
 
 from cdtool.cli.benchmark import benchmark
 from cdtool.cli.compare import compare
+from cdtool.cli.convert import convert
 from cdtool.cli.detect import detect
 from cdtool.cli.explain import explain
 from cdtool.cli.info import info
+from cdtool.cli.init import init
 from cdtool.cli.learn_signature import learn_signature
 from cdtool.cli.list_known import list_known
 from cdtool.cli.plan import plan
@@ -37,6 +39,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",  # in its default the help loses what stands in brackets, such as units
 )
 app.command("info")(info)
+app.command("init")(init)
 app.command("learn-signature")(learn_signature)
 app.command("detect")(detect)
 app.command("explain")(explain)
@@ -45,6 +48,7 @@ app.command("report")(report)
 app.command("score")(score)
 app.command("compare")(compare)
 app.command("plan")(plan)
+app.command("convert")(convert)
 app.command("recover")(recover)
 app.add_typer(signature, name="signature")
 app.add_typer(simulate, name="simulate")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def info(
-    logs: Annotated[list[Path], typer.Argument(help="Recordings: CSV, MCAP or MAT.", metavar="LOG...")],
+    logs: Annotated[list[Path], typer.Argument(help="Recordings: CSV, MCAP, MAT and more.", metavar="LOG...")],
     machine: Annotated[
         Path | None, typer.Option("--machine", "-m", help="Machine file: map the channels and check them.")
     ] = None,

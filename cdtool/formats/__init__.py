@@ -14,6 +14,11 @@ FORMATS = Registry(
         "csv": "cdtool.formats.csv:Csv",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
+        "parquet": "cdtool.formats.parquet:Parquet",
+        "hdf5": "cdtool.formats.hdf5:Hdf5",
+        "mdf": "cdtool.formats.mdf:Mdf",
+        "tdms": "cdtool.formats.tdms:Tdms",
+        "rosbag": "cdtool.formats.rosbag:Rosbag",
     },
     contract=("name", "suffixes", "sniff", "columns"),
 )

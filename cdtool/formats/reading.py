@@ -13,6 +13,7 @@ from cdtool.channels import ChannelMap
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
 from cdtool.formats import FORMATS
 from cdtool.formats.channel_assembly import as_logged, assemble
+from cdtool.formats.own_clocks import with_own_clocks
 from cdtool.formats.source import Format, Source
 from cdtool.machine_file import MachineFile
 from cdtool.recording import Recording, Series
@@ -26,8 +27,7 @@ _KNOWN_CONTENTS = {
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
     b"\x89HDF": "an HDF5 file",
-    b"SQLite format 3": "an SQLite database (a rosbag2 .db3?)",
-    b"#ROSBAG": "a ROS 1 bag",
+    b"SQLite format 3": "an SQLite database, but no ROS 2 bag",
     b"<": "HTML or XML",
     b"{": "JSON",
     b"[": "JSON",
@@ -68,13 +68,33 @@ def survey(path: Path) -> Source:
 def read_recording(path: Path, machine_file: MachineFile) -> Recording:
     """One log as a recording on the load side; raises RecordingError or ConfigurationError.
 
-    A folder of MCAP files, as rosbag2 writes it, is one log in parts.
+    A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts.
     """
-    if path.is_dir() and (parts := sorted(path.glob("*.mcap"))):
-        return replace(read_parts(parts, machine_file, path.name), source=str(path))
+    if path.is_dir():
+        return replace(read_parts(log_parts(path), machine_file, path.name), source=str(path))
+    source, channels = mapped_source(path, machine_file)
+    return assemble(source, channels, machine_file.machine)
+
+
+def log_parts(path: Path) -> list[Path]:
+    """The files of a log: itself, or those in the folder that rosbag2 made; raises RecordingError."""
+    for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
+        if parts := sorted(path.glob(pattern)):
+            return parts
+    _head(path)
+    return [path]
+
+
+def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
+    """One file's columns that the machine file maps, and the map that fits them; raises RecordingError."""
     found = choose_format(path)
     channels = _map(found, machine_file, path)
-    return assemble(found.columns(path, channels), channels, machine_file.machine)
+    return with_own_clocks(found.columns(path, channels), channels)
+
+
+def has_topics(found: Format) -> bool:
+    """True where a format holds messages of topics, so that [channels.mcap] maps it; a plug-in need not tell."""
+    return bool(getattr(found, "topics", False))
 
 
 def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> Recording:
@@ -84,10 +104,9 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> R
     parts: list[Recording] = []
     low_pass = 0.0
     for path in paths:
-        found = choose_format(path)
-        channels = _map(found, machine_file, path)
+        source, channels = mapped_source(path, machine_file)
         low_pass = channels.speed_low_pass
-        parts.append(as_logged(found.columns(path, channels), channels, machine_file.machine))
+        parts.append(as_logged(source, channels, machine_file.machine))
     parts.sort(key=lambda part: part.origin + part.start)
     recording: Recording = machine_file.machine.referred_to_load(_joined(parts, name), low_pass)
     return recording
@@ -126,10 +145,11 @@ def _joined(parts: Sequence[Recording], name: str) -> Recording:
 
 
 def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
-    channels = machine_file.topics if found.name == "mcap" else machine_file.columns
+    topics = has_topics(found)
+    channels = machine_file.topics if topics else machine_file.columns
     if not channels.sources:
-        section = "[channels.mcap]" if found.name == "mcap" else "[channels]"
-        what = "topic and field" if found.name == "mcap" else "column and unit"
+        section = "[channels.mcap]" if topics else "[channels]"
+        what = "topic and field" if topics else "column and unit"
         raise ConfigurationError(
             f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
         )

@@ -73,7 +73,7 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
 
     What is learned afresh has no curve along the stroke that could be held against a season's runs.
     """
-    pairs = []
+    pairs: list[tuple[FittedSignature, FittedSignature]] = []
     for current, first in zip(file.current, file.first, strict=True):
         if not isinstance(file.rule, Signature) or not all(
             isinstance(item, FittedSignature) for item in (current, first)

@@ -12,6 +12,7 @@ import cdtool.machines
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.formats import FORMATS
+from cdtool.formats.reading import has_topics
 from cdtool.machines import MACHINES
 from cdtool.registry import Registry
 
@@ -20,7 +21,8 @@ REGISTRIES = (FORMATS, MACHINES, DETECTORS)
 
 def test_every_file_of_the_folder_with_a_format_is_registered():
     folder = Path(cdtool.formats.__file__).parent
-    helpers = {"__init__", "source", "channel_assembly", "reading", "csv_dialect", "csv_rows", "mat_check"}
+    helpers = {"__init__", "source", "channel_assembly", "reading", "mat_check", "groups", "own_clocks"}
+    helpers |= {"container_checks", "csv_writing", "mcap_writing", "element_names"}
     names = {path.stem for path in folder.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
     assert names - helpers == set(FORMATS.table)
 
@@ -42,6 +44,25 @@ def test_a_format_knows_its_suffixes_and_refuses_what_is_of_another(name, tmp_pa
         assert found.sniff(path) is False
         with pytest.raises(CdtoolError, match=r"x\."):
             found.columns(path)
+
+
+@pytest.mark.parametrize("name", FORMATS.names())
+def test_a_format_whose_library_is_absent_says_how_to_install_it(name, tmp_path, monkeypatch):
+    def absent(module: str) -> None:
+        raise ImportError(module)
+
+    monkeypatch.setattr("cdtool.formats.container_checks.import_module", absent)
+    found = FORMATS.load(name)()
+    path = tmp_path / f"x{found.suffixes[0]}"
+    path.write_bytes(b"no recording")
+    extra = rf"is not installed \(pip install 'cdtool\[{name}\]'\)"
+    with pytest.raises(CdtoolError, match=None if name in ("csv", "mcap", "mat") else extra):
+        found.columns(path)
+
+
+@pytest.mark.parametrize("name", FORMATS.names())
+def test_a_format_tells_whether_it_holds_topics(name):
+    assert has_topics(FORMATS.load(name)()) == (name in ("mcap", "rosbag"))
 
 
 @pytest.mark.parametrize("registry", REGISTRIES, ids=lambda registry: registry.kind)

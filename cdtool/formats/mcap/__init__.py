@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError, nearest
+from cdtool.formats.mcap.columns import UndecodableError
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.fields import parse_field
-from cdtool.formats.mcap.gathering import Gathering
+from cdtool.formats.mcap.gathering import Decoders, Gathering
 from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding
@@ -26,6 +28,7 @@ class Mcap:
 
     name: ClassVar[str] = "mcap"
     suffixes: ClassVar[tuple[str, ...]] = (".mcap",)
+    topics: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """True if the file starts with MCAP's magic bytes."""
@@ -35,6 +38,18 @@ class Mcap:
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
         return _survey(path) if wanted is None else _wanted(path, wanted)
+
+    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
+        """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""
+        decoders = Decoders()
+        try:
+            for messages in chain.from_iterable(Log(path, topic.__eq__).pieces()):
+                decoder = decoders.of(messages.stream, messages.batch)
+                if decoder is not None:
+                    return decoder.element_names(messages.batch.first(1))
+        except (RecordingError, UndecodableError):  # the survey says what is wrong
+            return ()
+        return ()
 
 
 def _wanted(path: Path, wanted: ChannelMap) -> Source:

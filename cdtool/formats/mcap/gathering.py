@@ -18,7 +18,7 @@ from cdtool.formats.mcap.rows import Rows
 from cdtool.formats.source import Column
 from cdtool.recording import Finding, FloatArray
 
-Stamps = npt.NDArray[np.uint64]
+Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
 
 
 class Decoders:
@@ -45,6 +45,11 @@ class Decoders:
             self._fail(len(batch), str(made))
             return None
         return made
+
+    def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
+        """What only the wanted places show: a channel's messages cannot be decoded; they are counted."""
+        self._made[stream.channel.id] = fault
+        self._fail(len(batch), str(fault))
 
     def keep(self, gathered: Gathered) -> npt.NDArray[np.bool_]:
         """Which messages of a batch were decoded; the others are counted."""
@@ -110,7 +115,8 @@ class Gathering:
         self.decoders = Decoders()
         self._fields = [_Field(field, expected) for field in fields]
         self._wanted = list(fields)
-        self._stamps = Rows(expected, np.uint64)
+        # A header's stamp may lie before 1970.
+        self._stamps = Rows(expected, np.int64 if clock == "header" else np.uint64)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     @property
@@ -127,6 +133,9 @@ class Gathering:
             gathered = decoder.gather(batch, self._wanted, self.joints, stamps=self.clock == "header")
         except FieldMissingError as fault:
             raise missing(self.where, self._absent(decoder, batch), fault) from fault
+        except UndecodableError as fault:
+            self.decoders.give_up(stream, batch, fault)
+            return
         whole = self.decoders.keep(gathered)
         all_whole = bool(whole.all())
         stamps = self._stamps_of(batch, gathered, whole)
@@ -176,7 +185,7 @@ class Gathering:
             raise RecordingError(
                 f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
             )
-        return gathered.stamps.astype(np.uint64)
+        return gathered.stamps
 
     def _absent(self, decoder: Decoder, batch: Batch) -> str:
         """The field that the schema does not have."""
@@ -197,8 +206,11 @@ def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:
 
 def in_order(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
     """Times [s] after `origin` [ns] in ascending order, and the order; None where they are in order as they stand."""
-    # The difference is taken between integers: an epoch in ns has more digits than a float64.
-    time = (stamps - np.uint64(origin % 2**64)).view(np.int64) / 1e9
+    # The difference is taken between integers: an epoch in ns has more digits than a float64. It may need all 64 bits.
+    later = (stamps.view(np.uint64) - np.uint64(origin % 2**64)).astype(np.uint64)
+    time = later / 1e9
+    if len(stamps) and (before := stamps < origin).any():
+        time[before] = -((~later[before] + np.uint64(1)) / 1e9)
     if np.all(time[1:] >= time[:-1]):
         return time, None
     order = np.argsort(time, kind="stable")

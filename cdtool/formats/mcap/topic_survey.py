@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns.gathered import ABSENT, Picked
+from cdtool.formats.mcap.columns.gathered import ABSENT, Picked, UndecodableError
 from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.fields import Field, parse_field
 from cdtool.formats.mcap.gathering import Decoders, column_of, in_order, tally
@@ -39,13 +39,20 @@ class TopicSurvey:
         decoder = self.decoders.of(stream, batch)
         if decoder is None:
             return
+        fields = dict(self._fields)
         for name in decoder.fields(batch):
-            if name not in self._fields and (parsed := _parsed(name)) is not None:
-                self._fields[name] = parsed
-                self._values[name] = Rows(self._expected)
-                self._values[name].append(np.full(self._stamps.count, np.nan))
-                self._widths[name] = Counter()
-        gathered = decoder.gather(batch, list(self._fields.values()), stamps=True)
+            if name not in fields and (parsed := _parsed(name)) is not None:
+                fields[name] = parsed
+        try:
+            gathered = decoder.gather(batch, list(fields.values()), stamps=True)
+        except UndecodableError as fault:
+            self.decoders.give_up(stream, batch, fault)
+            return
+        for name in fields.keys() - self._fields.keys():
+            self._values[name] = Rows(self._expected)
+            self._values[name].append(np.full(self._stamps.count, np.nan))
+            self._widths[name] = Counter()
+        self._fields = fields
         whole = self.decoders.keep(gathered)
         self._stamps.append(batch.log_time if whole.all() else batch.log_time[whole])
         for name, picked in zip(self._fields, gathered.picked, strict=True):

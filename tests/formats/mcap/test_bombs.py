@@ -10,9 +10,11 @@ import sys
 import zlib
 
 import lz4.frame
+import numpy as np
 import pytest
 import zstandard
 
+from cdtool.formats.mcap.container import chunks
 from cdtool.formats.mcap.container.records import MAGIC
 from tests.formats.mcap.small_files import read_or_refused
 
@@ -129,3 +131,19 @@ def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opc
     found, findings = read_or_refused(path)
     assert found == [("/a", 0, b"{}")] * 2
     assert f"claims {length} bytes" in findings[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "taken"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
+)
+def test_lz4_gives_the_same_in_pieces_of_whatever_size(monkeypatch, given, taken):
+    rng = np.random.default_rng(0)
+    content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if taken > 1 else 9), np.uint8)
+    frames = b"".join(lz4.frame.compress(part.tobytes()) for part in (content[:10_000], content[10_000:]))
+    packed = np.frombuffer(frames, np.uint8).copy()
+    room = np.empty(len(content), np.uint8)
+    monkeypatch.setattr(chunks, "_LZ4_IN", given)
+    monkeypatch.setattr(chunks, "_LZ4_OUT", taken)
+    header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(packed))
+    chunks.Decompressor().fill(header, packed, room)
+    assert room.tobytes() == content.tobytes()

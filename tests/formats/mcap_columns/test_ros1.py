@@ -40,7 +40,8 @@ def encode(text, value):
 def _message(store, name, value):
     filled = {}
     for field, (kind, detail) in store.fielddefs[name][1]:
-        filled[field] = _value(store, kind, detail, value[field])
+        # What rosbags gives a message without members is not written in ROS 1.
+        filled[field] = _value(store, kind, detail, value.get(field, 0))
     return store.types[name](**filled)
 
 

@@ -73,3 +73,7 @@ class Decoder(Protocol):
     def names(self, batch: Batch, field: Field) -> list[str]:
         """The names that the first messages give to the elements of a field's array, sorted."""
         ...
+
+    def element_names(self, batch: Batch) -> tuple[str, ...]:
+        """The array of texts `name` of the first message, in its order; empty where there is none."""
+        ...

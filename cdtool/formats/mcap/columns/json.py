@@ -26,6 +26,7 @@ from cdtool.recording import FloatArray
 
 _MOST_PATTERNS = 64
 _NEW_PATTERNS = 8  # of one batch: more shapes than that are read one by one
+_ENDS = np.isin(np.arange(256), list(b"}\0 \t\n\r"))
 _LATEST = 9_223_372_035  # s: an int64 of ns holds no more
 
 
@@ -43,7 +44,7 @@ class JsonDecoder:
 
     def fields(self, batch: Batch) -> list[str]:
         """Every numeric field of the messages so far, in order of first appearance."""
-        groups, alone = self._groups(batch, lambda _: np.zeros(0, dtype=np.int64))
+        groups, alone, _ = self._groups(batch, lambda _: np.zeros(0, dtype=np.int64))
         shapes = [(int(group.rows[0]), group.pattern.fields()) for group in groups]
         shapes += [(row, list(numeric_fields(message))) for row, message in alone.items() if isinstance(message, dict)]
         for _, names in sorted(shapes, key=lambda shape: shape[0]):
@@ -54,16 +55,21 @@ class JsonDecoder:
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> Gathered:
         """The wanted fields of all messages."""
-        groups, alone = self._groups(batch, lambda pattern: _places(pattern, wanted, joints, stamps))
+        groups, alone, broken = self._groups(batch, lambda pattern: _places(pattern, wanted, joints, stamps))
         columns = [JsonColumn(each, joints, len(batch)) for each in wanted]
         for group in groups:
             for each, column in zip(wanted, columns, strict=True):
                 column.add(group.rows, group.pattern.resolve(each, joints), group.of)
         status, reason = np.full(len(batch), DECODED, dtype=np.uint8), ""
+        faults = {row: message for row, message in alone.items() if isinstance(message, str)}
+        if len(broken):
+            status[broken] = DAMAGED
+            faults[int(broken[0])] = str(_loaded(batch, int(broken[0])))
+        if faults:
+            status[list(faults)] = DAMAGED
+            reason = faults[min(faults)]
         for row, message in alone.items():
             if isinstance(message, str):
-                status[row] = DAMAGED
-                reason = reason or message
                 continue
             for column in columns:
                 column.add_message(row, message)
@@ -88,16 +94,24 @@ class JsonDecoder:
             found.update(map(str, names if isinstance(names, list) else ()))
         return sorted(found)
 
+    def element_names(self, batch: Batch) -> tuple[str, ...]:
+        """The array of texts `name` of the first message, in its order; empty where there is none."""
+        message = _loaded(batch, 0)
+        names = message.get("name") if isinstance(message, dict) else None
+        return tuple(map(str, names)) if isinstance(names, list) else ()
+
     def _groups(
         self, batch: Batch, places: Callable[[JsonPattern], IntArray]
-    ) -> tuple[list[_Group], dict[int, dict[str, Any] | str]]:
-        """The messages by their shapes, and those that Python has read: the object, or why it is none."""
+    ) -> tuple[list[_Group], dict[int, dict[str, Any] | str], IntArray]:
+        """The messages by their shapes, those that Python has read (the object, or why it is none), and broken ones."""
         groups: list[_Group] = []
         alone: dict[int, dict[str, Any] | str] = {}
         left = np.arange(len(batch))
         for pattern in list(self._patterns):
             left = self._fitted(batch, pattern, places(pattern), left, groups, alone)
         learnt = 0
+        ends = _may_end(batch, left)
+        left, broken = left[ends], left[~ends]
         while len(left):
             row = int(left[0])
             message = _loaded(batch, row)
@@ -116,7 +130,7 @@ class JsonDecoder:
             used = [group.pattern for group in sorted(groups, key=lambda group: -len(group.rows))]
             rest = [pattern for pattern in self._patterns if all(pattern is not other for other in used)]
             self._patterns = (used + rest)[:_MOST_PATTERNS]
-        return groups, dict(sorted(alone.items()))
+        return groups, dict(sorted(alone.items())), broken
 
     def _fitted(
         self,
@@ -168,6 +182,14 @@ def _places(pattern: JsonPattern, wanted: Sequence[Field], joints: Sequence[str]
     if stamps:
         found.update(pattern.stamp() or ())
     return np.array(sorted(found), dtype=np.int64)
+
+
+def _may_end(batch: Batch, rows: IntArray) -> npt.NDArray[np.bool_]:
+    """Which messages end as an object can: with its brace, white space, or half of one in UTF-16."""
+    length = batch.length[rows]
+    last = batch.data[np.maximum(batch.start[rows] + length - 1, 0)] if len(rows) else np.zeros(0, np.uint8)
+    ends: npt.NDArray[np.bool_] = (length > 0) & _ENDS[last]
+    return ends
 
 
 def _content(batch: Batch, row: int) -> bytes:

@@ -71,6 +71,14 @@ class TypedDecoder:
         found = self.finder.find(batch, (place,))
         return sorted({name for row in np.flatnonzero(found.status == 0)[:10] for name in found.names[place].of(row)})
 
+    def element_names(self, batch: Batch) -> tuple[str, ...]:
+        """The array of texts `name` of the first message, in its order; empty where there is none."""
+        place = _names_place(self.schema.root, ())
+        if place is None:
+            return ()
+        found = self.finder.find(batch.first(1), (place,))
+        return found.names[place].of(0) if len(found.rows) else ()
+
     def plan(self, field: Field) -> Plan | FieldMissingError:
         """The field's place, or why the schema has none."""
         if field not in self._plans:

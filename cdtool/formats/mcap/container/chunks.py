@@ -21,6 +21,11 @@ from cdtool.formats.mcap.container.walk_kernel import Bytes
 LARGEST = 128 << 20
 # Sensor data shrinks to between a half and a fiftieth; small chunks may be all zeros.
 LARGEST_SHARE, _SMALL = 250, 16 << 20
+# A long log moves now and then: it does not shrink as much. lz4 cannot reach the other share.
+_LONG, _LONG_SHARE = 1 << 30, 100
+# lz4's decompressor copies what it is given and what it gives: pieces of these sizes [bytes].
+_LZ4_IN, _LZ4_OUT = 1 << 20, 8 << 20
+_LZ4_FRAMES = 1000  # of a chunk: writers make one
 
 _FIXED = struct.Struct("<BQQQQII")  # opcode, content length, three sizes, CRC, length of the compression's name
 _KNOWN = ("", "zstd", "lz4")
@@ -77,6 +82,22 @@ def chunk_header(at: int, head: memoryview) -> ChunkHeader | None:
     return ChunkHeader(at, PREFIX + length, first, last, size, crc, compression, at + end + 8, packed)
 
 
+@dataclass
+class Claims:
+    """What the chunks of a file become together: many small bombs are one large one."""
+
+    packed: int = 0
+    unpacked: int = 0
+
+    def add(self, header: ChunkHeader) -> None:
+        """Take a chunk; raises DamageError where that would be more than any sensor's data."""
+        packed, unpacked = self.packed + header.size, self.unpacked + header.uncompressed_size
+        share = LARGEST_SHARE if unpacked <= _LONG else _LONG_SHARE
+        if unpacked > LARGEST + share * packed:
+            raise DamageError(f"chunks of {packed} bytes in all claim to become {unpacked}: not decompressed")
+        self.packed, self.unpacked = packed, unpacked
+
+
 class Decompressor:
     """Decompressors that are made once a file."""
 
@@ -131,14 +152,23 @@ def _lz4() -> Callable[[Bytes, Bytes], int]:
     def into(packed: Bytes, room: Bytes) -> int:
         filled, left = 0, packed.data
         try:
-            while len(left):  # one frame after another, as a file of them would be read
+            for _ in range(_LZ4_FRAMES):  # one frame after another, as a file of them would be read
+                if not len(left):
+                    break
                 made = lz4.frame.LZ4FrameDecompressor()
-                part = made.decompress(left, max_length=len(room) - filled + 1)
-                if len(part) > len(room) - filled:
-                    raise DamageError(f"a chunk holds more than the {len(room)} bytes it claims")
-                room[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
-                filled += len(part)
-                left = memoryview(made.unused_data or b"") if made.eof else memoryview(b"")
+                while not made.eof and (len(left) or not made.needs_input):
+                    given = left[:0]
+                    if made.needs_input:
+                        given, left = left[:_LZ4_IN], left[_LZ4_IN:]
+                    part = made.decompress(given, max_length=min(len(room) - filled + 1, _LZ4_OUT))
+                    if len(part) > len(room) - filled:
+                        raise DamageError(f"a chunk holds more than the {len(room)} bytes it claims")
+                    room[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
+                    filled += len(part)
+                    if not (len(part) or len(given) or made.needs_input):
+                        break
+                if made.eof and made.unused_data:
+                    left = packed.data[len(packed) - len(left) - len(made.unused_data) :]
         except RuntimeError as fault:
             raise DamageError(f"lz4: {fault}") from fault
         return filled

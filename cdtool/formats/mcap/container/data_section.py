@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping
 from itertools import pairwise
 
-import numpy as np
-
 from cdtool.formats.mcap.container import walk_kernel as why
 from cdtool.formats.mcap.container.attachments import check_attachment
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
-    LARGEST_SHARE,
     ChunkHeader,
+    Claims,
     Decompressor,
     check_crc,
     chunk_header,
@@ -40,10 +38,10 @@ from cdtool.formats.mcap.container.records import (
     Metadata,
     Schema,
 )
-from cdtool.formats.mcap.container.resync import next_chunk
+from cdtool.formats.mcap.container.resync import Resync
 from cdtool.formats.mcap.container.room import Piece, Room, Walked
+from cdtool.formats.mcap.container.skim import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, same_figures
-from cdtool.formats.mcap.container.walk_kernel import Bytes
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
@@ -65,7 +63,7 @@ class DataSection:
     def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, skip: Mapping[int, object]) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
-        self.extras: list[tuple[int, int, int]] = []
+        self.extras: dict[tuple[int, int, int], None] = {}
         self.end: DataEnd | None = None
         self.end_at = 0
         self.other_times = 0
@@ -74,8 +72,8 @@ class DataSection:
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
         self._window = _SMALLEST_WINDOW
-        self._scratch = np.empty(0, np.uint8)
-        self._taken = 0, 0  # bytes of chunks so far, compressed and not
+        self._claims = Claims()
+        self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
 
     def pieces(self) -> Iterator[Piece]:
@@ -135,59 +133,53 @@ class DataSection:
         return PREFIX + length
 
     def _resume(self, at: int, reason: str) -> int:
-        found = self._summary.next_chunk(at + 1)
-        if found is None:
-            found = next_chunk(self._file, at + 1)
+        begin, found = self._resync.after(at)
         behind = self._file.size if found is None else found
         self.losses.stopped = found is None
-        self.losses.add(Loss(at, behind - at, reason))
+        self.losses.add(Loss(begin, behind - begin, reason))
         return behind
 
     def _chunk(self, header: ChunkHeader) -> Iterator[Piece]:
         self._lost = None
         self.chunks[header.at] = header
         if header.at in self._skip:
+            self._resync.proven = header.at + header.length
             return
+        self._resync.proven = header.at + 1
         covered = header.uncompressed_crc != 0
         try:
             header.check()
-            self._bound(header)
+            self._claims.add(header)
             if not self.room.fits(header.uncompressed_size, covered):
                 yield from self.room.renew(header.uncompressed_size, covered)
             content = self.room.take(header.uncompressed_size)
             if header.compression:
-                self._decompressor.fill(header, self._packed(header.data, header.size), content)
+                self._decompressor.fill(header, self._file.passing(header.data, header.size), content)
             else:
                 self._file.read_into(header.data, content)
                 check_crc(header, content)
         except DamageError as fault:
-            self._lost = self.losses.add(self._loss_of(header, str(fault)))
+            self._lost = self.losses.add(Loss.of_chunk(header, self._summary, str(fault)))
             return
+        self._resync.proven = header.at + header.length
         walked = yield from self.room.walk(len(content))
         self._note(walked, header.at, len(content))
         if walked.why == why.DONE and walked.times is not None:
             self.other_times += walked.times != (header.message_start_time, header.message_end_time)
-
-    def _bound(self, header: ChunkHeader) -> None:
-        """Raise DamageError where the chunks together become more than any sensor's data: many small bombs."""
-        size, claimed = self._taken[0] + header.size, self._taken[1] + header.uncompressed_size
-        if claimed > LARGEST + LARGEST_SHARE * size:
-            raise DamageError(f"chunks of {size} bytes in all claim to become {claimed}: not decompressed")
-        self._taken = size, claimed
 
     def _behind(self, header: ChunkHeader) -> int:
         """The next place to look at: the next chunk, where a verified summary has only message indexes before it."""
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
         if self._lost is None and index is not None and self._summary.verified and same_figures(index, header):
             following = self._following.get(header.at)
-            if following == end + index.message_index_length:
+            if following == end + index.message_index_length and only_message_indexes(self._file, end, following):
                 return following
         return end
 
     def _cut_chunk(self, header: ChunkHeader) -> Iterator[Piece]:
         """A chunk that the end of the file cuts off: what lies before the cut."""
         left = self._file.size - header.data
-        loss = self._loss_of(header, f"the file ends within a chunk: {left} of {header.size} bytes")
+        loss = Loss.of_chunk(header, self._summary, f"the file ends within a chunk: {left} of {header.size} bytes")
         loss.size, loss.time = self._file.size - header.at, None
         if not header.consistent:
             raise DamageError(f"a record claims {header.length - PREFIX} bytes where {left} are left")
@@ -196,7 +188,7 @@ class DataSection:
         self.losses.add(loss)
         yield from self.room.renew(header.uncompressed_size, covered=False)
         content = self.room.take(header.uncompressed_size)
-        packed = self._packed(header.data, left)
+        packed = self._file.passing(header.data, left)
         if header.compression:
             try:
                 left = self._decompressor.fill_what_there_is(header, packed, content)
@@ -213,6 +205,7 @@ class DataSection:
             raise DamageError(f"a record claims {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
         window = self._file.array(at, max(self._window, length))
         walked = yield from self.room.take_window(window)
+        self._resync.proven = at + walked.at
         self._note(walked, at, len(window))
         self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.at > len(window) else _SMALLEST_WINDOW
         if walked.why == why.SHORT_MESSAGE:
@@ -227,6 +220,7 @@ class DataSection:
             self.losses.add(Loss(at, size - walked.at, f"in a chunk: {_REASONS[walked.why]}"))
 
     def _other(self, opcode: int, at: int, length: int, head: memoryview) -> None:
+        self._resync.check(at, length)
         if opcode == MessageIndex.opcode:
             if self._lost is not None and length >= PREFIX + 6:
                 self._lost.messages = (self._lost.messages or 0) + int.from_bytes(head[11:15], "little") // 16
@@ -244,20 +238,6 @@ class DataSection:
             except DamageError as fault:
                 self.losses.add(Loss(at, length, str(fault)))
             else:
-                self.extras.append((opcode, at, length))
-
-    def _loss_of(self, header: ChunkHeader, reason: str) -> Loss:
-        # The header may be what is damaged: the index's figures count where its CRC fits.
-        known = self._summary.chunks.get(header.at) if self._summary.verified else None
-        span = (header.message_start_time, header.message_end_time)
-        if known is not None:
-            span = (known.message_start_time, known.message_end_time)
-        usable = known is not None or span[0] <= span[1] < 1 << 63
-        return Loss(header.at, header.length, reason, 1, None, span if usable else None)
-
-    def _packed(self, at: int, size: int) -> Bytes:
-        """Compressed bytes of the file, in memory that is used again."""
-        if size > len(self._scratch):
-            self._scratch = np.empty(max(size, 1 << 20), np.uint8)
-        self._file.read_into(at, self._scratch[:size])
-        return self._scratch[:size]
+                self.extras[opcode, at, length] = None
+                if opcode == Attachment.opcode:
+                    self._resync.proven = at + length

@@ -31,9 +31,17 @@ class Definitions:
         self.ambiguous: dict[int, str] = {}
         self._ambiguous_schemas: dict[int, str] = {}
         self._streams: dict[int, Stream | DamageError] = {}
+        self._taken: dict[tuple[int, bytes, bool], bytes] = {}
+
+    def knows(self, opcode: int, body: bytes, covered: bool) -> bool:
+        """True where one more look tells nothing new: writers repeat definitions, and half a million fit into 8 kB."""
+        if opcode == Channel.opcode and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
+            return True
+        return self._taken.get((opcode, body[:2], covered)) == body
 
     def take(self, opcode: int, body: memoryview, covered: bool) -> None:
         """One definition of the data section; raises DamageError where its bytes cannot be one."""
+        self._taken[opcode, bytes(body[:2]), covered] = bytes(body)
         if opcode == Schema.opcode:
             schema = Schema.read(body)
             if schema.id == 0:  # invalid, to be ignored

@@ -21,6 +21,7 @@ class FileBytes:
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb", buffering=0)
         self.size = self._file.seek(0, 2)
+        self._scratch = np.empty(0, np.uint8)
 
     def __enter__(self) -> Self:
         return self
@@ -39,6 +40,13 @@ class FileBytes:
         room = np.empty(max(0, min(length, self.size - at)), np.uint8)
         self.read_into(at, room)
         return room
+
+    def passing(self, at: int, length: int) -> Bytes:
+        """The same in memory that the next call uses again; raises DamageError where the file ends before."""
+        if length > len(self._scratch):
+            self._scratch = np.empty(max(length, _PIECE), np.uint8)
+        self.read_into(at, self._scratch[:length])
+        return self._scratch[:length]
 
     def read_into(self, at: int, room: Bytes) -> None:
         """Fill `room` from `at` on; raises DamageError where the file ends before."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
+from cdtool.formats.mcap.container.chunks import ChunkHeader
+from cdtool.formats.mcap.container.summary import Summary
 from cdtool.recording import Finding
 
 _LISTED = 10
@@ -23,6 +25,15 @@ class Loss:
     chunks: int = 0
     messages: int | None = None
     time: tuple[int, int] | None = None
+
+    @classmethod
+    def of_chunk(cls, header: ChunkHeader, summary: Summary, reason: str) -> Loss:
+        """A whole chunk. Its header may be what is damaged: the summary's figures count where its CRC fits."""
+        known = summary.chunks.get(header.at) if summary.verified else None
+        told = known or header
+        span = (told.message_start_time, told.message_end_time)
+        usable = known is not None or span[0] <= span[1] < 1 << 63
+        return cls(header.at, header.length, reason, 1, None, span if usable else None)
 
     def described(self, origin: int) -> str:
         """What is lost, in words; times in seconds after `origin` [ns]."""

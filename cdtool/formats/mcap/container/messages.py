@@ -11,6 +11,8 @@ from cdtool.formats.mcap.container.walk_kernel import Bytes, sort_by_channel, wa
 
 # Messages in one table, and definitions: what a walk is interrupted for.
 MOST_MESSAGES, MOST_DEFINITIONS = 1 << 17, 1 << 12
+# Times from here on [ns] are of no clock: beside them others would not keep their digits.
+NO_DATE = 1 << 63
 
 _DTYPES = (np.uint16, np.int64, np.int64, np.uint64)
 
@@ -37,8 +39,9 @@ class MessageTable:
         return (int(log_time.min()), int(log_time.max())) if len(log_time) else None
 
     def first_time(self) -> int:
-        """Log time [ns] of the first message in the file's order."""
-        return int(self._columns[3][0])
+        """Log time [ns] of the first message in the file's order; of those before 2262, where there are any."""
+        times = self._columns[3][: self.count]
+        return int(times[np.argmax(np.less(times, NO_DATE))])
 
     def by_channel(self, data: Bytes) -> Iterator[tuple[int, Batch]]:
         """Channel by channel its messages, in the file's order; the table is empty afterwards."""

@@ -11,7 +11,7 @@ from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container import walk_kernel as why
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
-from cdtool.formats.mcap.container.messages import MessageTable
+from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
 # Chunks lie side by side up to this many bytes: the columns are then gathered from many messages at once. More does not
@@ -98,10 +98,14 @@ class Room:
 
     def _define(self, definitions: list[tuple[int, int, int]]) -> Iterator[str]:
         """Take definitions and note where a channel's changes; gives what is wrong with them."""
+        data = self._data.data
         for opcode, start, size in definitions:
+            body = data[start : start + size]
+            if self._definitions.knows(opcode, bytes(body), self._covered):
+                continue
             before = set(self._definitions.ambiguous)
             try:
-                self._definitions.take(opcode, self._data[start : start + size].data, self._covered)
+                self._definitions.take(opcode, body, self._covered)
             except DamageError as fault:
                 yield str(fault)
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, start))
@@ -109,7 +113,7 @@ class Room:
     def _hand_out(self) -> Iterator[Piece]:
         if not self._table.count:
             return
-        if self.first_time is None:
+        if self.first_time is None or self.first_time >= NO_DATE:
             self.first_time = self._table.first_time()
         cuts = {channel: self._cuts.get(channel, 0) for channel in self._definitions.ambiguous}
         yield Piece(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)

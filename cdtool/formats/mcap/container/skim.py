@@ -44,6 +44,16 @@ def skippable(file: FileBytes, summary: Summary, wanted: Callable[[str], bool]) 
     return {place: held[place] for place in unwanted} if dict(total) == stated else {}
 
 
+def only_message_indexes(file: FileBytes, at: int, end: int) -> bool:
+    """Nothing else stands from byte `at` to `end`: a summary could hide a chunk there."""
+    while at < end:
+        head = file.read(at, PREFIX)
+        if len(head) < PREFIX or head[0] != MessageIndex.opcode:
+            return False
+        at += PREFIX + int.from_bytes(head[1:], "little")
+    return at == end
+
+
 def _wanted(index: ChunkIndex, summary: Summary, wanted: Callable[[str], bool]) -> bool:
     """The chunk may hold a wanted topic: its index names one, or a channel that is not there, or nothing."""
     channels = [summary.channels.get(channel) for channel in index.message_index_offsets]

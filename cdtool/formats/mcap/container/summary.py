@@ -40,10 +40,6 @@ class Summary:
     chunks: dict[int, ChunkIndex] = field(default_factory=dict)
     statistics: Statistics | None = None
 
-    def next_chunk(self, at: int) -> int | None:
-        """Where the first chunk from byte `at` on begins, if that can be trusted."""
-        return min((place for place in self.chunks if place >= at), default=None) if self.verified else None
-
 
 def read_summary(file: FileBytes) -> Summary:
     """What stands behind the data; raises nothing: what is wrong is its `problem`."""

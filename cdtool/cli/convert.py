@@ -1,0 +1,47 @@
+"""`cdtool convert`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.console import plain, print_json
+from cdtool.cli.options import JsonOption
+from cdtool.errors import ExitStatus
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="The recording to read.", metavar="IN")],
+    output: Annotated[
+        Path,
+        typer.Argument(help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.", metavar="OUT"),
+    ],
+    machine: Annotated[
+        Path | None,
+        typer.Option("--machine", "-m", help="Machine file: write its channels in SI; without it all columns."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a log's channels into another container: to the bit, each on its own clock, with units and provenance.
+
+    Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
+    """
+    from cdtool.workflows.converting import convert as write
+
+    done = write(source, output, machine=machine, force=force)
+    if as_json:
+        print_json(asdict(done))
+    else:
+        clocks = f"{done.clocks} {'clock' if done.clocks == 1 else 'clocks'}"
+        typer.echo(f"{', '.join(map(plain, done.files))}: {done.columns} columns on {clocks}")
+        for path in done.machine_files:
+            typer.echo(f"{plain(path)}: the machine file that reads it")
+    for finding in done.findings:
+        if finding.severity != "note":
+            typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
+    if any(finding.severity == "loss" for finding in done.findings):
+        raise typer.Exit(ExitStatus.INCOMPLETE)

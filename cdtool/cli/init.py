@@ -1,0 +1,38 @@
+"""`cdtool init`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.console import plain, print_json
+from cdtool.cli.options import JsonOption
+from cdtool.errors import ExitStatus
+
+
+def init(
+    log: Annotated[Path, typer.Argument(help="A recording of the machine.", metavar="LOG")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Machine file to write.")] = Path("machine.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Draft a machine file from a log: channels and units guessed from names and numbers, each guess marked.
+
+    Example: cdtool init sample_logs/gate/stiff/03.csv -o machine.toml
+    """
+    from cdtool.workflows.drafting import init as draft
+
+    drafted = draft(log, output, force=force)
+    if as_json:
+        print_json(asdict(drafted))
+    else:
+        typer.echo(drafted.text)
+        typer.echo(f"{plain(drafted.path)} written: a draft of guesses. Check each line marked CHECK, then")
+        typer.echo(f"  cdtool info {plain(log)} --machine {plain(drafted.path)}")
+    for name in drafted.left_out:
+        typer.echo(f"warning: {name}: the log contradicts the guess: it stands in the file as a comment", err=True)
+    if any(finding.severity == "loss" for finding in drafted.findings):
+        raise typer.Exit(ExitStatus.INCOMPLETE)

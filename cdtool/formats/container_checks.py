@@ -1,0 +1,83 @@
+"""What the readers of other containers share: their library, sizes that a small file declares, one line an error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import CdtoolError, RecordingError
+from cdtool.formats.source import Column
+from cdtool.recording import Finding, FloatArray
+
+# Above this many bytes, and this many times its own size, a file unpacks to more than any log: it is refused.
+_FREE, _RATIO = 256 * 2**20, 200
+_LARGEST_EXACT = 2**53
+# A clock that starts later than this [s] counts from an epoch, as in channel_assembly.
+_EPOCH = 1e8
+
+
+def library(module: str, extra: str, path: Path) -> Any:
+    """An optional library; raises RecordingError that names the extra where it is absent."""
+    try:
+        return import_module(module)
+    except ImportError as fault:
+        raise RecordingError(
+            f"{path}: {module.partition('.')[0]} is not installed", f"pip install 'cdtool[{extra}]'"
+        ) from fault
+
+
+def check_size(path: Path, values: int) -> None:
+    """Refuse a file that declares far more numbers than a log of its size holds; raises RecordingError."""
+    size, declared = path.stat().st_size, 8 * values
+    if declared > _FREE and declared > _RATIO * size:
+        raise RecordingError(
+            f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
+            "name fewer columns in the machine file, or save it without compression",
+        )
+
+
+@contextmanager
+def one_line_errors(path: Path, kind: str) -> Iterator[None]:
+    """Any error of a library on a damaged file becomes one RecordingError."""
+    try:
+        yield
+    except (CdtoolError, KeyboardInterrupt):
+        raise
+    except Exception as fault:  # damaged bytes provoke all kinds of errors
+        reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
+        raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it anew") from fault
+
+
+def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:
+    """Integers, booleans and floats as float64; integers that float64 cannot hold are told."""
+    if values.dtype.kind in "iu" and values.size:
+        largest = max(abs(int(values.min())), abs(int(values.max())))
+        if largest > _LARGEST_EXACT:
+            findings.append(Finding("integers beyond 2^53 are rounded to float64", name))
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def without_epoch(columns: Sequence[Column]) -> tuple[dict[str, Column], float]:
+    """Columns whose own times count from an epoch, shifted to start at 0, and the shift [s]; 0 and as they are else."""
+    starts = [float(c.time[0]) for c in columns if c.time is not None and len(c.time) and np.isfinite(c.time[0])]
+    origin = min(starts, default=0.0)
+    if origin <= _EPOCH:
+        return {column.name: column for column in columns}, 0.0
+    moved = {
+        column.name: Column(
+            column.name, column.values, None if column.time is None else column.time - origin, column.unit
+        )
+        for column in columns
+    }
+    return moved, origin
+
+
+def left_out(name: str, kind: str) -> Finding:
+    """The note on a column that holds no numbers."""
+    return Finding(f"column '{name}' is {kind}: left out", severity="note")

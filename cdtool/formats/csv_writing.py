@@ -1,0 +1,38 @@
+"""Writing one table of a recording as CSV: every float64 in as few digits as read back to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+
+from cdtool.formats.groups import Group, Written, one_table, stored
+from cdtool.formats.own_clocks import OWN_CLOCK
+from cdtool.formats.source import Column
+
+_ROWS = 2**14
+
+
+def write_csv_table(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+    """Write a table with its provenance in lines that begin with #, and units in the header: `torque [N m]`."""
+    group = one_table(path, groups)
+    columns = list(chain(*group.flat))
+    if group.time is not None and not group.is_table:
+        columns.insert(0, Column(OWN_CLOCK, group.time, unit="s"))
+    header = [_heading(column) for column in columns]
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for key, value in stored(provenance).items():
+            file.write(f"# {key}: {' '.join(value.split())}\n")
+        file.write(",".join(map(_quoted, header)) + "\n")
+        for start in range(0, group.rows, _ROWS):
+            cells = [map(repr, column.values[start : start + _ROWS].tolist()) for column in columns]
+            file.write("".join(f"{','.join(row)}\n" for row in zip(*cells, strict=True)))
+    return [[[_heading(part) for part in parts] for parts in group.flat]]
+
+
+def _heading(column: Column) -> str:
+    return f"{column.name} [{column.unit}]" if column.unit else column.name
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if any(mark in name for mark in ',;"\n\r\t|') else name

@@ -1,0 +1,170 @@
+"""ASAM MDF, versions 3 and 4, by asammdf."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import re
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from itertools import chain
+from pathlib import Path
+from traceback import clear_frames
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cdtool.channels import ChannelMap
+from cdtool.errors import RecordingError
+from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
+from cdtool.formats.groups import Group, Written, clock_of, stored
+from cdtool.formats.own_clocks import asked_keys
+from cdtool.formats.source import Column, Source
+from cdtool.recording import Finding, FloatArray
+from cdtool.units import find_unit
+
+_MAGICS = (b"MDF     ", b"UnFinMF ")
+# A conversion by a formula is a text that a library would evaluate: only plain arithmetic is let through.
+_ARITHMETIC = re.compile(r"[0-9Xx.eE+\-*/() ]*")
+_ORIGIN = re.compile(r"^cdtool\.origin_s: (\S+)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Mdf:
+    """MDF files: a column is a channel, with its group's number before it where several groups have one of that name.
+
+    Each group's master channel is the clock of its channels. Attachments are not opened.
+    """
+
+    name: ClassVar[str] = "mdf"
+    suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf", ".mf3")
+
+    def sniff(self, path: Path) -> bool:
+        """True if the file starts as MDF does."""
+        with path.open("rb") as file:
+            return file.read(8) in _MAGICS
+
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
+        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        asammdf = library("asammdf", "mdf", path)
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says comes as an error or a finding
+        if not self.sniff(path):
+            raise RecordingError(f"{path}: is no MDF file", "see cdtool list formats")
+        findings: list[Finding] = []
+        with path.open("rb") as file:
+            unfinished = file.read(8) == _MAGICS[1]
+        with one_line_errors(path, "an MDF file"), _opened(asammdf, path) as log:
+            if unfinished:
+                findings.append(Finding("the recording was never finalised: its end may be missing", severity="loss"))
+            channels = _channels(log, findings)
+            keys = asked_keys(path, wanted, tuple(channels))
+            if not keys:
+                raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
+            check_size(path, sum(log.groups[channels[key][0]].channel_group.cycles_nr for key in keys))
+            columns = {}
+            for key in keys:
+                column = _column(log, key, *channels[key], findings)
+                if column is not None:
+                    columns[key] = column
+                elif wanted is not None:
+                    raise RecordingError(f"{path}: channel '{key}' holds no numbers", "name another one")
+            told = _ORIGIN.search(str(log.header.description)) if hasattr(log.header, "description") else None
+            details = {"version": str(log.version), "start": str(log.start_time)}
+        if not columns:
+            raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
+        return Source(
+            path, self.name, columns, float(told[1]) if told else 0.0, tuple(findings), details, tuple(channels)
+        )
+
+
+def _opened(asammdf: Any, path: Path) -> Any:
+    """The open log. What asammdf leaves half made of a damaged file complains when it is destroyed: not heard here."""
+    hook = sys.unraisablehook
+    try:
+        return asammdf.MDF(path)
+    except Exception as fault:
+        reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
+        sys.unraisablehook = lambda _: None
+        clear_frames(fault.__traceback__)
+    gc.collect()
+    sys.unraisablehook = hook
+    raise RecordingError(f"{path}: damaged or not an MDF file: {reason}", "copy or save it anew")
+
+
+def _channels(log: Any, findings: list[Finding]) -> dict[str, tuple[int, int]]:
+    """Group and place of every channel that may hold numbers, by the names of their columns; the masters are none."""
+    every = [
+        (group, place, channel)
+        for group, content in enumerate(log.groups)
+        for place, channel in enumerate(content.channels)
+        if log.masters_db.get(group) != place
+    ]
+    count = Counter(channel.name for _, _, channel in every)
+    found: dict[str, tuple[int, int]] = {}
+    for group, place, channel in every:
+        name = channel.name if count[channel.name] == 1 else f"{group}/{channel.name}"
+        while name in found:
+            name += "'"
+        formula = str(getattr(channel.conversion, "formula", "") or "")
+        if not log.groups[group].channel_group.cycles_nr:
+            findings.append(left_out(name, "empty"))
+        elif not _ARITHMETIC.fullmatch(formula):
+            findings.append(left_out(name, f"given by the formula '{formula[:40]}', which is not evaluated"))
+        else:
+            found[name] = (group, place)
+    return found
+
+
+def _column(log: Any, key: str, group: int, place: int, findings: list[Finding]) -> Column | None:
+    signal = log.get(group=group, index=place, ignore_invalidation_bits=True)
+    samples = signal.samples
+    if samples.dtype.kind not in "biuf" or samples.ndim != 1:
+        kind = "of texts" if samples.dtype.kind in "SUO" else "an array or a structure"
+        findings.append(left_out(key, kind))
+        return None
+    values = as_numbers(key, samples, findings)
+    if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
+        values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
+    expected = int(log.groups[group].channel_group.cycles_nr)
+    if len(values) < expected:
+        findings.append(Finding(f"{expected - len(values)} of {expected} values are missing", key, "loss"))
+    return Column(key, values, _clock(log, group, signal), signal.unit or None)
+
+
+def _clock(log: Any, group: int, signal: Any) -> FloatArray | None:
+    """The master's times [s]; None where it is no time (an angle, a distance)."""
+    master = log.masters_db.get(group)
+    if master is None:
+        return None
+    unit = find_unit(log.groups[group].channels[master].unit or "s")
+    if unit is None or unit.si != "s":
+        return None
+    time: FloatArray = np.asarray(signal.timestamps, dtype=np.float64)
+    return time if unit.factor == 1.0 else time * unit.factor
+
+
+def write_mdf(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+    """Write MDF 4.10: a channel a column with its unit, a group a clock; provenance as the file's comment."""
+    asammdf = library("asammdf", "mdf", path)
+    shared = Counter(part.name for group in groups for part in chain(*group.flat))
+    names: Written = []
+    with asammdf.MDF(version="4.10") as log:
+        # The log's own start, or the epoch's: the moment of writing would make other bytes of the same log.
+        start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(provenance.get("origin_s", "0")))
+        log.header.start_time = start
+        log.header.comment = "\n".join(f"{key}: {value}" for key, value in stored(provenance).items())
+        for number, group in enumerate(groups):
+            time = clock_of(path, group)
+            signals = [
+                asammdf.Signal(samples=part.values, timestamps=time, name=part.name, unit=part.unit or "")
+                for part in chain(*group.flat)
+            ]
+            log.append(signals, acq_name=group.name, comment=group.name, common_timebase=True)
+            names.append(
+                [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]
+            )
+        log.save(path, overwrite=True)
+    return names

@@ -1,0 +1,64 @@
+"""Containers whose columns bring their own times (MDF4, TDMS, HDF5): each channel then keeps its own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.formats.source import Column, Source, find_key, wanted_keys
+
+# What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
+OWN_CLOCK = "time"
+
+
+def asked_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
+    """The columns that a map asks for (all without one); the container's own clock is none of them."""
+    if wanted is None:
+        return list(names)
+    if wanted.time.column == OWN_CLOCK and OWN_CLOCK not in names:
+        wanted = replace(wanted, time=TimeSource())
+    return wanted_keys(path, wanted, names)
+
+
+def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """A source whose columns bring times, and its map, so that each channel becomes one column with a clock.
+
+    A table comes back as it is. Raises RecordingError where a channel's columns have different clocks or none, and
+    ConfigurationError where the machine file gives the clock another unit than s.
+    """
+    if channels.topics or not any(column.time is not None for column in source.columns.values()):
+        return source, channels
+    if channels.time.column != OWN_CLOCK:  # a column or a rate that the machine file names decides
+        plain = {name: replace(column, time=None) for name, column in source.columns.items()}
+        return replace(source, columns=plain), channels
+    if channels.time.factor != 1.0:
+        raise ConfigurationError(
+            f"{source.path}: its own clock is in s, [channels] time says another unit",
+            'time = { column = "time", unit = "s" }',
+        )
+    joined = {item.channel: _joined(source, item) for item in channels.sources}
+    sources = tuple(replace(item, columns=(item.channel,)) for item in channels.sources)
+    names = tuple(joined)
+    return replace(source, columns=joined, names=names), replace(channels, sources=sources, topics=True)
+
+
+def _joined(source: Source, item: ChannelSource) -> Column:
+    parts = [source.columns[find_key(source.path, item.channel, column, source.names)] for column in item.columns]
+    time = parts[0].time
+    for part in parts:
+        if part.time is None or time is None:
+            raise RecordingError(
+                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock of its own",
+                "name the column that is its clock in [channels] time",
+            )
+        if not np.array_equal(part.time, time):
+            raise RecordingError(
+                f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
+                "the joints of one channel are logged together",
+            )
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time, parts[0].unit)

@@ -1,0 +1,206 @@
+"""ROS 1 bags and ROS 2 bags in SQLite (.db3), by rosbags; their messages are decoded as those of MCAP files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cdtool.channels import ChannelMap
+from cdtool.errors import RecordingError, nearest
+from cdtool.formats.container_checks import check_size, library, one_line_errors
+from cdtool.formats.mcap.batch import Batch
+from cdtool.formats.mcap.container.definitions import Stream
+from cdtool.formats.mcap.container.records import Channel, Schema
+from cdtool.formats.mcap.fields import parse_field
+from cdtool.formats.mcap.gathering import Gathering
+from cdtool.formats.mcap.topic_survey import TopicSurvey
+from cdtool.formats.source import Column, Source
+from cdtool.recording import Finding
+
+_BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
+_FIRST_PAGE = 2**16  # the largest that SQLite has; its tables are named there
+_MESSAGES = 4096
+# A batch's payloads stand behind the header that a message has in an MCAP file: publish time last.
+_HEADER = 22
+
+
+@dataclass(frozen=True)
+class Rosbag:
+    """ROS bags: a column is a topic and a numeric field of its messages, as in an MCAP file."""
+
+    name: ClassVar[str] = "rosbag"
+    suffixes: ClassVar[tuple[str, ...]] = (".bag", ".db3")
+    topics: ClassVar[bool] = True
+
+    def sniff(self, path: Path) -> bool:
+        """True if the file starts as a ROS 1 bag, or as an SQLite database with a table of messages."""
+        with path.open("rb") as file:
+            head = file.read(_FIRST_PAGE)
+        return head.startswith(_BAG) or (head.startswith(_SQLITE) and b"messages" in head)
+
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
+        """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
+        library("rosbags", "rosbag", path)
+        if not self.sniff(path):
+            raise RecordingError(f"{path}: is no ROS bag", "see cdtool list formats")
+        bag = _Bag(path)
+        columns, findings = bag.survey() if wanted is None else bag.wanted(wanted)
+        details = {topic: f"{kind}, {count} messages" for topic, (kind, count) in bag.topics.items()}
+        return Source(path, self.name, columns, bag.origin / 1e9, tuple(findings), details, tuple(columns))
+
+    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
+        """The `name` list of a topic's first message; empty where it has none."""
+        from rosbags.highlevel import AnyReader
+
+        with one_line_errors(path, "a ROS bag"), AnyReader([path], default_typestore=_typestore()) as reader:
+            chosen = [connection for connection in reader.connections if connection.topic == topic]
+            for connection, _, raw in reader.messages(connections=chosen):
+                names = getattr(reader.deserialize(raw, connection.msgtype), "name", ())
+                return tuple(map(str, names)) if isinstance(names, list) else ()
+        return ()
+
+
+@dataclass
+class _Bag:
+    """A bag that is run through once; then `topics` (type, messages) and the `origin` [ns] hold."""
+
+    path: Path
+    origin: int = 0
+    topics: dict[str, tuple[str, int]] = field(default_factory=dict)
+    _read: dict[str, int] = field(default_factory=dict)
+    _end: str = ""
+
+    def survey(self) -> tuple[dict[str, Column], list[Finding]]:
+        """Every numeric field."""
+        topics: dict[str, TopicSurvey] = {}
+        for stream, batch in self._batches(lambda _: True):
+            name = stream.channel.topic
+            topics.setdefault(name, TopicSurvey(name, self.topics[name][1])).add(stream, batch)
+        columns, findings = {}, self._losses()
+        for item in (item for topic in topics.values() for item in topic.found(self.origin)):
+            if isinstance(item, Finding):
+                findings.append(item)
+            else:
+                columns[item.name] = item
+        return columns, findings
+
+    def wanted(self, wanted: ChannelMap) -> tuple[dict[str, Column], list[Finding]]:
+        """The fields of a map."""
+        fields: dict[str, list[str]] = {}
+        for source in wanted.sources:
+            if source.field not in fields.setdefault(source.topic, []):
+                fields[source.topic].append(source.field)
+        topics = {}
+        for name, texts in fields.items():
+            where = f"{self.path}: {name}"
+            parsed = [parse_field(text, where) for text in texts]
+            topics[name] = Gathering(where, name, parsed, wanted.time.clock, wanted.joints)
+        for stream, batch in self._batches(fields.__contains__):
+            topics[stream.channel.topic].add(stream, batch)
+        known = [name for name, (_, count) in self.topics.items() if count]
+        columns, findings = {}, self._losses()
+        for source in wanted.sources:
+            if source.topic not in known:
+                text = f"{self.path}: no message of topic '{source.topic}' (channel '{source.channel}')"
+                raise RecordingError(text, nearest(source.topic, known))
+        for name, topic in topics.items():
+            if not topic.decoders.decoded:
+                text = f"{self.path}: no message of {name} can be decoded: {topic.decoders.reason}"
+                raise RecordingError(text, "record it with its message definition")
+            findings += topic.decoders.failure(name)
+        if wanted.time.clock != "log":
+            self.origin = min(topic.first_stamp or 0 for topic in topics.values())
+        for name, texts in fields.items():
+            for i in range(len(texts)):
+                column, found = topics[name].column(i, self.origin)
+                columns[column.name] = column
+                findings += found
+        return columns, findings
+
+    def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[Stream, Batch]]:
+        """The messages of the topics that are asked for, some thousand of one topic at a time."""
+        from rosbags.highlevel import AnyReader
+
+        with one_line_errors(self.path, "a ROS bag"):
+            reader = AnyReader([self.path], default_typestore=_typestore())
+            reader.open()
+        try:
+            with one_line_errors(self.path, "a ROS bag"):
+                streams = {connection.id: _stream(connection) for connection in reader.connections}
+                for connection in reader.connections:
+                    count = self.topics.get(connection.topic, ("", 0))[1] + connection.msgcount
+                    self.topics[connection.topic] = (connection.msgtype, count)
+                self.origin = int(reader.start_time) if reader.message_count else 0
+            kept: dict[int, list[tuple[int, bytes]]] = {}
+            for connection, time, raw in self._messages(reader, [c for c in reader.connections if asked(c.topic)]):
+                rows = kept.setdefault(connection.id, [])
+                rows.append((time, raw))
+                if len(rows) == _MESSAGES:
+                    yield streams[connection.id], _batch(kept.pop(connection.id))
+            for number, rows in kept.items():
+                yield streams[number], _batch(rows)
+        finally:
+            reader.close()
+
+    def _messages(self, reader: Any, connections: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """Messages until the bag's end or its first damage, which is told; too large ones are a bomb."""
+        messages, size = iter(reader.messages(connections=connections)), 0
+        while connections:
+            try:
+                connection, time, raw = next(messages)
+            except StopIteration:
+                return
+            except Exception as fault:  # damaged bytes provoke all kinds of errors
+                self._end = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
+                return
+            size += len(raw)
+            check_size(self.path, size // 8)
+            self._read[connection.topic] = self._read.get(connection.topic, 0) + 1
+            yield connection, time, bytes(raw)
+
+    def _losses(self) -> list[Finding]:
+        why = f": {self._end}" if self._end else ""
+        found = [
+            Finding(
+                f"{self.topics[topic][1] - count} of {self.topics[topic][1]} messages cannot be read{why}",
+                topic,
+                "loss",
+            )
+            for topic, count in self._read.items()
+            if count < self.topics[topic][1]
+        ]
+        return found or ([Finding(f"the bag is damaged{why}", severity="loss")] if self._end else [])
+
+
+def _typestore() -> Any:
+    """The standard messages: bags from before ROS 2 Iron do not hold their definitions."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def _stream(connection: Any) -> Stream:
+    """A connection as MCAP would describe it."""
+    definition = connection.msgdef
+    ros1 = not hasattr(connection.ext, "serialization_format")
+    kind = {"IDL": "ros2idl"}.get(definition.format.name, "ros1msg" if ros1 else "ros2msg")
+    text = definition.data
+    if not text:
+        text, _ = _typestore().generate_msgdef(connection.msgtype, ros_version=1 if ros1 else 2)
+    encoding = "ros1" if ros1 else connection.ext.serialization_format
+    channel = Channel(connection.id % 2**16, 1, connection.topic, encoding, {})
+    return Stream(channel, Schema(1, connection.msgtype, kind, text.encode()), covered=True)
+
+
+def _batch(rows: list[tuple[int, bytes]]) -> Batch:
+    times = np.array([time for time, _ in rows], dtype=np.uint64)
+    length = np.array([len(raw) for _, raw in rows], dtype=np.int64)
+    start = np.cumsum(length + _HEADER) - length
+    parts = (
+        bytes(_HEADER - 8) + stamp.tobytes() + raw for stamp, (_, raw) in zip(times.astype("<u8"), rows, strict=True)
+    )
+    return Batch(np.frombuffer(b"".join(parts), dtype=np.uint8), start, length, times)

@@ -1,0 +1,136 @@
+"""What a log may have for channels: single columns, columns that differ by a number only, fields of topics."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.formats.source import Source, split_unit
+from cdtool.recording import FloatArray
+
+_NUMBER = re.compile(r"\d+")
+# `position[:]` with more elements than this is no list of joints.
+_MOST_JOINTS = 64
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Numbers over time that may be a channel: `values` (n, k) at `time` (n,) s, of k columns or of one field."""
+
+    name: str
+    columns: tuple[str, ...]
+    unit: str | None
+    time: FloatArray
+    values: FloatArray
+    topic: str = ""
+    field: str = ""
+
+    @property
+    def width(self) -> int:
+        """How many joints it could serve."""
+        return int(self.values.shape[1])
+
+    @property
+    def moves(self) -> bool:
+        """False where no value ever changes, or none is there."""
+        return any(np.ptp(part[np.isfinite(part)], axis=0) > 0.0 for part in self.values.T if np.isfinite(part).any())
+
+    def element(self, index: int) -> Stream:
+        """One of its columns alone."""
+        values = self.values[:, index : index + 1]
+        if self.topic:
+            field = self.field.replace("[:]", f"[{index}]")
+            return Stream(f"{self.topic} {field}", (), self.unit, self.time, values, self.topic, field)
+        column = self.columns[index]
+        return Stream(column, (column,), self.unit, self.time, values)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A stream taken for a channel, and why."""
+
+    stream: Stream
+    why: str
+
+
+@dataclass
+class Channels:
+    """The channels found so far, of a machine with `joints` joints, and the streams that are still free."""
+
+    joints: int
+    free: list[Stream]
+    found: dict[str, Found] = dataclasses.field(default_factory=dict)
+
+    def take(self, channel: str, stream: Stream, why: str) -> None:
+        """Note a guess; streams that share a column with it are taken with it."""
+        self.found[channel] = Found(stream, why)
+        used = set(stream.columns)
+        self.free = [
+            other
+            for other in self.free
+            if other is not stream
+            and not used & set(other.columns)
+            and not (stream.topic and (other.topic, other.field) == (stream.topic, stream.field))
+        ]
+
+    def of_joints(self) -> list[Stream]:
+        """Free streams with one column a joint that change."""
+        return [stream for stream in self.free if stream.width == self.joints and stream.moves]
+
+
+def streams_of(source: Source, table_time: FloatArray | None, clock: str | None, topics: bool) -> list[Stream]:
+    """Every column with its times, families of them first; the clock itself is none.
+
+    A table without a clock gets sample numbers for times: its rates are then per sample.
+    """
+    if topics:
+        return [_of_topic(name, source) for name in source.columns if source.columns[name].values.shape[0] > 1]
+    singles: dict[str, Stream] = {}
+    for name, column in source.columns.items():
+        if name == clock or column.values.ndim != 1 or len(column.values) < 2:
+            continue
+        time = column.time if column.time is not None else table_time
+        if time is None or len(time) != len(column.values):
+            time = np.arange(len(column.values), dtype=np.float64)
+        singles[name] = Stream(name, (name,), column.unit, time, column.values[:, np.newaxis])
+    return [*_families(singles), *singles.values()]
+
+
+def _of_topic(name: str, source: Source) -> Stream:
+    column = source.columns[name]
+    topic, _, field = name.partition(" ")
+    time = column.time if column.time is not None else np.arange(len(column.values), dtype=np.float64)
+    return Stream(name, (), column.unit, time, column.values.reshape(len(column.values), -1), topic, field)
+
+
+def _families(singles: Mapping[str, Stream]) -> list[Stream]:
+    """`tau_1, tau_2`, `q[0] ... q[5]`, `axis1_speed, axis2_speed`: names that differ by one number, counted up by 1."""
+    if all(name.isdigit() for name in singles):
+        return []  # a table without a header: its names are but places
+    members: dict[tuple[str, str], dict[int, Stream]] = {}
+    for name, stream in singles.items():
+        for number in _NUMBER.finditer(split_unit(name)[0]):
+            key = (name[: number.start()], name[number.end() :])
+            members.setdefault(key, {})[int(number[0])] = stream
+    found = []
+    for (before, after), parts in members.items():
+        numbers = sorted(parts)
+        alike = len({len(stream.time) for stream in parts.values()}) == 1
+        if (
+            2 <= len(numbers) <= _MOST_JOINTS
+            and numbers[0] in (0, 1)
+            and numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+            and alike
+        ):
+            found.append(joined([parts[number] for number in numbers], f"{before}#{after}"))
+    return found
+
+
+def joined(streams: list[Stream], name: str) -> Stream:
+    """Streams of one column each, on one clock, as one of many columns."""
+    values = np.hstack([stream.values for stream in streams])
+    return Stream(name, tuple(stream.columns[0] for stream in streams), streams[0].unit, streams[0].time, values)

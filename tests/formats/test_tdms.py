@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.errors import RecordingError
+from cdtool.formats.reading import survey
+from cdtool.formats.tdms import Tdms
+
+nptdms = pytest.importorskip("nptdms")
+
+
+def channel(group, name, data, **properties):
+    return nptdms.ChannelObject(group, name, data, properties=properties)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def save(*segments):
+        path = tmp_path / "log.tdms"
+        with nptdms.TdmsWriter(str(path)) as writer:
+            for objects in segments:
+                writer.write_segment(objects)
+        return path
+
+    return save
+
+
+def test_a_waveforms_increment_is_its_clock_and_its_unit_is_told(saved):
+    start = np.datetime64("2025-03-04T05:06:07.5", "us")
+    path = saved(
+        [
+            channel(
+                "m", "i", np.arange(5.0), wf_increment=0.01, wf_start_offset=0.5, wf_start_time=start, unit_string="A"
+            ),
+            channel("m", "F", np.arange(9.0), wf_increment=0.001, wf_start_time=start + np.timedelta64(250_000, "us")),
+        ]
+    )
+    source = survey(path)
+    assert source.columns["i"].unit == "A"
+    np.testing.assert_allclose(source.columns["i"].time, 0.5 + 0.01 * np.arange(5), rtol=1e-15)
+    np.testing.assert_allclose(source.columns["F"].time, 0.25 + 0.001 * np.arange(9), rtol=1e-15)
+    assert source.origin == (start - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+
+
+def test_segments_are_joined_and_names_of_two_groups_are_told_apart(saved):
+    parts = [[channel("a", "v", np.arange(3.0) + 3 * k), channel("b", "v", np.arange(2))] for k in range(3)]
+    source = survey(saved(*parts))
+    assert source.columns["a/v"].values.tolist() == list(range(9)) and len(source.columns["b/v"].values) == 6
+
+
+def test_texts_and_time_stamps_are_named_and_left_out(saved):
+    stamps = np.array(["2025-01-01", "2025-01-02"], dtype="datetime64[us]")
+    source = survey(
+        saved([channel("m", "word", ["a", "b"]), channel("m", "when", stamps), channel("m", "v", np.ones(3))])
+    )
+    assert list(source.columns) == ["v"]
+    told = " ".join(map(str, source.findings))
+    assert "'word' is no number" in told and "'when' is of time stamps" in told
+
+
+def test_of_a_file_that_is_cut_off_the_whole_part_is_read_and_the_loss_told(saved):
+    data = np.random.default_rng(1).normal(size=1000)
+    path = saved(*[[channel("m", "v", data[k : k + 100])] for k in range(0, 1000, 100)])
+    whole = path.read_bytes()
+    for cut in (len(whole) - 8, len(whole) - 400, len(whole) // 2):
+        path.write_bytes(whole[:cut])
+        source = survey(path)
+        values = source.columns["v"].values
+        assert 400 <= len(values) < 1000 and values.tobytes() == data[: len(values)].tobytes()
+        assert any(finding.severity == "loss" for finding in source.findings), cut
+
+
+def test_damaged_files_are_one_line(saved):
+    path = saved([channel("m", "v", np.random.default_rng(1).normal(size=50), unit_string="A")])
+    whole = path.read_bytes()
+    random = np.random.default_rng(3)
+    for _ in range(150):
+        wrong = bytearray(whole)
+        wrong[int(random.integers(4, len(whole)))] ^= 1 << int(random.integers(8))
+        path.write_bytes(wrong)
+        try:
+            Tdms().columns(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
