@@ -75,9 +75,8 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
     """
     pairs: list[tuple[FittedSignature, FittedSignature]] = []
     for current, first in zip(file.current, file.first, strict=True):
-        if not isinstance(file.rule, Signature) or not all(
-            isinstance(item, FittedSignature) for item in (current, first)
-        ):
+        ours = isinstance(file.rule, Signature)
+        if not ours or not isinstance(current, FittedSignature) or not isinstance(first, FittedSignature):
             raise SignatureError(
                 f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
                 "such a threshold is not updated run by run: learn it again with learn-signature",
