@@ -1,0 +1,36 @@
+"""Any seed: `python -m tests.formats.mcap_damage SEED COUNT [FIRST]` prints what fails, kind by kind."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from pathlib import Path
+
+from tests.formats.mcap_damage.generator import cases
+from tests.formats.mcap_damage.judge import faults, warm_up
+
+
+def main(seed: int, count: int, first: int = 0) -> int:
+    """Run the cases; 1 where any failed."""
+    failed: dict[str, list[str]] = defaultdict(list)
+    slowest = (0.0, "")
+    with tempfile.TemporaryDirectory() as folder:
+        warm_up(Path(folder) / "case.mcap")
+        for number, case in enumerate(cases(seed, count, first), start=first):
+            start = time.perf_counter()
+            found = faults(case, Path(folder) / "case.mcap")
+            slowest = max(slowest, (time.perf_counter() - start, f"{number} {case.name}"))
+            if found:
+                failed[case.kind].append(f"{number} {case.name}: {'; '.join(found)}")
+    for kind, texts in failed.items():
+        print(f"{kind}: {len(texts)} fail")
+        for text in texts:
+            print(f"    {text}")
+    print(f"{sum(map(len, failed.values()))} of {count} fail; the slowest took {slowest[0]:.2f} s ({slowest[1]})")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*(int(argument) for argument in sys.argv[1:])))

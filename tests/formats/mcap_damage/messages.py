@@ -1,0 +1,82 @@
+"""What the files hold: four topics of different encodings, each value different from all others."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.formats.mcap_damage import records
+from tests.formats.mcap_damage.truth import Message
+
+START = 1_000_000_000  # ns: times in seconds then are exact to the ns
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A topic's channel and schema, under the ids by which its messages name them."""
+
+    channel: int
+    schema: int
+    topic: str
+    encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema_data: bytes
+
+    @property
+    def records(self) -> bytes:
+        """Schema and channel record; a schema 0 there is not."""
+        made = records.channel(self.channel, self.schema, self.topic, self.encoding)
+        if not self.schema:
+            return made
+        return records.schema(self.schema, self.schema_name, self.schema_encoding, self.schema_data) + made
+
+
+_STAMPED = b"std_msgs/Header header\nfloat64 value\n" + b"=" * 80
+_STAMPED += b"\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + b"=" * 80
+_STAMPED += b"\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+
+DEFINITIONS = {
+    "/force": Definition(1, 1, "/force", "cdr", "std_msgs/msg/Float64", "ros2msg", b"float64 data"),
+    "/state": Definition(2, 0, "/state", "json", "", "", b""),
+    "/axis": Definition(3, 2, "/axis", "cdr", "machine_msgs/msg/Axis", "ros2msg", _STAMPED),
+    "/raw": Definition(4, 3, "/raw", "ros1", "std_msgs/Float64", "ros1msg", b"float64 data"),
+}
+TOPICS = tuple(DEFINITIONS)
+# Where /count or /other stands, it stands in the place of /force.
+CHANNELS = {**{topic: definition.channel for topic, definition in DEFINITIONS.items()}, "/count": 1, "/other": 1}
+ALL_DEFINITIONS = b"".join(definition.records for definition in DEFINITIONS.values())
+
+
+def payload(topic: str, time: int, value: float, big_endian: bool = False) -> bytes:
+    """A value as a message of the topic's encoding."""
+    order = ">" if big_endian else "<"
+    kind = b"\0\0\0\0" if big_endian else b"\0\1\0\0"
+    if topic == "/force":
+        return kind + struct.pack(order + "d", value)
+    if topic == "/state":
+        return json.dumps({"note": "up, down", "x": value}).encode()
+    if topic == "/axis":
+        # The body is aligned behind the four bytes of the encapsulation: 4 + 4 + 4 + 5 bytes, 7 of padding, 8.
+        return kind + struct.pack(order + "iII5s7xd", time // 10**9, time % 10**9, 5, b"base\0", value)
+    if topic == "/raw":
+        return struct.pack("<d", value)
+    raise KeyError(topic)
+
+
+def ordinary(rng: np.random.Generator, count: int) -> list[Message]:
+    """`count` messages 1 ms apart; every third eight are of /raw alone, so that some chunks hold nothing else."""
+    made = []
+    for i, value in enumerate(rng.normal(size=count).tolist()):
+        topic = "/raw" if i // 8 % 3 == 2 else TOPICS[i % 3]
+        time = START + i * 1_000_000
+        made.append(Message(topic, time, payload(topic, time, value), value))
+    return made
+
+
+def record_of(message: Message, sequence: int = 0) -> bytes:
+    """The message's record."""
+    return records.message(CHANNELS[message.topic], message.time, message.payload, sequence)

@@ -1,0 +1,88 @@
+"""2,000 damaged files, each held against the truth that a careful person would read; and bombs, one process each.
+
+Other seeds: `python -m tests.formats.mcap_damage SEED COUNT`.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import NonSeekingReader
+
+from tests.formats.mcap_damage import logs, messages
+from tests.formats.mcap_damage.assembly import assemble, blocks_of
+from tests.formats.mcap_damage.bomb_probe import measurable
+from tests.formats.mcap_damage.bombs import bombs
+from tests.formats.mcap_damage.generator import KINDS, cases, kind_of
+from tests.formats.mcap_damage.judge import faults, judged, warm_up
+from tests.formats.mcap_damage.truth import Message, Truth
+from tests.formats.mcap_damage.ways import Reading, value_key
+
+SEED, COUNT, STEP = 1, 2000, 100
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("first", range(0, COUNT, STEP))
+def test_of_a_damaged_file_all_is_given_that_can_be_had_and_nothing_else_and_every_loss_is_said(tmp_path, first):
+    warm_up(tmp_path / "case.mcap")
+    found = {
+        f"{number} {case.name}": wrong
+        for number, case in enumerate(cases(SEED, STEP, first), start=first)
+        if (wrong := faults(case, tmp_path / "case.mcap"))
+    }
+    assert not found
+
+
+def test_every_kind_of_damage_is_among_the_cases():
+    drawn = Counter(kind_of(SEED, number)[0] for number in range(COUNT))
+    assert set(drawn) == set(KINDS)
+
+
+def test_a_case_depends_on_its_seed_and_number_alone():
+    (alone,) = cases(3, 1, 7)
+    assert alone == list(cases(3, 8))[7]
+    assert alone != next(cases(4, 1, 7))
+
+
+@pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
+def test_undamaged_the_generators_files_read_through_the_mcap_package(compression):
+    rng = np.random.default_rng(0)
+    written = messages.ordinary(rng, 64)
+    log = logs.write(rng, logs.Style(compression))
+    for data, known in ((assemble(blocks_of(written, 8, compression)), written), (log.data, log.messages)):
+        reader = NonSeekingReader(BytesIO(data), validate_crcs=True)
+        read = reader.iter_messages(log_time_order=False)
+        given = [(channel.topic, message.log_time, message.data) for _, channel, message in read]
+        assert given == [(message.topic, message.time, message.payload) for message in known]
+
+
+def test_the_judge_sees_what_it_is_there_for():
+    one, two = Message("/force", 10**9, b"a", 1.0), Message("/force", 2 * 10**9, b"b", 2.0)
+    both = tuple((value_key(message), message.time / 1e9) for message in (one, two))
+    truth = Truth((one, two), (one,), loss=True)
+    for reading, said in (
+        (Reading(both), "a loss is not said"),
+        (Reading(both[1:]), "1 of 1 messages are not given"),
+        (Reading(both[:1]), "1 messages are missing without a word"),
+        (Reading((*both, both[0])), "1 values that the file does not hold"),
+        (Reading(((both[0][0], 1.5),)), "1 values that the file does not hold"),
+    ):
+        assert any(said in fault for fault in judged(truth, reading, value_key)), said
+    assert not list(judged(Truth((one, two), (one, two), loss=False), Reading(both), value_key))
+
+
+@pytest.mark.skipif(not measurable(), reason="memory is measured as Linux has it")
+def test_bombs_are_refused_in_5_s_of_cpu_and_300_mb_and_the_messages_beside_them_are_given(tmp_path):
+    command = [sys.executable, "-m", "tests.formats.mcap_damage.bomb_probe", str(tmp_path)]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert ran.returncode == 0, ran.stderr
+    taken = [json.loads(line) for line in ran.stdout.splitlines()]
+    assert len(taken) == 2 * len(bombs())
+    assert not [took for took in taken if took["faults"] or took["seconds"] >= 5.0 or took["bytes"] >= 300e6]

@@ -1,0 +1,1 @@
+"""Fuzz targets of the readers, and the inputs they have found."""
