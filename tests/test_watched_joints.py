@@ -63,7 +63,7 @@ def test_a_signature_watches_the_joints_that_it_was_learned_for(forearm, tmp_pat
     refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--joints", "arm")
     assert refused.status == 2 and "joints belong to a limit" in refused.err
     more = forearm / "holdout" / "01.csv"
-    added = cdtool("learn-signature", more, "-m", forearm / "machine.toml", "--update", signature, "--json")
+    added = cdtool("signature", "update", signature, more, "-m", forearm / "machine.toml", "--json")
     assert added.status == 0 and len(json.loads(added.out)["added"]) == 1
 
 

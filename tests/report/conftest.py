@@ -42,7 +42,7 @@ class Bench:
     def detected(self, recording: Recording, name: str) -> Detected:
         detection, contacts = self.detect(recording, name), tuple(find_contacts(recording, RULE))
         matching = match(detection.verdict, contacts, detection.statistic)
-        return Detected(recording, (detection,), contacts, (matching,))
+        return Detected(recording, (detection,), contacts, (matching,), "limit 1 N set by hand")
 
     def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
         detections = tuple(self.detect(recording, name) for name in names)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -120,10 +120,10 @@ def test_a_higher_level_gives_a_longer_interval():
 def test_five_thousand_contacts_take_little_time_and_memory():
     values = np.random.default_rng(1).lognormal(3.4, 0.5, 5000)
     bca(values[:3], range(3), "mean", resamples=1)
-    begin = perf_counter()
+    begin = process_time()
     bca(values, range(5000), "mean")
-    # Some 0.5 s where nothing else runs.
-    assert perf_counter() - begin < 5.0
+    # Some 0.5 s of a processor, whatever else runs.
+    assert process_time() - begin < 5.0
     tracemalloc.start()
     bca(values, range(5000), "median", resamples=999)
     assert tracemalloc.get_traced_memory()[1] < 200e6

@@ -53,6 +53,7 @@ def six_joints() -> Detected:
         (Detection(operation, "pure_torque", statistic, band, Verdict("alarm", alarms)),),
         (),
         (Matching((), alarms),),
+        "limit 40 N m set by hand",
     )
 
 
