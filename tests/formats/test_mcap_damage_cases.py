@@ -40,6 +40,13 @@ def test_of_a_damaged_file_all_is_given_that_can_be_had_and_nothing_else_and_eve
     assert not found
 
 
+@pytest.mark.parametrize("number", [1126, 1133], ids=["a data end before the data's end", "an index beyond any file"])
+def test_cases_of_another_seed_that_once_went_wrong(tmp_path, number):
+    warm_up(tmp_path / "case.mcap")
+    (case,) = cases(22, 1, number)
+    assert not faults(case, tmp_path / "case.mcap")
+
+
 def test_every_kind_of_damage_is_among_the_cases():
     drawn = Counter(kind_of(SEED, number)[0] for number in range(COUNT))
     assert set(drawn) == set(KINDS)

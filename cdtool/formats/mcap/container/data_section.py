@@ -167,6 +167,9 @@ class DataSection:
         if walked.why == why.DONE and walked.times is not None:
             self.other_times += walked.times != (header.message_start_time, header.message_end_time)
 
+    def _is_chunk(self, start: int) -> bool:
+        return start < self._file.size and self._file.read(start, 1)[0] == Chunk.opcode
+
     def _behind(self, header: ChunkHeader) -> int:
         """The next place to look at: the next chunk, where a verified summary has only message indexes before it."""
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
@@ -228,6 +231,8 @@ class DataSection:
         self._lost = None
         body = at + PREFIX
         if opcode == DataEnd.opcode:
+            if self._summary.verified and any(self._is_chunk(start) for start in self._summary.chunks if start > at):
+                raise DamageError("the data end before chunks that the summary names")
             self.end = DataEnd.read(self._file.read(body, min(length - PREFIX, 64)))
         elif opcode in (Attachment.opcode, Metadata.opcode):
             try:
