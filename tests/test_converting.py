@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.errors import UsageError
+from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.reading import survey
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.converting import _WRITERS, convert
+from cdtool.workflows.written_file import written_file
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
 
 LIBRARIES = {
@@ -239,3 +240,11 @@ PROVENANCE = {
     ".mf4": of_mdf,
     ".tdms": of_tdms,
 }
+
+
+def test_an_error_names_the_file_that_was_asked_for_and_not_the_temporary_one(tmp_path):
+    target = tmp_path / "out.parquet"
+    with pytest.raises(RecordingError, match=r"out\.parquet: no pyarrow") as told, written_file(target) as part:
+        raise RecordingError(f"{part}: no pyarrow", "pip install 'cdtool[parquet]'")
+    assert part.name not in str(told.value) and "pip install" in told.value.hint
+    assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdtool.errors import UsageError
+from cdtool.errors import CdtoolError, UsageError
 
 
 @contextmanager
@@ -31,5 +31,8 @@ def written_file(target: Path) -> Iterator[Path]:
         yield part
         part.chmod(0o644)
         part.replace(target)
+    except CdtoolError as fault:
+        # Nobody knows the temporary file by its name.
+        raise type(fault)(fault.message.replace(str(part), str(target)), fault.hint) from fault
     finally:
         part.unlink(missing_ok=True)
