@@ -62,7 +62,7 @@ def plot_impact(motion: Motion, path: Path) -> None:
         panels[0, 0].set_title("the whole event", loc="left", fontweight="bold")
         panels[0, 1].set_title("its first contact", loc="left", fontweight="bold")
         panels[0, 1].annotate(
-            f"{first.peak_force:.1f} N, {1e3 * first.max_penetration:.4f} mm\n{1e3 * first.duration:.3f} ms\n"
+            f"{first.peak_force:.1f} N\n{1e3 * first.max_penetration:.4f} mm, {1e3 * first.duration:.3f} ms\n"
             f"energy lost: {100.0 * first.energy_loss:.1f} %",
             (0.5, 0.1),
             xycoords="axes fraction",
