@@ -6,7 +6,6 @@ skipped and named (comment, blank line, the header again, NUL bytes, the half-wr
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.formats.cores import usable_cores
 from cdtool.formats.csv.cells import NARROW_BLANKS
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.marks import thousands_byte
@@ -111,7 +111,7 @@ class RowReader:
     def _blocks(self, rows: Rows) -> Iterator[tuple[_Read, int]]:
         """Blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
         place = 0
-        workers = min(_THREADS, _processors())
+        workers = min(_THREADS, usable_cores())
         pending: deque[tuple[Future[_Read], int]] = deque()
         blocks = self._counted()
         first = next(blocks, None)
@@ -201,9 +201,3 @@ def _close_up(rows: Rows, runs: Sequence[tuple[int, int]], dropped: Sequence[int
             to += stop - start
             start = stop + 1 if stop < end else end
     return to
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

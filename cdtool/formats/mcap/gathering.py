@@ -207,7 +207,7 @@ def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:
 def in_order(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
     """Times [s] after `origin` [ns] in ascending order, and the order; None where they are in order as they stand."""
     # The difference is taken between integers: an epoch in ns has more digits than a float64. It may need all 64 bits.
-    later = (stamps.view(np.uint64) - np.uint64(origin % 2**64)).astype(np.uint64)
+    later: npt.NDArray[np.uint64] = stamps.view(np.uint64) - np.uint64(origin % 2**64)
     time = later / 1e9
     if len(stamps) and (before := stamps < origin).any():
         time[before] = -((~later[before] + np.uint64(1)) / 1e9)

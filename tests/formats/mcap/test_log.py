@@ -7,8 +7,8 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
+from cdtool.formats.mcap.container import chunks_ahead
 from cdtool.formats.mcap.container import messages as table
-from cdtool.formats.mcap.container import room
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.log import Log
@@ -22,7 +22,7 @@ def test_however_small_the_pieces_are_the_messages_are_the_same(tmp_path, monkey
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     monkeypatch.setattr(table, "MOST_MESSAGES", most)
-    monkeypatch.setattr(room, "_JOINED", joined)
+    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
     found, findings, _ = read(path)
     assert found == sent
     assert not findings

@@ -8,7 +8,7 @@ import zlib
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from cdtool.formats.mcap.container import data_section
+from cdtool.formats.mcap.container import chunks
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import read, small_file
 
@@ -44,7 +44,7 @@ def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
     path = tmp_path / "log.mcap"
     by_turns(path)
     checked = []
-    monkeypatch.setattr(data_section, "check_crc", lambda header, _: checked.append(header.at))
+    monkeypatch.setattr(chunks, "check_crc", lambda header, _: checked.append(header.at))
     for topic in ("/a", "/b"):
         checked.clear()
         found, findings, log = read(path, wanted=topic.__eq__)

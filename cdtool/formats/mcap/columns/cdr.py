@@ -46,13 +46,11 @@ class WalkFinder:
     def find(self, batch: Batch, places: tuple[Place, ...]) -> Found:
         """The places of all messages; raises UndecodableError for a schema that is too large."""
         pattern = self._patterns.get(places)
-        if pattern is not None and pattern.fits(batch):
-            return pattern.found(batch)
-        pattern = pattern_of(self._program(places), batch, self.header) if len(batch) else None
-        self._patterns[places] = pattern
-        if pattern is not None and pattern.fits(batch):
-            return pattern.found(batch)
-        return self.checked(batch, places)
+        if pattern is None or (found := pattern.found(batch)) is None:
+            pattern = pattern_of(self._program(places), batch, self.header) if len(batch) else None
+            self._patterns[places] = pattern
+            found = pattern.found(batch) if pattern is not None else None
+        return self.checked(batch, places) if found is None else found
 
     def checked(self, batch: Batch, places: tuple[Place, ...]) -> Found:
         """The same, found message by message."""

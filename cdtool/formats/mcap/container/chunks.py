@@ -14,6 +14,7 @@ import numpy as np
 
 from cdtool.formats.mcap.container.checksums import crc32
 from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
@@ -103,6 +104,14 @@ class Decompressor:
 
     def __init__(self) -> None:
         self._into: dict[str, Callable[[Bytes, Bytes], int]] = {}
+
+    def read(self, file: FileBytes, header: ChunkHeader, room: Bytes) -> None:
+        """Read a whole chunk from the file into `room` (uncompressed_size,) and check it; raises DamageError."""
+        if header.compression:
+            self.fill(header, file.passing(header.data, header.size), room)
+        else:
+            file.read_into(header.data, room)
+            check_crc(header, room)
 
     def fill(self, header: ChunkHeader, packed: Bytes, room: Bytes) -> None:
         """Decompress a whole chunk into `room` (uncompressed_size,) and check it; raises DamageError."""

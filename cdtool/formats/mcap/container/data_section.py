@@ -18,9 +18,9 @@ from cdtool.formats.mcap.container.chunks import (
     ChunkHeader,
     Claims,
     Decompressor,
-    check_crc,
     chunk_header,
 )
+from cdtool.formats.mcap.container.chunks_ahead import ChunksAhead
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
@@ -71,6 +71,7 @@ class DataSection:
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
+        self._ahead = ChunksAhead(file.path, summary, skip)
         self._window = _SMALLEST_WINDOW
         self._claims = Claims()
         self._resync = Resync(file, summary)
@@ -78,8 +79,9 @@ class DataSection:
 
     def pieces(self) -> Iterator[Piece]:
         """All messages that can be had."""
-        yield from self._records()
-        yield from self.room.flush()
+        with self._ahead:
+            yield from self._records()
+            yield from self.room.flush()
 
     def _records(self) -> Iterator[Piece]:
         at = len(MAGIC)
@@ -150,14 +152,11 @@ class DataSection:
         try:
             header.check()
             self._claims.add(header)
-            if not self.room.fits(header.uncompressed_size, covered):
-                yield from self.room.renew(header.uncompressed_size, covered)
+            if self._ahead.begins(header.at) or not self.room.fits(header.uncompressed_size, covered):
+                yield from self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered)
             content = self.room.take(header.uncompressed_size)
-            if header.compression:
-                self._decompressor.fill(header, self._file.passing(header.data, header.size), content)
-            else:
-                self._file.read_into(header.data, content)
-                check_crc(header, content)
+            if not self._ahead.holds(header, content):
+                self._decompressor.read(self._file, header, content)
         except DamageError as fault:
             self._lost = self.losses.add(Loss.of_chunk(header, self._summary, str(fault)))
             return
@@ -189,7 +188,7 @@ class DataSection:
         header.check()
         self.losses.stopped = True
         self.losses.add(loss)
-        yield from self.room.renew(header.uncompressed_size, covered=False)
+        yield from self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
         content = self.room.take(header.uncompressed_size)
         packed = self._file.passing(header.data, left)
         if header.compression:

@@ -19,6 +19,7 @@ class FileBytes:
     """`size` bytes, read where they are asked for."""
 
     def __init__(self, path: Path) -> None:
+        self.path = path
         self._file = path.open("rb", buffering=0)
         self.size = self._file.seek(0, 2)
         self._scratch = np.empty(0, np.uint8)
@@ -29,6 +30,10 @@ class FileBytes:
     def __exit__(
         self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Read no more."""
         self._file.close()
 
     def read(self, at: int, length: int) -> memoryview:

@@ -14,10 +14,6 @@ from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
-# Chunks lie side by side up to this many bytes: the columns are then gathered from many messages at once. More does not
-# stay in the processor's cache from decompressing to gathering; 1 MiB and 16 MiB both take a fifth longer.
-_JOINED = 4 << 20
-
 
 @dataclass(frozen=True)
 class Piece:
@@ -62,10 +58,10 @@ class Room:
         """Memory for the next chunk; it counts once `walk` is told of it."""
         return self._data[self._used : self._used + size]
 
-    def renew(self, size: int, covered: bool) -> Iterator[Piece]:
-        """Hand out what is there, and begin anew with memory for `size` bytes."""
+    def renew(self, memory: Bytes, covered: bool) -> Iterator[Piece]:
+        """Hand out what is there, and begin anew with `memory`."""
         yield from self.flush()
-        self._data, self._covered = np.empty(max(size, _JOINED), np.uint8), covered
+        self._data, self._covered = memory, covered
 
     def walk(self, size: int, top_level: bool = False) -> Generator[Piece, None, Walked]:
         """Take the records of the next `size` bytes; gives a Walked. Hands out pieces where the table is full."""

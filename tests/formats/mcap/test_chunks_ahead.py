@@ -1,0 +1,127 @@
+"""Chunks decompressed ahead, side by side: the same messages, losses and findings as one after the other."""
+
+from __future__ import annotations
+
+import gc
+
+import numpy as np
+import pytest
+
+from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container.buffers import Buffers
+from cdtool.formats.mcap.container.chunks import Decompressor
+from cdtool.formats.mcap.container.log import Log
+from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
+
+ONE_CORE, MANY = 1, 4
+
+
+@pytest.fixture
+def cores(monkeypatch):
+    """Sets how many cores there seem to be."""
+
+    def to(count):
+        monkeypatch.setattr(chunks_ahead, "usable_cores", lambda: count)
+
+    return to
+
+
+@pytest.fixture
+def read_in_turn(monkeypatch):
+    """Places of the chunks that were read when their turn came, and of those read ahead."""
+    places = {True: [], False: []}
+    reading, filling = Decompressor.read, chunks_ahead.ChunksAhead._fill
+    threads = []
+
+    def fill(self, index, content):
+        threads.append(index.chunk_start_offset)
+        return filling(self, index, content)
+
+    def read_chunk(self, file, header, room):
+        places[header.at in threads].append(header.at)
+        return reading(self, file, header, room)
+
+    monkeypatch.setattr(chunks_ahead.ChunksAhead, "_fill", fill)
+    monkeypatch.setattr(Decompressor, "read", read_chunk)
+    return places
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("joined", [1, 2000, 10**6])
+def test_every_chunk_is_read_once_and_ahead(tmp_path, monkeypatch, cores, read_in_turn, compression, joined):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path, compression)
+    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    cores(MANY)
+    found, findings, log = read(path)
+    assert found == sent
+    assert not findings
+    assert sorted(read_in_turn[True]) == sorted(log.summary.chunks)
+    assert not read_in_turn[False]
+
+
+def test_on_one_core_and_without_a_checked_summary_nothing_is_read_ahead(tmp_path, cores, read_in_turn):
+    path = tmp_path / "log.mcap"
+    sent = small_file(path)
+    cores(ONE_CORE)
+    assert read(path)[0] == sent
+    whole = bytearray(path.read_bytes())
+    whole[-12:-8] = bytes(4)  # the summary's CRC: 0, there is none
+    path.write_bytes(whole)
+    cores(MANY)
+    assert read(path)[0] == sent
+    assert not read_in_turn[True]
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("damage", ["content", "crc", "no crc", "size", "opcode", "time"])
+@pytest.mark.parametrize("joined", [1, 2000, 10**6])
+def test_a_damaged_chunk_is_lost_as_it_is_without(tmp_path, monkeypatch, cores, compression, damage, joined):
+    path = tmp_path / "log.mcap"
+    small_file(path, compression)
+    places = sorted(Log(path).summary.chunks)
+    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    whole = path.read_bytes()
+    # Where it stands in the record: opcode 1 and length 8 bytes, two times, size, CRC.
+    offset, count = {"content": (70, 1), "crc": (33, 1), "no crc": (33, 4), "size": (25, 1), "opcode": (0, 1)}.get(
+        damage, (9, 1)
+    )
+    for place in (places[0], places[len(places) // 2], places[-1]):
+        changed = bytearray(whole)
+        at = place + offset
+        changed[at : at + count] = bytes(count) if damage == "no crc" else bytes([changed[at] ^ 0x41])
+        path.write_bytes(changed)
+        cores(ONE_CORE)
+        found, findings, log = read(path)
+        cores(MANY)
+        again = read(path)
+        assert again[0] == found
+        assert again[1] == findings
+        assert again[2].unverified == log.unverified
+        assert findings
+
+
+def test_memory_is_used_again_only_when_nothing_refers_to_it():
+    buffers = Buffers(1 << 22)
+    first = buffers.take(100)
+    assert len(first) == 1 << 22 and first.ctypes.data % (2 << 20) == 0
+    first[:] = 1
+    address, part = first.ctypes.data, first[5:10]
+    del first
+    other = buffers.take(100)
+    assert other.ctypes.data != address
+    other[:] = 2
+    assert part.tolist() == [1] * 5
+    view = part.data
+    del part
+    gc.collect()
+    assert buffers.take(100).ctypes.data != address  # a memoryview refers to it, too
+    del view
+    gc.collect()
+    kept = [buffers.take(100) for _ in range(3)]
+    assert address in {each.ctypes.data for each in kept}
+
+
+def test_more_than_a_buffer_holds_is_given_as_it_is_asked_for():
+    large = Buffers(1 << 22).take(5 << 20)
+    assert large.shape == (5 << 20,) and large.dtype == np.uint8
