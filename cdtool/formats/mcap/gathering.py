@@ -83,6 +83,11 @@ class _Field:
         self.names: list[str] = []
 
     def add(self, picked: Picked, whole: npt.NDArray[np.bool_], all_whole: bool) -> None:
+        if picked.alike and all_whole and self.elsewhere is None:
+            if picked.count is not None:
+                self._count(Counter({picked.values.shape[1]: len(picked.values)}))
+            self.rows.append(picked.values)
+            return
         values, count, state = picked.values, picked.count, picked.state
         if not all_whole:
             values, count, state = values[whole], None if count is None else count[whole], state[whole]
@@ -94,11 +99,13 @@ class _Field:
             self.elsewhere.append(other)
             count = None if count is None else count[~other]
         if count is not None:
-            found = tally(count)
-            if not self.widths.keys() - {0} and (widths := found.keys() - {0}):
-                self.rows.widen(next(width for width in found if width in widths))
-            self.widths.update(found)
+            self._count(tally(count))
         self.rows.append(values)
+
+    def _count(self, found: Counter[int]) -> None:
+        if not self.widths.keys() - {0} and (widths := found.keys() - {0}):
+            self.rows.widen(next(width for width in found if width in widths))
+        self.widths.update(found)
 
 
 class Gathering:

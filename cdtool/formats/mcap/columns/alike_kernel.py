@@ -8,10 +8,14 @@ import numpy.typing as npt
 from cdtool.formats.mcap.columns.gathered import ByteArray, IntArray
 from cdtool.formats.mcap.columns.walk_kernel import PLACES
 from cdtool.kernels import kernel
+from cdtool.prefetch import prefetch
 
 WordArray = npt.NDArray[np.uint64]
 
 WORD = 8  # bytes
+_LINE = 64  # bytes of the cache's lines
+_AHEAD = 8  # messages
+_MOST_AHEAD = 1024  # bytes of a message
 
 
 @kernel(
@@ -36,9 +40,13 @@ def take_alike(
     `words[p]` are the 8 bytes from byte p on. Alike: at least `shortest` bytes, and at `compared` (m,) the bits of
     `mask` as in `pattern`. All these places begin at least 8 bytes before `shortest`.
     """
+    span = min(shortest, _MOST_AHEAD)
     for i in range(start.size):
         if length[i] < shortest:
             return False
+        if i + _AHEAD < start.size:
+            for place in range(start[i + _AHEAD], start[i + _AHEAD] + span, _LINE):
+                prefetch(words, place)
         begin = np.uint64(start[i])
         differing = np.uint64(0)
         for k in range(compared.size):

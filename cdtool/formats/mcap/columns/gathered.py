@@ -33,13 +33,14 @@ class Picked:
     `values` (n,) or, for a whole array, (n, k): NaN where there is none; k is the width of the first row that is not
     empty, and rows of another width are NaN. `count` (n,) are the widths of a whole array's rows (0: empty, -1: not
     there), None for a field that is one number. `state` (n,): THERE, OTHER_JOINTS or ABSENT; `fault` says why the first
-    ABSENT one is.
+    ABSENT one is. `alike`: all are THERE, and no row has another width.
     """
 
     values: FloatArray
     count: IntArray | None
     state: ByteArray
     fault: FieldMissingError | None = None
+    alike: bool = False
 
 
 @dataclass(frozen=True)

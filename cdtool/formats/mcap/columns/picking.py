@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS, IntArray, Picked
+from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS, THERE, IntArray, Picked
 from cdtool.formats.mcap.columns.slots import Found, Place
 from cdtool.formats.mcap.fields import Field, FieldMissingError, order_of
 from cdtool.recording import FloatArray
 
 WHOLE = ":"
+_THERE = np.uint8(THERE)
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,10 @@ def _picked_at_once(plan: Plan, found: Found, joints: Sequence[str]) -> Picked |
     elements, index = slot.uniform, plan.index
     if not found.whole or not elements or plan.arrays:
         return None
-    state = np.zeros(len(found.status), dtype=np.uint8)
+    n = len(found.status)
+    state = np.broadcast_to(_THERE, n)
     if index is None or (index.isdigit() and int(index) < elements):
-        return Picked(slot.numbers(None, int(index or 0), 1)[:, 0], None, state)
+        return Picked(slot.numbers(None, int(index or 0), 1)[:, 0], None, state, alike=True)
     if index != WHOLE:
         return None
     order = None
@@ -73,7 +75,7 @@ def _picked_at_once(plan: Plan, found: Found, joints: Sequence[str]) -> Picked |
     values = slot.numbers(None, 0, elements)
     if order is not None and order != list(range(elements)):
         values = values[:, order]
-    return Picked(values, np.full(len(values), values.shape[1]), state)
+    return Picked(values, np.broadcast_to(np.int64(values.shape[1]), n), state, alike=True)
 
 
 class _Picking:

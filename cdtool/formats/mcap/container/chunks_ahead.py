@@ -25,12 +25,14 @@ from cdtool.formats.mcap.container.records import ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
-# Chunks lie side by side up to this many bytes. More does not stay in the processor's cache from decompressing to
-# gathering; with less, what there is to do for each piece of memory counts.
-JOINED = 4 << 20
+# Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
+# through the processor's cache, with less, what there is to do for each piece of memory counts.
+JOINED = 10 << 20
 _LARGEST = 16 << 20  # chunks beyond this size are read one by one
-_GROUPS_AHEAD = 2
+_GROUPS_AHEAD = 1
 _MOST_THREADS = 4
+# Memory that was never used before costs as much as decompressing into it does: it is kept from log to log.
+_BUFFERS = Buffers(JOINED)
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,6 @@ class ChunksAhead:
 
     def __init__(self, path: Path, summary: Summary, skip: Container[int]) -> None:
         self._path = path
-        self._buffers = Buffers(JOINED)
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
@@ -75,7 +76,7 @@ class ChunksAhead:
         """Memory of `size` bytes at least for the chunk at byte `at`; where it begins a group, the group's."""
         self._there = {}
         if at not in self._groups:
-            return self._buffers.take(size)
+            return _BUFFERS.take(size)
         for passed in [place for place in self._started if place < at]:
             del self._started[passed]
         following: int | None = at
@@ -86,7 +87,7 @@ class ChunksAhead:
         group = self._started.pop(at)
         chunks = [chunk.result() for chunk in group.chunks]
         if not all(chunks) or len(group.memory) < size:
-            return self._buffers.take(size)
+            return _BUFFERS.take(size)
         self._there = {header: place for chunk in chunks if chunk is not None for header, place in [chunk]}
         return group.memory
 
@@ -96,7 +97,7 @@ class ChunksAhead:
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
-        memory = self._buffers.take(sum(index.uncompressed_size for index in chunks))
+        memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
         begun, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size

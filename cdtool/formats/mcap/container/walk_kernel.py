@@ -8,9 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.kernels import kernel
+from cdtool.prefetch import prefetch
 
 # Why a walk ended.
 DONE, FULL, OTHER_KIND, NO_KIND, TOO_LONG, SHORT_MESSAGE = range(6)
+
+_AHEAD = 1024  # bytes: some records
 
 Bytes = npt.NDArray[np.uint8]
 _Array = npt.NDArray[Any]
@@ -60,6 +63,7 @@ def walk(
             why = TOO_LONG
             break
         body = at + 9
+        prefetch(data, at + _AHEAD)
         if opcode == 5:
             if size < np.uint64(22):
                 why = SHORT_MESSAGE
