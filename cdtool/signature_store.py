@@ -1,4 +1,4 @@
-"""The signature file: versioned JSON, checked against machine and detector, atomic, updated under a lock."""
+"""The signature file on disk: versioned JSON, written atomically, updated under a lock."""
 
 from __future__ import annotations
 
@@ -7,128 +7,30 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from cdtool.activation import Activation
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
-from cdtool.machine_file import fingerprint
 from cdtool.operations import HOW_TO_CUT
-from cdtool.plain_text import counted, digits
+from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
 SCHEMA_VERSION = 3
 _KIND = "cdtool signature"
+# Every signature file begins with it: `_to_json` names its kind first.
+MARK = f'"kind": "{_KIND}"'.encode()
 _LOCK_SECONDS = 60.0
 
 
-@dataclass(frozen=True)
-class LearnedRun:
-    """A run that a signature was learned from: its name, the SHA-256 of its file, and which operation of it."""
-
-    name: str
-    sha256: str
-    operation: int = 0
-
-
-@dataclass(frozen=True)
-class FactorOrigin:
-    """Where a safety factor comes from: the rule's default, a hand, or a false-alarm budget.
-
-    With a budget: its text, the impact-free operations that the factor was set on, and the alarms it gives on them.
-    `added`: runs that a signature was updated with since.
-    """
-
-    by: Literal["default", "hand", "budget"] = "default"
-    budget: str | None = None
-    operations: int = 0
-    alarms: int = 0
-    added: int = 0
-
-    def __str__(self) -> str:
-        if self.by != "budget":
-            return "by default" if self.by == "default" else "set by hand"
-        set_on = f"set for {self.budget} on {counted(self.operations, 'operation')}, {counted(self.alarms, 'alarm')}"
-        return f"{set_on}, before {counted(self.added, 'run')} more" if self.added else set_on
-
-
-@dataclass(frozen=True)
-class SignatureFile:
-    """The thresholds of one machine and one detector with its gains: of a signature, one for each class of motion.
-
-    `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
-    first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
-    `operations`: how the logs were cut.
-    """
-
-    machine: str
-    machine_fingerprint: str
-    detector: str
-    gains: Mapping[str, Gain]
-    unit: str
-    joints: tuple[str, ...]
-    rule: Any
-    origin: FactorOrigin
-    activation: Activation
-    current: tuple[FittedThreshold, ...]
-    first: tuple[FittedThreshold, ...]
-    runs: tuple[LearnedRun, ...]
-    operations: str = "whole"
-    source: str = ""
-
-    @property
-    def threshold(self) -> str:
-        """The threshold's name."""
-        return str(self.rule.name)
-
-    @property
-    def learns_limits(self) -> bool:
-        """Whether the runs decide the limits, and no hand."""
-        return not getattr(self.rule, "limits", ())
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """The rule's settings that differ from its defaults, its safety factor apart."""
-        plain = asdict(type(self.rule)())
-        return {
-            name: value
-            for name, value in asdict(self.rule).items()
-            if value != plain[name] and name not in ("safety_factor", "signature")
-        }
-
-    @property
-    def described(self) -> str:
-        """The threshold with its safety factor or limits, and where those come from."""
-        if by_hand := getattr(self.rule, "limits", ()):
-            return f"{self.threshold} {', '.join(map(digits, by_hand))} {self.unit} {self.origin}"
-        return f"{self.threshold}, safety factor {self.current[0].safety_factor:.4g} {self.origin}"
-
-    def check(self, machine: Any, detector: Any) -> None:
-        """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
-        where = self.source or "signature"
-        if detector.name != self.detector:
-            raise SignatureError(f"{where}: learned with {self.detector}, not {detector.name}", "learn one for it")
-        if fingerprint(machine) != self.machine_fingerprint:
-            raise SignatureError(
-                f"{where}: learned on another machine ('{self.machine}', other parameters than '{machine.name}')",
-                "learn a signature with this machine file",
-            )
-        gains = asdict(detector)
-        for name, value in gains.items():
-            if self.gains.get(name) != value:
-                raise SignatureError(
-                    f"{where}: learned with {name} = {self.gains.get(name)}, the machine file has {value}",
-                    "learn again, or restore the gain in [detectors]",
-                )
-
-
 def write_signature(path: str | Path, signature: SignatureFile) -> None:
-    """Write atomically: a temporary file, fsync, rename, fsync of the folder. Raises SignatureError."""
+    """Write a file in .json atomically: a temporary file, fsync, rename, fsync of the folder. Raises SignatureError."""
     file = Path(path)
+    check_name(file)
     text = json.dumps(_to_json(signature), allow_nan=False)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{file.name}.", suffix=".tmp", dir=file.parent)
@@ -147,6 +49,12 @@ def write_signature(path: str | Path, signature: SignatureFile) -> None:
         raise SignatureError(
             f"{file}: cannot be written: {fault.strerror or fault}", "check folder and space"
         ) from fault
+
+
+def check_name(file: Path) -> None:
+    """Raise SignatureError where a file's name is none of a signature's: that of a recording would be lost."""
+    if file.suffix.lower() != ".json":
+        raise SignatureError(f"{file}: is no name of a signature file", "let it end in .json")
 
 
 def read_signature(path: str | Path) -> SignatureFile:
@@ -189,14 +97,6 @@ def update_signature(path: str | Path, change: Callable[[SignatureFile], Signatu
             return changed
     except Timeout as fault:
         raise SignatureError(f"{file}: locked by another process", f"remove {file}.lock if none runs") from fault
-
-
-def with_run(signature: SignatureFile, index: int, updated: FittedThreshold, run: LearnedRun) -> SignatureFile:
-    """The file with the class at `index` replaced and the run noted; the first signature stays."""
-    current = list(signature.current)
-    current[index] = updated
-    origin = replace(signature.origin, added=signature.origin.added + 1)
-    return replace(signature, current=tuple(current), runs=(*signature.runs, run), origin=origin)
 
 
 def _to_json(signature: SignatureFile) -> dict[str, Any]:

@@ -14,14 +14,8 @@ from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint
-from cdtool.signature_store import (
-    FactorOrigin,
-    LearnedRun,
-    SignatureFile,
-    read_signature,
-    update_signature,
-    write_signature,
-)
+from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
+from cdtool.signature_store import read_signature, update_signature, write_signature
 from cdtool.thresholds.signature import Signature
 
 RULE = Signature(position_step=0.02, position_window=0.1)
@@ -111,7 +105,8 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, learned, mon
 WORKER = """
 import sys
 from dataclasses import replace
-from cdtool.signature_store import LearnedRun, update_signature
+from cdtool.signature_file import LearnedRun
+from cdtool.signature_store import update_signature
 for k in range(int(sys.argv[3])):
     run = LearnedRun(f"{sys.argv[2]}.{k}", "x")
     update_signature(sys.argv[1], lambda file: replace(file, runs=(*file.runs, run)))

@@ -13,7 +13,7 @@ from cdtool.cli.console import number, plain, table
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
     from cdtool.evaluation.upkeep.coverage import Coverage
-    from cdtool.signature_store import SignatureFile
+    from cdtool.signature_file import SignatureFile
     from cdtool.workflows.upkeep import Checked, CheckedClass
 
 # Rows of a table, and stretches, that are shown; --json has all.

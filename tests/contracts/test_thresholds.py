@@ -13,7 +13,8 @@ import cdtool.thresholds
 from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import CHANNELS, GROUND_TRUTH
-from cdtool.signature_store import FactorOrigin, SignatureFile, read_signature, write_signature
+from cdtool.signature_file import FactorOrigin, SignatureFile
+from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import exceedance
 

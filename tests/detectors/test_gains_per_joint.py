@@ -14,7 +14,8 @@ from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import ConfigurationError, SignatureError
 from cdtool.machine_file import fingerprint, read_machine_file
-from cdtool.signature_store import FactorOrigin, SignatureFile, read_signature, write_signature
+from cdtool.signature_file import FactorOrigin, SignatureFile
+from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.signature import Signature
 from tests.conftest import GATE, machine_of
 from tests.motions import moving

@@ -1,0 +1,163 @@
+"""What `cdtool detect` shows: alarms, contacts without one, and what could not be judged; as a table or as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cdtool.cli.console import number, plain, say, table
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.truth.matching import Matching
+    from cdtool.pipeline import Detection
+    from cdtool.workflows.contact_force import ForceSummary
+    from cdtool.workflows.detection import Detected
+
+# Operations of which is told what could not be judged, and how many stretches of each.
+_SHOWN, _STRETCHES = 6, 3
+
+
+def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
+    """The table of all logs, then lines on what could not be judged, on signals and on estimated forces."""
+    rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
+    detections = [detection for found in done for detection in found.detections]
+    _show(rows, done[0].threshold)
+    _show_not_judged(detections)
+    _show_notes(detections)
+    for force in list(forces.values())[:_SHOWN]:
+        _show_force(force)
+
+
+def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
+    """A JSON object an operation."""
+    return [
+        _as_json(log, found, detection, matching, forces.get(detection.operation.name))
+        for log, found in done
+        for detection, matching in zip(found.detections, found.matchings, strict=True)
+    ]
+
+
+def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> None:
+    """A row for each alarm, for each contact without one, and for each operation without either."""
+    cells = [cell for row in rows for cell in _rows_of(*row)]
+    first = rows[0][1]
+    unit = first.statistic.unit
+    columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
+    columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
+    typer.echo(f"{first.detector}: {plain(threshold)}")
+    table(columns, cells)
+
+
+def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+    from cdtool.workflows.detection import why_no_contact
+
+    name, joints = detection.operation.name, detection.statistic.joints
+    latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
+    rows: list[tuple[object, ...]] = []
+    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
+        late = number(1e3 * latency[alarm], 3) if alarm in latency else "-"
+        figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
+        why = "" if alarm in latency else why_no_contact(found, alarm)
+        rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, why))
+    for item in matching.matches:
+        if not item.alarm:
+            outcome = item.outcome.replace("_", " ")
+            why = f"contact at {item.contact.start:.3f} s{': ' + item.reason if item.reason else ''}"
+            rows.append((name, outcome, "-", "-", "-", "-", "-", why))
+    if not rows:
+        rows.append((name, detection.verdict.outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
+    return rows
+
+
+def _show_force(force: ForceSummary) -> None:
+    at_alarm = f"{force.at_alarm:.1f} N at the first alarm, " if math.isfinite(force.at_alarm) else ""
+    largest = (
+        f"largest {force.largest:.1f} N at {force.largest_at:.3f} s" if math.isfinite(force.largest) else "unknown"
+    )
+    typer.echo(f"{plain(force.operation)}: estimated force at {plain(str(force.contact))}: {at_alarm}{largest}")
+
+
+def _show_notes(detections: list[Detection]) -> None:
+    """What a detector wants to be known of its signal, of as many operations as for what could not be judged."""
+    for detection in detections[:_SHOWN]:
+        for note in detection.statistic.notes:
+            say(f"{detection.operation.name}: {note}")
+
+
+def _show_not_judged(detections: list[Detection]) -> None:
+    """What share of an operation could not be judged, and when, where and why in its longest stretches."""
+    shown = [detection for detection in detections if detection.statistic.shares()]
+    for detection in shown[:_SHOWN]:
+        longest = sorted(detection.not_judged(), key=lambda item: item.start - item.end)[:_STRETCHES]
+        unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
+        parts = []
+        for item in sorted(longest, key=lambda item: item.start):
+            where = (
+                f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})" if math.isfinite(item.way_end) else ""
+            )
+            parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
+        share = 1.0 - float(detection.statistic.valid.mean())
+        say(f"not judged in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
+    if len(shown) > _SHOWN:
+        typer.echo(f"not judged: and {len(shown) - _SHOWN} operations more (--json has all)")
+
+
+def _place(way: float) -> str:
+    """A place along the travel [load unit] with three digits, and no more than millimetres or milliradians."""
+    return f"{round(way, 3) + 0.0:.3g}"
+
+
+def _as_json(
+    log: Path, found: Detected, detection: Detection, matching: Matching, force: ForceSummary | None
+) -> dict[str, Any]:
+    from cdtool.workflows.detection import why_no_contact
+
+    joints = detection.statistic.joints
+    known = {item.alarm for item in matching.matches}
+    return {
+        "log": str(log),
+        "operation": detection.operation.name,
+        "detector": detection.detector,
+        "unit": detection.statistic.unit,
+        "threshold": found.threshold,
+        "verdict": detection.verdict.outcome,
+        "reason": detection.verdict.reason or None,
+        "alarms": [
+            {
+                "time_s": alarm.time,
+                "joint": joints[alarm.joint],
+                "side": alarm.side,
+                "statistic": alarm.statistic,
+                "limit": alarm.limit,
+                "why_no_contact": None if alarm in known else why_no_contact(found, alarm),
+            }
+            for alarm in detection.verdict.alarms
+        ],
+        "contacts": [
+            {
+                "onset_s": item.contact.start,
+                "onset_uncertainty_s": item.contact.uncertainty,
+                "peak_force_n": item.contact.peak_force,
+                "outcome": item.outcome,
+                "alarm_s": item.alarm.time if item.alarm else None,
+                "latency_ms": 1e3 * item.latency,
+            }
+            for item in matching.matches
+        ],
+        "not_judged": detection.statistic.shares(),
+        "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
+        "estimated_force": _force_as_json(force) if force else None,
+        "notes": list(detection.statistic.notes),
+        "findings": [str(item) for item in found.recording.findings],
+    }
+
+
+def _force_as_json(force: ForceSummary) -> dict[str, Any]:
+    figures = {"at_alarm_n": force.at_alarm, "largest_n": force.largest, "largest_at_s": force.largest_at}
+    known = {name: value if math.isfinite(value) else None for name, value in figures.items()}
+    return {"link": force.contact.link, "point_m": list(force.contact.point), **known}
