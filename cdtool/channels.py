@@ -10,10 +10,8 @@ from typing import Literal
 from cdtool.errors import nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
 from cdtool.tables import Table
-from cdtool.units import unit
+from cdtool.units import RAW_UNITS, unit
 
-# From these a scale leads to a channel's own unit (N m per A, say).
-_RAW_UNITS = ("A", "V", "1", "count")
 _CLOCKS = ("log", "publish", "header")
 
 AcceptedUnits = Callable[[str], tuple[str, ...]]
@@ -34,7 +32,7 @@ class Duty:
 
 @dataclass(frozen=True)
 class ChannelSource:
-    """Where one channel comes from, and how its numbers become SI: value * factor [unit]."""
+    """Where one channel comes from, and how its numbers become SI: value * factor [unit]; `stated`: the log's unit."""
 
     channel: str
     columns: tuple[str | int, ...] = ()
@@ -42,6 +40,7 @@ class ChannelSource:
     field: str = ""
     factor: tuple[float, ...] = (1.0,)
     unit: str = "1"
+    stated: str = ""
     time_offset: float = 0.0
     valid_range: tuple[float, float] | None = None
     duty: Duty | None = None
@@ -58,11 +57,12 @@ class ChannelSource:
 class TimeSource:
     """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
 
-    With both a column and a rate the column counts samples: a gap in it is a gap in time.
+    With both a column and a rate the column counts samples: a gap in it is a gap in time. `unit` is the column's.
     """
 
     column: str | int | None = None
     factor: float = 1.0
+    unit: str = ""
     rate: float | None = None
     clock: Literal["log", "publish", "header"] = "log"
 
@@ -88,7 +88,10 @@ class TablePins:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """All channels of a log; `topics` tells the MCAP map from the map of columns, `pins` is for tables of text."""
+    """All channels of a log; `topics` tells the MCAP map from the map of columns, `pins` is for tables of text.
+
+    `named`: the machine file says what its joints are called. Else its only one is called like the machine.
+    """
 
     time: TimeSource
     sources: tuple[ChannelSource, ...]
@@ -96,6 +99,12 @@ class ChannelMap:
     topics: bool = False
     speed_low_pass: float = 50.0
     pins: TablePins = TablePins()
+    named: bool = True
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """What the messages of a log call the joints; empty where nobody said."""
+        return self.joints if self.named else ()
 
     def __contains__(self, channel: str) -> bool:
         return any(source.channel == channel for source in self.sources)
@@ -140,7 +149,7 @@ def _time_source(table: Table, topics: bool) -> TimeSource:
     if found.si != "s":
         raise part.fault("unit", f"'{name}' is not a unit of time", "s, ms, us, ns or min")
     part.finish()
-    return TimeSource(column=column, factor=found.factor)
+    return TimeSource(column=column, factor=found.factor, unit=name)
 
 
 def _source(
@@ -161,7 +170,7 @@ def _source(
             raise table.fault("columns", f"names {len(columns)} columns", f"{count} are needed: one a joint")
     kind = table.choice("kind", ("measured", "duty"), "measured")
     duty = _duty(table, channel) if kind == "duty" else None
-    si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
+    stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
     source = ChannelSource(
         channel=channel,
         columns=columns,
@@ -169,6 +178,7 @@ def _source(
         field=field,
         factor=factor,
         unit=si,
+        stated=stated,
         time_offset=table.number("time_offset", 0.0),
         valid_range=_valid_range(table),
         duty=duty,
@@ -179,12 +189,13 @@ def _source(
 
 def _unit_factor(
     table: Table, channel: str, accepted: tuple[str, ...], count: int, topics: bool, duty: Duty | None
-) -> tuple[str, tuple[float, ...]]:
+) -> tuple[str, str, tuple[float, ...]]:
+    """The unit as it is stated, the channel's own, and the factors that lead there."""
     scale = table.numbers("scale", count, 1.0)
     if any(item == 0.0 for item in scale):
         raise table.fault("scale", "is 0", "a factor other than 0, e.g. N m per A")
     if channel in UNITLESS:  # a unit would mean nothing, and is refused as an unknown key
-        return "1", scale
+        return "", "1", scale
     name = table.text("unit", "")
     if not name:
         if not topics or duty is not None:
@@ -195,17 +206,17 @@ def _unit_factor(
     if duty is not None:
         if found.si not in ("1", "V"):
             raise table.fault("unit", f"is '{name}'", "kind = 'duty' takes %, 1 or V")
-        return found.si, factor
+        return name, found.si, factor
     if found.si in accepted:
-        return found.si, factor
-    if found.si in _RAW_UNITS:
+        return name, found.si, factor
+    if found.si in RAW_UNITS:
         if "scale" not in table.values:
             raise table.fault("scale", f"is missing for unit '{name}'", f"give the {accepted[0]} per {found.si}")
-        return accepted[0], factor
+        return name, accepted[0], factor
     raise table.fault(
         "unit",
         f"'{name}' does not measure {channel} here",
-        f"units of {' or '.join(accepted)}, or {', '.join(_RAW_UNITS)} with a scale",
+        f"units of {' or '.join(accepted)}, or {', '.join(RAW_UNITS)} with a scale",
     )
 
 

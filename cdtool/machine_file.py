@@ -52,6 +52,8 @@ def read_machine_file(path: str | Path) -> MachineFile:
     columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
     columns = replace(columns, pins=_read_pins(root.table("csv")))
     topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
+    if len(machine.joints) == 1 and "joints" not in table:
+        topics = replace(topics, named=False)
     gains = _read_gains(root.table("detectors"), len(machine.joints))
     root.finish()
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()

@@ -16,6 +16,9 @@ class Unit:
     factor: float
 
 
+# SI units of what a drive reports: from these a scale leads to a channel's own unit (N m per A, say).
+RAW_UNITS = ("A", "V", "1", "count")
+
 _STANDARD_GRAVITY = 9.80665
 _TURN = 2.0 * math.pi
 
@@ -60,7 +63,7 @@ UNITS: dict[str, Unit] = {
     "kN m": Unit("N m", 1e3),
     # a channel of a robot with joints of both kinds: rad or m, N m or N ... each joint's own
     "SI": Unit("SI", 1.0),
-    # what a drive reports; a scale leads from here to a torque or a force
+    # what a drive reports: RAW_UNITS
     "A": Unit("A", 1.0),
     "mA": Unit("A", 1e-3),
     "V": Unit("V", 1.0),

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.clock import clean_time, differentiate, gap_findings, integrate, previous_value
+from cdtool.clock import clean_time, differentiate, epoch_start, gap_findings, integrate, previous_value
+from cdtool.errors import RecordingError
 from cdtool.recording import Series
 
 
@@ -48,21 +49,65 @@ def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(float("nan")), max_size=40))
 def test_whatever_the_stamps_the_clean_ones_strictly_increase(stamps):
-    clean = clean_time(stamps)
+    try:
+        clean = clean_time(stamps)
+    except RecordingError as fault:
+        assert "stands still" in str(fault)
+        return
     assert np.all(np.diff(clean.time) > 0.0)
     assert clean.keep.sum() == len(clean.time)
+    assert clean.keep.all() == (not any("dropped" in item.message for item in clean.findings))
 
 
-def test_a_coarse_clock_becomes_a_causal_straight_line():
-    true = np.arange(2000) * 1e-3
-    stamps = np.floor(true / 0.01) * 0.01
-    clean = clean_time(stamps)
-    assert "coarse clock" in str(clean.findings[0])
-    assert len(clean.time) > 1980
-    later = clean.time[500:]
-    assert np.abs(np.diff(later) - 1e-3).max() < 2e-4
-    early = clean_time(stamps[:1200])
-    np.testing.assert_array_equal(early.time, clean.time[: len(early.time)])
+@pytest.mark.parametrize(
+    ("stamps", "words", "severity"),
+    [
+        (
+            [0, 1, 2, 3, 4, 5, 6, 0, 1, 2],
+            "3 time stamps run backward (sample 7, 8, 9): dropped, 30 %",
+            "loss",
+        ),
+        ([0, 1, 2, 3, 4, 5, 6, 0, 1, 2], "the clock starts again there", "loss"),
+        ([*range(200), 150, *range(200, 400)], "1 time stamps run backward (sample 200): dropped, 0.25 %", "warning"),
+        ([*range(200), 199, *range(200, 400)], "1 time stamps repeat (sample 200): dropped, 0.25 %", "warning"),
+        ([*range(30), 29, *range(30, 40)], "1 time stamps repeat (sample 30): dropped, 2.4 %", "loss"),
+        ([*range(30), np.nan, np.nan, *range(30, 40)], "2 time stamps are no number (sample 30, 31)", "loss"),
+        ([*range(65500, 65536), *range(20)], "counter of 16 bits wraps there", "loss"),
+        ([*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)], "add 4294967296 to the stamps", "loss"),
+        ([*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)], "counter of 32 bits wraps there", "loss"),
+        ([*range(65490, 65500), *range(20)], "the clock starts again there", "loss"),
+        ([*range(50), 60000, *range(50, 60)], "or has jumped ahead before", "loss"),
+    ],
+    ids=["restart", "cut", "stray", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "ahead"],
+)
+def test_dropped_stamps_are_told_with_their_share_and_are_a_loss_unless_they_are_strays(stamps, words, severity):
+    findings = clean_time(np.array(stamps, dtype=float)).findings
+    told = [item for item in findings if words in item.message]
+    assert [item.severity for item in told] == [severity], findings
+
+
+def test_a_counters_wrap_shows_in_the_stamps_as_the_file_has_them():
+    counted = np.concatenate((np.arange(65500.0, 65536.0), np.arange(20.0)))
+    assert "counter of 16 bits" in str(clean_time((counted - counted[0]) * 1e-6, counted=counted).findings[0])
+
+
+@pytest.mark.parametrize("stamps", [[0.0] * 40, [5.0, 5.0], [7.0, 7.0, 3.0, 2.0]])
+def test_a_clock_that_stands_still_is_refused(stamps):
+    with pytest.raises(RecordingError, match=r"the clock stands still .*rate_hz"):
+        clean_time(stamps)
+
+
+def test_a_single_sample_and_events_at_one_time_are_no_clock_that_stands_still():
+    assert clean_time([5.0]).time.tolist() == [5.0]
+    events = clean_time([1.0, 1.0, 4.0, 4.0, 9.0], sampled=False)
+    assert events.time.tolist() == [1.0, 4.0, 9.0]
+    assert events.findings[0].severity == "loss"
+
+
+def test_an_epochs_start_is_told_in_the_stamps_own_unit():
+    assert epoch_start(np.array([np.nan, 1.7e12, 1.7e12 + 1.0]), 1e-3) == 1.7e12
+    assert epoch_start(np.array([1.7e12]), 1e-6) == 0.0
+    assert epoch_start(np.array([np.nan]), 1.0) == 0.0
 
 
 def test_the_derivative_of_a_ramp_is_its_slope_and_a_missing_sample_is_skipped():

@@ -12,7 +12,9 @@ from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.reading import survey
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.converting import _WRITERS, convert
+from cdtool.workflows.runs import read_log
 from cdtool.workflows.written_file import written_file
+from tests.command import cdtool
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
 
 LIBRARIES = {
@@ -248,3 +250,59 @@ def test_an_error_names_the_file_that_was_asked_for_and_not_the_temporary_one(tm
         raise RecordingError(f"{part}: no pyarrow", "pip install 'cdtool[parquet]'")
     assert part.name not in str(told.value) and "pip install" in told.value.hint
     assert list(tmp_path.iterdir()) == []
+
+
+GATE_TABLE = """[machine]
+type = "linear_axis"
+name = "gate"
+load_mass = 100.0
+coordinates = "load"
+[channels]
+time = { column = "t", unit = "s" }
+position = { column = "x", unit = "m" }
+torque = { column = "F", unit = "N" }
+"""
+
+
+def test_a_clock_that_begins_at_5_s_begins_there_in_mcap_too(tmp_path):
+    rows = "\n".join(f"{5 + i / 1000:.3f},{i / 1000},{i % 7}" for i in range(200))
+    (tmp_path / "log.csv").write_text(f"t,x,F\n{rows}\n", encoding="utf-8")
+    (tmp_path / "gate.toml").write_text(GATE_TABLE, encoding="utf-8")
+    done = convert(tmp_path / "log.csv", tmp_path / "log.mcap", machine=tmp_path / "gate.toml")
+    before = read_log(tmp_path / "log.csv", read_machine_file(tmp_path / "gate.toml"))
+    after = read_log(done.files[0], read_machine_file(done.machine_files[0]))
+    assert before["torque"].time[0] == 5.0
+    assert after["torque"].time.tolist() == before["torque"].time.tolist()
+    assert after.origin == before.origin
+
+
+def unverified_log(path):
+    from mcap.writer import Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, enable_crcs=False)
+        writer.start()
+        channel = writer.register_channel("/a", "json", 0)
+        for i in range(20):
+            writer.add_message(channel, i * 10**6, b'{"data": %d}' % i, i * 10**6)
+        writer.finish()
+    return path
+
+
+def test_what_no_checksum_covered_gets_none_by_converting_and_says_so(tmp_path):
+    log = unverified_log(tmp_path / "log.mcap")
+    done = cdtool("convert", log, tmp_path / "out.mcap")
+    assert done.status == 0 and "20 of 20 messages carry no checksum: unverified" in done.err
+    assert any(
+        "20 of 20 messages carry no checksum" in str(finding) for finding in survey(tmp_path / "out.mcap").findings
+    )
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_names_that_a_container_takes_for_one_are_told_apart(suffix, tmp_path):
+    needs(suffix)
+    rows = "\n".join(f"{i / 100:.2f},{i},{-i}" for i in range(20))
+    (tmp_path / "log.csv").write_text(f"t [s],a.b,a/b\n{rows}\n", encoding="utf-8")
+    done = convert(tmp_path / "log.csv", tmp_path / f"out{suffix}")
+    ends = {(column.values[0], column.values[-1]) for column in survey(Path(done.files[0])).columns.values()}
+    assert {(0.0, 19.0), (0.0, -19.0)} <= ends

@@ -41,7 +41,7 @@ def convert(
         for path in done.machine_files:
             typer.echo(f"{plain(path)}: the machine file that reads it")
     for finding in done.findings:
-        if finding.severity != "note":
+        if finding.severity != "note" or finding.message.endswith(": unverified"):
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
     if any(finding.severity == "loss" for finding in done.findings):
         raise typer.Exit(ExitStatus.INCOMPLETE)

@@ -14,15 +14,11 @@ from typing import Any
 import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource
-from cdtool.clock import CleanTime, clean_time, differentiate, gap_findings, previous_value
+from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
 from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.formats.header_units import time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
-from cdtool.recording import MEASURED, BoolArray, Finding, FloatArray, Recording, Series
-from cdtool.units import find_unit
-
-# A clock that starts later than this [s] counts from an epoch (3 years): it is shifted to start at 0.
-_EPOCH = 1e8
-_RAW_UNITS = ("A", "V", "1", "count")
+from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
 
 
 def assemble(source: Source, channels: ChannelMap, machine: Any) -> Recording:
@@ -49,7 +45,7 @@ def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
         joints=channels.joints,
         channels=series,
         origin=work.origin,
-        findings=(*source.findings, *work.findings, *_stuck(series)),
+        findings=(*source.findings, *work.findings, *_stuck(series), *_apart(series)),
         digest=file_digest(source.path),
     )
 
@@ -69,14 +65,17 @@ class _Assembly:
         self.origin = source.origin
         self.findings: list[Finding] = []
         self.gaps: set[str] = set()  # what was said of the table's clock is not repeated for each channel
-        self.table = None if channels.topics else self._table_clock()
+        self.table: CleanTime | None = None
+        if not channels.topics:
+            self.table = self._table_clock()
+            self.findings += unit_findings(source, channels)
 
     def series(self, item: ChannelSource) -> Series:
         """One channel: its values in SI at its own times."""
         if self.table is None:
             column = self.source.columns[find_key(self.source.path, item.channel, item.described, self._names())]
-            clock = clean_time(column.time if column.time is not None else ())
-            self.findings += [replace(found, channel=f"{item.channel} time") for found in clock.findings]
+            stamps = column.time if column.time is not None else np.empty(0)
+            clock = self._clean(stamps, f"{item.channel} time", sampled=item.channel != "event")
             values = column.values
         else:
             clock = self.table
@@ -93,19 +92,11 @@ class _Assembly:
             rows = {len(column.values) for column in self.source.columns.values()}
             return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
         column = self._column("time", time.column)
-        told = find_unit(column.unit) if column.unit else None
-        if told is not None and told.si == "s" and told.factor != time.factor:
-            text = f"the header says '{column.name}', the machine file another unit"
-            self.findings.append(Finding(text, "time"))
-        stamps = column.values
-        finite = stamps[np.isfinite(stamps)]
-        if len(finite) and finite[0] * time.factor > _EPOCH:
-            # Taken off before scaling, so that no digit is lost.
-            self.origin = float(finite[0]) * time.factor
-            stamps = stamps - finite[0]
-        first = self.source.first_row
-        clock = clean_time(stamps * time.factor, first, "line" if first else "sample")
-        self.findings += clock.findings
+        self.findings += time_unit_findings(time, column)
+        start = epoch_start(column.values, time.factor)
+        if start:
+            self.origin = start * time.factor
+        clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
         if not len(clock.time):
             raise RecordingError(
                 f"{self.source.path}: column '{column.name}' holds no time stamp", "see [channels] time"
@@ -114,6 +105,19 @@ class _Assembly:
         self.gaps = {found.message for found in told_gaps}
         self.findings += told_gaps
         return clock
+
+    def _clean(
+        self, stamps: FloatArray, clock: str, *, counted: FloatArray | None = None, sampled: bool = True
+    ) -> CleanTime:
+        """The times of a clock's stamps [s]; what is odd about them is told under its name."""
+        first = self.source.first_row
+        row_name = "line" if first else "sample"
+        try:
+            clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
+        except RecordingError as fault:
+            raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
+        self.findings += [replace(found, channel=clock) for found in clean.findings]
+        return clean
 
     def _names(self) -> tuple[str, ...]:
         return self.source.names or tuple(self.source.columns)
@@ -138,7 +142,6 @@ class _Assembly:
         return np.array(table[keep], dtype=np.float64)
 
     def _scaled(self, item: ChannelSource, values: FloatArray) -> FloatArray:
-        self._compare_unit(item)
         infinite = np.isinf(values)
         if infinite.any():
             values[infinite] = np.nan
@@ -151,13 +154,6 @@ class _Assembly:
                 self._found(item, f"{np.count_nonzero(saturated)} values are at the sensor's limit: masked")
         scaled: FloatArray = values * np.array(item.factor)
         return scaled
-
-    def _compare_unit(self, item: ChannelSource) -> None:
-        for column in item.columns:
-            header = self._column(item.channel, column)
-            told = find_unit(header.unit) if header.unit else None
-            if told is not None and told.si not in (item.unit, *_RAW_UNITS):
-                self._found(item, f"the header says '{header.name}', the machine file measures it in {item.unit}")
 
     def _found(self, item: ChannelSource, text: str) -> None:
         self.findings.append(Finding(text, item.channel))
@@ -192,6 +188,25 @@ def _stuck(series: dict[str, Series]) -> list[Finding]:
             others = [series[other] for other in ("speed", "position") if other in series and other != name]
             if _constant(series[name], joint) and any(not _constant(other, joint) for other in others):
                 found.append(Finding("the value never changes while the machine moves: stuck?", name))
+    return found
+
+
+def _apart(series: dict[str, Series]) -> list[Finding]:
+    """Channels on clocks of their own that have no time in common: between them nothing can be compared.
+
+    What is logged at events only may lie beside the rest, by no more than the log is long.
+    """
+    spans = sorted((float(s.time[0]), float(s.time[-1]), name) for name, s in series.items())
+    longest = max((end - start for start, end, _ in spans), default=0.0)
+    found = []
+    latest, before = (spans[0][1], spans[0][2]) if spans else (0.0, "")
+    for start, end, name in spans[1:]:
+        distance = start - latest
+        if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
+            text = f"begins {distance:.6g} s after {before} ends: their clocks have no time in common"
+            found.append(Finding(f"{text}; choose another clock in the machine file, or a time_offset", name))
+        if end > latest:
+            latest, before = end, name
     return found
 
 

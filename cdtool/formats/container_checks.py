@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -18,6 +19,8 @@ from cdtool.recording import Finding, FloatArray
 # Above this many bytes, and this many times its own size, a file unpacks to more than any log: it is refused.
 _FREE, _RATIO = 256 * 2**20, 200
 _LARGEST_EXACT = 2**53
+# HDF5's filters that only rearrange or check bytes: shuffle, Fletcher's checksum.
+_NO_PACKERS = (2, 3)
 # A clock that starts later than this [s] counts from an epoch, as in channel_assembly.
 _EPOCH = 1e8
 
@@ -40,6 +43,18 @@ def check_size(path: Path, values: int) -> None:
             f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
             "name fewer columns in the machine file, or save it without compression",
         )
+
+
+def check_chunks(path: Path, name: str, dataset: Any) -> None:
+    """Refuse an HDF5 dataset that is packed twice, or in chunks far larger than its file; raises RecordingError.
+
+    A chunk is unpacked as a whole, whatever is read of it, and each packing may shrink zeros to a thousandth.
+    """
+    check_size(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize // 8)
+    packing = dataset.id.get_create_plist()
+    packers = [packing.get_filter(i)[0] for i in range(packing.get_nfilters())]
+    if sum(packer not in _NO_PACKERS for packer in packers) > 1:
+        raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it anew")
 
 
 @contextmanager

@@ -6,28 +6,34 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
-from cdtool.formats.groups import Group, Written, one_table, stored
+from cdtool.formats.groups import Group, Part, Parts, Written, one_table, stored
 from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.source import Column
 
 _ROWS = 2**14
 
 
-def write_csv_table(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+def write_csv_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
     """Write a table with its provenance in lines that begin with #, and units in the header: `torque [N m]`."""
     group = one_table(path, groups)
-    columns = list(chain(*group.flat))
-    if group.time is not None and not group.is_table:
-        columns.insert(0, Column(OWN_CLOCK, group.time, unit="s"))
-    header = [_heading(column) for column in columns]
+    header = [_heading(column) for column in chain(*group.flat)]
+    if group.own_clock:
+        header.insert(0, f"{OWN_CLOCK} [s]")
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for key, value in stored(provenance).items():
             file.write(f"# {key}: {' '.join(value.split())}\n")
         file.write(",".join(map(_quoted, header)) + "\n")
-        for start in range(0, group.rows, _ROWS):
-            cells = [map(repr, column.values[start : start + _ROWS].tolist()) for column in columns]
-            file.write("".join(f"{','.join(row)}\n" for row in zip(*cells, strict=True)))
+        for (part,) in parts:
+            if part is not None:
+                for start in range(0, len(part), _ROWS):
+                    file.write(_lines(group, part, slice(start, start + _ROWS)))
     return [[[_heading(part) for part in parts] for parts in group.flat]]
+
+
+def _lines(group: Group, part: Part, rows: slice) -> str:
+    columns = [part.time, *part.flat] if group.own_clock else part.flat
+    cells = [map(repr, column[rows].tolist()) for column in columns if column is not None]
+    return "".join(f"{','.join(row)}\n" for row in zip(*cells, strict=True))
 
 
 def _heading(column: Column) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,14 +14,17 @@ from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import (
     as_numbers,
+    check_chunks,
     check_size,
     left_out,
     library,
     one_line_errors,
     without_epoch,
 )
-from cdtool.formats.groups import Group, Written, stored
+from cdtool.formats.groups import Group, Parts, Written, stored
 from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
+from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
@@ -53,6 +56,13 @@ class Hdf5:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        return joined(self._read(path, wanted, None), sort=False)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
+        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        return self._read(path, None, keys)
+
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         h5py = library("h5py", "hdf5", path)
         if not self.sniff(path):
             raise RecordingError(f"{path}: is no HDF5 file", "see cdtool list formats")
@@ -60,13 +70,19 @@ class Hdf5:
         with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
             tree = _Tree(path, h5py, file, findings)
             names = tuple(tree.places)
-            keys = asked_keys(path, wanted, names)
+            keys = [key for key in asked_keys(path, wanted, names) if some is None or key in some]
             if not keys:
                 raise RecordingError(f"{path}: holds no dataset of numbers", "see h5dump -n")
             check_size(path, sum(tree.rows(key) for key in keys))
-            columns, origin = without_epoch([tree.column(key) for key in keys])
+            for name in dict.fromkeys(tree.places[key][0] for key in keys):
+                check_chunks(path, name, tree.datasets[name])
+            origin = tree.take_epoch(keys)
+            columns = [tree.column(key) for key in keys]
+            yield from side_by_side(columns)
             origin += float(file.attrs.get("cdtool.origin_s", 0.0))
-        return Source(path, self.name, columns, origin, tuple(findings), {"datasets": str(len(tree.datasets))}, names)
+        headers = {column.name: header_of(column) for column in columns}
+        told = {"datasets": str(len(tree.datasets))}
+        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), told, names)
 
 
 class _Tree:
@@ -76,7 +92,7 @@ class _Tree:
         self.path, self.h5py, self.findings = path, h5py, findings
         self.datasets: dict[str, Any] = {}
         self.places: dict[str, tuple[str, int | None]] = {}
-        self._clocks: dict[str, FloatArray] = {}
+        self._epoch = 0.0
         # Hard links only: a soft or external one may lead in circles, or out of the file.
         file.visititems(self._visit)
 
@@ -101,17 +117,38 @@ class _Tree:
         """How many values a column has."""
         return int(max(self.datasets[self.places[key][0]].shape))
 
-    def column(self, key: str) -> Column:
+    def column(self, key: str) -> Sliced:
         """One column with its unit, and its clock where the file knows it."""
         name, place = self.places[key]
-        dataset = self.datasets[name]
-        if place is None:
-            raw = dataset[()].ravel()
-        else:
-            raw = dataset[place, :] if dataset.shape[0] < dataset.shape[1] else dataset[:, place]
-        return Column(key, as_numbers(key, raw, self.findings), self._clock(name, len(raw)), _unit(dataset))
+        dataset, rows = self.datasets[name], self.rows(key)
 
-    def _clock(self, name: str, count: int) -> FloatArray | None:
+        def values(start: int, end: int) -> FloatArray:
+            return as_numbers(key, _rows_of(dataset, place, start, end), self.findings)
+
+        clock = self._clock(key)
+        if clock is None:
+            return Sliced(key, rows, values, unit=_unit(dataset))
+        path, factor = clock
+
+        def time(start: int, end: int) -> FloatArray:
+            return self._times(path, factor, start, end) - self._epoch
+
+        return Sliced(key, rows, values, path, time, _unit(dataset))
+
+    def take_epoch(self, keys: Sequence[str]) -> float:
+        """Where the clocks of these columns count from an epoch: its start [s], which is then taken off; else 0."""
+        clocks = {clock for key in keys if (clock := self._clock(key)) is not None}
+        starts = [Column(clock[0], np.empty(0), self._times(*clock, 0, 1)) for clock in clocks]
+        self._epoch = without_epoch(starts)[1]
+        return self._epoch
+
+    def _times(self, path: str, factor: float, start: int, end: int) -> FloatArray:
+        times = as_numbers(path, _rows_of(self.datasets[path], None, start, end), self.findings)
+        return times if factor == 1.0 else times * factor
+
+    def _clock(self, key: str) -> tuple[str, float] | None:
+        """The dataset that is a column's clock, and its factor to seconds."""
+        name, count = self.places[key][0], self.rows(key)
         folder, _, own = name.rpartition("/")
         for clock in _CLOCK_NAMES:
             path = f"{folder}/{clock}" if folder else clock
@@ -119,13 +156,20 @@ class _Tree:
             if dataset is None or clock == own or dataset.size != count:
                 continue
             unit = find_unit(_unit(dataset) or "?")
-            if unit is None or unit.si != "s":
-                continue
-            if path not in self._clocks:
-                values = as_numbers(path, dataset[()].ravel(), self.findings)
-                self._clocks[path] = values if unit.factor == 1.0 else values * unit.factor
-            return self._clocks[path]
+            if unit is not None and unit.si == "s":
+                return path, unit.factor
         return None
+
+
+def _rows_of(dataset: Any, place: int | None, start: int, end: int) -> Any:
+    """Values of a vector, or of one column of a matrix, whose longer side are its rows."""
+    if place is None:
+        return dataset[start:end] if dataset.ndim == 1 else _long_side(dataset, start, end)
+    return dataset[place, start:end] if dataset.shape[0] < dataset.shape[1] else dataset[start:end, place]
+
+
+def _long_side(dataset: Any, start: int, end: int) -> Any:
+    return (dataset[0, start:end] if dataset.shape[0] == 1 else dataset[start:end, 0]).ravel()
 
 
 def _unusable(dataset: Any) -> str:
@@ -162,21 +206,34 @@ def _link(name: str) -> str:
     return name.replace("/", ".")
 
 
-def write_hdf5(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
     """Write a dataset a column, units as attributes; several clocks are groups, each with its `time`."""
     h5py = library("h5py", "hdf5", path)
-    names = []
+    names: Written = []
+    datasets: list[list[Any]] = []
     with h5py.File(path, "w", track_order=True) as file:
         for key, value in stored(provenance).items():
             file.attrs[key] = value
         for group in groups:
             folder = file if len(groups) == 1 else file.create_group(group.name, track_order=True)
             before = "" if len(groups) == 1 else f"{group.name}/"
-            if group.time is not None and not group.is_table:
-                folder.create_dataset(OWN_CLOCK, data=group.time).attrs["unit"] = "s"
-            for column in chain(*group.flat):
-                dataset = folder.create_dataset(_link(column.name), data=column.values)
-                if column.unit:
-                    dataset.attrs["unit"] = column.unit
+            columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if group.own_clock else []
+            datasets.append([_dataset(folder, column, group.rows) for column in (*columns, *chain(*group.flat))])
             names.append([[before + _link(part.name) for part in parts] for parts in group.flat])
+        done = [0] * len(groups)
+        for ready in parts:
+            for number, part in enumerate(ready):
+                if part is not None:
+                    rows = slice(done[number], done[number] + len(part))
+                    values = [part.time, *part.flat] if groups[number].own_clock else part.flat
+                    for dataset, column in zip(datasets[number], values, strict=True):
+                        dataset[rows] = column
+                    done[number] = rows.stop
     return names
+
+
+def _dataset(folder: Any, column: Column, rows: int) -> Any:
+    dataset = folder.create_dataset(_link(column.name), (rows,), np.float64)
+    if column.unit:
+        dataset.attrs["unit"] = column.unit
+    return dataset

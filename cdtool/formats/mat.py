@@ -1,4 +1,4 @@
-"""MATLAB .mat files up to version 7 (not HDF5): variables of numbers as columns."""
+"""MATLAB .mat files: variables of numbers as columns. Versions 5 to 7 by scipy, 7.3 (HDF5) by h5py."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats import mat_hdf5
 from cdtool.formats.mat_check import MAGIC, check_whole
 from cdtool.formats.source import Column, Source, wanted_keys
 from cdtool.recording import Finding
 
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
-_HDF5_MAGIC = b"MATLAB 7.3 MAT-file"
 
 
 @dataclass(frozen=True)
 class Mat:
-    """MATLAB files up to version 7: a vector is a column, a matrix the columns `name[0]`, `name[1]` and so on."""
+    """MATLAB files: a vector is a column, a matrix the columns `name[0]`, `name[1]` and so on."""
 
     name: ClassVar[str] = "mat"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
@@ -28,7 +28,7 @@ class Mat:
     def sniff(self, path: Path) -> bool:
         """True if the file starts as MATLAB writes it (versions 5 to 7.3)."""
         with path.open("rb") as file:
-            return file.read(len(MAGIC)) in (MAGIC, _HDF5_MAGIC)
+            return file.read(len(MAGIC)) == MAGIC or mat_hdf5.is_v73(path)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all; raises RecordingError."""
@@ -75,8 +75,8 @@ def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, s
     """The numeric variables with their shapes, and the others with their kind."""
     from scipy.io import whosmat
 
-    if _is_hdf5(path):
-        raise RecordingError(f"{path}: is a MATLAB v7.3 (HDF5) file", "save it with: save(name, ..., '-v7')")
+    if mat_hdf5.is_v73(path):
+        return mat_hdf5.contents(path)
     check_whole(path)
     shapes: dict[str, tuple[int, int]] = {}
     others: list[tuple[str, str]] = []
@@ -96,6 +96,8 @@ def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, s
 def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
     from scipy.io import loadmat
 
+    if mat_hdf5.is_v73(path):
+        return mat_hdf5.load(path, variables)
     try:
         # Only variables of numbers are named: no struct, object or function is ever built.
         values: dict[str, Any] = loadmat(str(path), appendmat=False, variable_names=list(variables))
@@ -111,9 +113,3 @@ def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
 def _unreadable(path: Path, fault: Exception) -> RecordingError:
     reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
     return RecordingError(f"{path}: damaged or not a MATLAB file: {reason}", "save it anew with -v7")
-
-
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as file:
-        head = file.read(1024)
-    return head.startswith(_HDF5_MAGIC) or b"\x89HDF\r\n" in head

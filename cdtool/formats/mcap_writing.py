@@ -7,41 +7,49 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdtool.formats.groups import Group, Written, clock_of, stored
-from cdtool.formats.source import Source
+from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, Written, need_clocks, stored
+from cdtool.formats.pieces import Piece, Pieces, Run
+from cdtool.formats.source import Format, Source
 from cdtool.recording import FloatArray
 
 METADATA = "cdtool.converted"
 EXACT_TIME = "time_s"
+_PACKAGE = "cdtool_msgs/msg"
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _SECOND = 10**9
 _ROWS = 2**14
 
 
-def write_mcap_topics(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
     """Write the groups, message by message in the order of their times; names are `/clock_1 torque`."""
     from mcap.writer import CompressionType, Writer
 
-    times = [clock_of(path, group) for group in groups]
-    stamps = _stamps(times, float(provenance.get("origin_s", "0")))
+    need_clocks(path, groups)
+    start = _start(groups, float(provenance.get("origin_s", "0")))
     fields = [_field_names([column.name for column in group.columns]) for group in groups]
     with path.open("wb") as file:
-        writer: Any = Writer(file, compression=CompressionType.ZSTD)
+        # What no checksum covered in the log gets none here: it would be stamped as good.
+        checked = UNVERIFIED not in provenance
+        writer: Any = Writer(file, compression=CompressionType.ZSTD, enable_crcs=checked)
         writer.start(profile="ros2", library="cdtool")
         writer.add_metadata(METADATA, stored(provenance))
         channels = []
         for group, names in zip(groups, fields, strict=True):
             schema = writer.register_schema(_type_name(group), "ros2msg", _definition(group, names).encode())
             channels.append(writer.register_channel(f"/{group.name}", "cdr", schema))
-        for which, row, payload in _messages(groups, times, stamps):
-            stamp = int(stamps[which][row])
-            writer.add_message(channels[which], log_time=stamp, data=payload, publish_time=stamp, sequence=row)
+        done = [0] * len(groups)
+        for ready in parts:
+            for which, stamp, payload in _messages(ready, start):
+                writer.add_message(channels[which], stamp, payload, stamp, done[which])
+                done[which] += 1
         writer.finish()
     return [
         [
@@ -66,41 +74,69 @@ def exact_times(path: Path) -> dict[str, str] | None:
     return None
 
 
-def with_exact_times(source: Source, exact: Source, origin: float) -> Source:
-    """A source of a converted file with the times that were written, where each message still has its own."""
+def with_exact_times(found: Format, source: Source, channels: ChannelMap) -> Source:
+    """The source, with the times that were written where cdtool converted the file: its stamps are whole nanoseconds.
+
+    They count from the first message on, so that a log whose clock began at 5 s would else begin at 0 s.
+    """
+    made = any(text.startswith(f"{_PACKAGE}/") for text in source.details.values())
+    told = exact_times(source.path) if made else None
+    if told is None:
+        return source
+    topics = dict.fromkeys(item.topic for item in channels.sources)
+    clocks = tuple(ChannelSource("event", topic=topic, field=EXACT_TIME) for topic in topics)
+    exact = found.columns(source.path, replace(channels, sources=clocks))
     columns = {}
     for name, column in source.columns.items():
-        topic = name.partition(" ")[0]
-        clock = exact.columns.get(f"{topic} {EXACT_TIME}")
+        clock = exact.columns.get(f"{name.partition(' ')[0]} {EXACT_TIME}")
         if clock is None or len(clock.values) != len(column.values):
             return source
-        columns[name] = type(column)(name, column.values, clock.values, column.unit)
-    return Source(source.path, source.format, columns, origin, source.findings, source.details, source.names)
+        columns[name] = replace(column, time=clock.values)
+    return replace(source, columns=columns, origin=float(told.get("cdtool.origin_s", "0")))
 
 
-def _stamps(times: Sequence[FloatArray], origin: float) -> list[Any]:
-    """Nanoseconds of each sample; an earlier time than 0 cannot be written, and moves all."""
+def exact_pieces(pieces: Pieces, origin: float) -> Pieces:
+    """The pieces of a converted file with the times that were written, which are columns no more."""
+    run = Run(pieces)
+    for piece in run:
+        time = piece.values.get(f"{piece.clock} {EXACT_TIME}")
+        values = {name: column for name, column in piece.values.items() if not name.endswith(f" {EXACT_TIME}")}
+        yield Piece(piece.clock, piece.time if time is None else time, values, piece.rows)
+    columns = {name: item for name, item in run.source.columns.items() if not name.endswith(f" {EXACT_TIME}")}
+    return replace(run.source, columns=columns, origin=origin)
+
+
+def _start(groups: Sequence[Group], origin: float) -> int:
+    """Nanoseconds of time 0; an earlier time than 0 ns cannot be written, and moves all."""
+    earliest = min((group.start for group in groups if group.rows), default=0.0)
     start = round(origin * _SECOND)
-    earliest = min((float(time[0]) for time in times if len(time)), default=0.0)
-    start = max(start, math.ceil(-earliest * _SECOND)) if earliest < 0.0 else start
-    return [start + np.rint(time * _SECOND).astype(np.int64) for time in times]
+    return max(start, math.ceil(-earliest * _SECOND)) if earliest < 0.0 else start
 
 
-def _messages(groups: Sequence[Group], times: Sequence[FloatArray], stamps: Sequence[Any]) -> Any:
-    """(group, row, payload) in the order of the times; of each group only some rows are packed at once."""
-    which = np.repeat(np.arange(len(groups)), [len(part) for part in stamps])
-    order = np.lexsort((which, np.concatenate(stamps)))
-    packed: list[list[bytes]] = [[] for _ in groups]
-    done = [0] * len(groups)
-    for group in which[order].tolist():
-        row = done[group]
-        if row % _ROWS == 0:
-            rows = slice(row, row + _ROWS)
-            parts = [times[group][rows], *(column.values[rows] for column in groups[group].columns)]
-            table = np.column_stack(parts).astype("<f8")
-            packed[group] = [_CDR_LITTLE_ENDIAN + line.tobytes() for line in table]
-        done[group] = row + 1
-        yield group, row, packed[group][row % _ROWS]
+def _messages(ready: Sequence[Part | None], start: int) -> Iterator[tuple[int, int, bytes]]:
+    """(group, stamp, payload) in the order of the stamps; at equal ones in the order of the groups."""
+    stamps = [start + np.rint(_time(part) * _SECOND).astype(np.int64) for part in ready]
+    which = np.repeat(np.arange(len(ready)), [len(part) for part in stamps])
+    row = np.concatenate([np.arange(len(part)) for part in stamps])
+    joined = np.concatenate(stamps)
+    order = np.lexsort((which, joined))
+    for first in range(0, len(order), _ROWS):
+        some = order[first : first + _ROWS]
+        packed = [_packed(part, row[some[which[some] == group]]) for group, part in enumerate(ready)]
+        for group, stamp in zip(which[some].tolist(), joined[some].tolist(), strict=True):
+            yield group, stamp, next(packed[group])
+
+
+def _time(part: Part | None) -> FloatArray:
+    return np.empty(0) if part is None or part.time is None else part.time
+
+
+def _packed(part: Part | None, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Iterator[bytes]:
+    """CDR of those rows."""
+    if part is None:
+        return iter(())
+    table = np.column_stack([_time(part)[rows], *(column[rows] for column in part.values)]).astype("<f8")
+    return (_CDR_LITTLE_ENDIAN + line.tobytes() for line in table)
 
 
 def _definition(group: Group, names: Sequence[str]) -> str:
@@ -113,7 +149,7 @@ def _definition(group: Group, names: Sequence[str]) -> str:
 
 
 def _type_name(group: Group) -> str:
-    return f"cdtool_msgs/msg/{re.sub(r'[^A-Za-z0-9]', '', group.name.title())}"
+    return f"{_PACKAGE}/{re.sub(r'[^A-Za-z0-9]', '', group.name.title())}"
 
 
 def _field_names(names: Sequence[str]) -> list[str]:

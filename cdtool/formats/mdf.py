@@ -7,7 +7,7 @@ import logging
 import re
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from itertools import chain
@@ -20,9 +20,11 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.groups import Group, Written, clock_of, stored
+from cdtool.formats.groups import Group, Parts, Written, need_clocks, stored
 from cdtool.formats.own_clocks import asked_keys
-from cdtool.formats.source import Column, Source
+from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.slices import Sliced, header_of, side_by_side
+from cdtool.formats.source import Source
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
 
@@ -49,6 +51,13 @@ class Mdf:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        return joined(self._read(path, wanted, None), sort=False)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
+        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        return self._read(path, None, keys)
+
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         asammdf = library("asammdf", "mdf", path)
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says comes as an error or a finding
         if not self.sniff(path):
@@ -60,24 +69,25 @@ class Mdf:
             if unfinished:
                 findings.append(Finding("the recording was never finalised: its end may be missing", severity="loss"))
             channels = _channels(log, findings)
-            keys = asked_keys(path, wanted, tuple(channels))
+            keys = [key for key in asked_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
                 raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
             check_size(path, sum(log.groups[channels[key][0]].channel_group.cycles_nr for key in keys))
-            columns = {}
+            columns: list[Sliced] = []
             for key in keys:
                 column = _column(log, key, *channels[key], findings)
                 if column is not None:
-                    columns[key] = column
+                    columns.append(column)
                 elif wanted is not None:
                     raise RecordingError(f"{path}: channel '{key}' holds no numbers", "name another one")
+            if not columns:
+                raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
+            yield from side_by_side(columns)
             told = _ORIGIN.search(str(log.header.description)) if hasattr(log.header, "description") else None
             details = {"version": str(log.version), "start": str(log.start_time)}
-        if not columns:
-            raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
-        return Source(
-            path, self.name, columns, float(told[1]) if told else 0.0, tuple(findings), details, tuple(channels)
-        )
+        headers = {column.name: header_of(column) for column in columns}
+        found, origin = tuple(dict.fromkeys(findings)), float(told[1]) if told else 0.0
+        return Source(path, self.name, headers, origin, found, details, tuple(channels))
 
 
 def _opened(asammdf: Any, path: Path) -> Any:
@@ -118,53 +128,72 @@ def _channels(log: Any, findings: list[Finding]) -> dict[str, tuple[int, int]]:
     return found
 
 
-def _column(log: Any, key: str, group: int, place: int, findings: list[Finding]) -> Column | None:
-    signal = log.get(group=group, index=place, ignore_invalidation_bits=True)
-    samples = signal.samples
-    if samples.dtype.kind not in "biuf" or samples.ndim != 1:
-        kind = "of texts" if samples.dtype.kind in "SUO" else "an array or a structure"
+def _column(log: Any, key: str, group: int, place: int, findings: list[Finding]) -> Sliced | None:
+    """A channel as a column; None, and told, where it holds no numbers."""
+    first = _signal(log, group, place, 0, 1)
+    if first.samples.dtype.kind not in "biuf" or first.samples.ndim != 1:
+        kind = "of texts" if first.samples.dtype.kind in "SUO" else "an array or a structure"
         findings.append(left_out(key, kind))
         return None
-    values = as_numbers(key, samples, findings)
-    if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
-        values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
-    expected = int(log.groups[group].channel_group.cycles_nr)
-    if len(values) < expected:
-        findings.append(Finding(f"{expected - len(values)} of {expected} values are missing", key, "loss"))
-    return Column(key, values, _clock(log, group, signal), signal.unit or None)
+    rows = int(log.groups[group].channel_group.cycles_nr)
+
+    def values(start: int, end: int) -> FloatArray:
+        signal = _signal(log, group, place, start, end)
+        numbers = as_numbers(key, signal.samples, findings)
+        if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
+            numbers = np.where(np.asarray(signal.invalidation_bits), np.nan, numbers)
+        if len(numbers) < end - start:
+            text = f"{end - start - len(numbers)} values from number {start + len(numbers)} on are missing"
+            findings.append(Finding(text, key, "loss"))
+        return np.pad(numbers, (0, end - start - len(numbers)), constant_values=np.nan)
+
+    factor = _time_factor(log, group)
+    if factor is None:
+        return Sliced(key, rows, values, unit=first.unit or None)
+
+    def time(start: int, end: int) -> FloatArray:
+        times = np.asarray(_signal(log, group, place, start, end).timestamps, dtype=np.float64)
+        return times if factor == 1.0 else times * factor
+
+    return Sliced(key, rows, values, str(group), time, first.unit or None)
 
 
-def _clock(log: Any, group: int, signal: Any) -> FloatArray | None:
-    """The master's times [s]; None where it is no time (an angle, a distance)."""
+def _signal(log: Any, group: int, place: int, start: int, end: int) -> Any:
+    """Some rows of a channel."""
+    return log.get(
+        group=group, index=place, ignore_invalidation_bits=True, record_offset=start, record_count=end - start
+    )
+
+
+def _time_factor(log: Any, group: int) -> float | None:
+    """From the master's unit to seconds; None where it is no time (an angle, a distance)."""
     master = log.masters_db.get(group)
-    if master is None:
-        return None
-    unit = find_unit(log.groups[group].channels[master].unit or "s")
-    if unit is None or unit.si != "s":
-        return None
-    time: FloatArray = np.asarray(signal.timestamps, dtype=np.float64)
-    return time if unit.factor == 1.0 else time * unit.factor
+    unit = None if master is None else find_unit(log.groups[group].channels[master].unit or "s")
+    return unit.factor if unit is not None and unit.si == "s" else None
 
 
-def write_mdf(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
+def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
     """Write MDF 4.10: a channel a column with its unit, a group a clock; provenance as the file's comment."""
     asammdf = library("asammdf", "mdf", path)
+    need_clocks(path, groups)
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
-    names: Written = []
     with asammdf.MDF(version="4.10") as log:
         # The log's own start, or the epoch's: the moment of writing would make other bytes of the same log.
         start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(provenance.get("origin_s", "0")))
         log.header.start_time = start
         log.header.comment = "\n".join(f"{key}: {value}" for key, value in stored(provenance).items())
-        for number, group in enumerate(groups):
-            time = clock_of(path, group)
+        for group in groups:
             signals = [
-                asammdf.Signal(samples=part.values, timestamps=time, name=part.name, unit=part.unit or "")
+                asammdf.Signal(samples=np.empty(0), timestamps=np.empty(0), name=part.name, unit=part.unit or "")
                 for part in chain(*group.flat)
             ]
             log.append(signals, acq_name=group.name, comment=group.name, common_timebase=True)
-            names.append(
-                [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]
-            )
+        for ready in parts:
+            for number, part in enumerate(ready):
+                if part is not None:  # kept by asammdf in a temporary file
+                    log.extend(number, [(values, None) for values in (part.time, *part.flat)])
         log.save(path, overwrite=True)
-    return names
+    return [
+        [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]
+        for number, group in enumerate(groups)
+    ]

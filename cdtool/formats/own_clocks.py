@@ -10,6 +10,7 @@ import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.formats.header_units import unit_findings
 from cdtool.formats.source import Column, Source, find_key, wanted_keys
 
 # What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
@@ -44,7 +45,10 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     joined = {item.channel: _joined(source, item) for item in channels.sources}
     sources = tuple(replace(item, columns=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
-    return replace(source, columns=joined, names=names), replace(channels, sources=sources, topics=True)
+    # What each column says of its unit: the joined ones have none.
+    findings = (*source.findings, *unit_findings(source, channels))
+    source = replace(source, columns=joined, names=names, findings=findings)
+    return source, replace(channels, sources=sources, topics=True)
 
 
 def _joined(source: Source, item: ChannelSource) -> Column:
@@ -61,4 +65,4 @@ def _joined(source: Source, item: ChannelSource) -> Column:
                 f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
                 "the joints of one channel are logged together",
             )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time, parts[0].unit)
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,16 +12,19 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.arrow_check import check_batches
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.groups import Group, Written, clock_of, one_table, stored
 from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
+from cdtool.formats.parquet_check import check_pages
+from cdtool.formats.pieces import VALUES_A_PIECE, Piece, Pieces, joined
 from cdtool.formats.source import Column, Source, split_unit
 from cdtool.recording import Finding, FloatArray
 
 _PARQUET, _ARROW = b"PAR1", b"ARROW1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
-_OWN_CLOCKS = b"cdtool.own_clocks"
-_ROW_GROUP = 2**20
+# In the metadata of a table that cdtool wrote from several clocks.
+OWN_CLOCKS = b"cdtool.own_clocks"
+_FEWEST_ROWS = 2**12
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,13 @@ class Parquet:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        return joined(self._read(path, wanted, None), sort=False)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
+        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        return self._read(path, None, keys)
+
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet", path)
         if not self.sniff(path):
             raise RecordingError(f"{path}: is no Parquet or Feather file", "see cdtool list formats")
@@ -47,7 +56,7 @@ class Parquet:
         with one_line_errors(path, "a Parquet or Feather file"):
             table = _Table(path, arrow, findings)
             names = tuple(table.schema.names)
-            keys = asked_keys(path, wanted, names)
+            keys = [key for key in asked_keys(path, wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
             findings += [left_out(key, str(table.schema.field(key).type)) for key in keys if key not in read]
             lost = [key for key in keys if key not in read]
@@ -55,28 +64,30 @@ class Parquet:
                 raise RecordingError(f"{path}: column '{lost[0]}' holds no numbers", "name another column")
             if not read:
                 raise RecordingError(f"{path}: holds no column of numbers", "see cdtool info")
-            columns = dict(table.columns(read))
+            yield from table.pieces(read)
         details = {"rows": str(table.rows), "container": table.kind}
-        return Source(path, self.name, columns, table.origin, tuple(findings), details, names)
+        found = tuple(dict.fromkeys(findings))
+        return Source(path, self.name, table.headers(read), table.origin, found, details, names)
 
 
 class _Table:
-    """A file's schema and columns, whichever of the two containers it is."""
+    """A file's schema and rows, whichever of the two containers it is; `rows` holds once they were read."""
 
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
+        self.rows = 0
         with path.open("rb") as file:
             self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
         if self.kind == "parquet":
-            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(path, memory_map=True)
-            self.schema, self.rows = self._file.schema_arrow, self._file.metadata.num_rows
+            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(path)
+            self.schema, self._batches = self._file.schema_arrow, self._of_parquet
         else:
-            self._file = None
-            self._table = self._feather()
-            self.schema, self.rows = self._table.schema, self._table.num_rows
+            self._file = _Feather(path, arrow, findings)
+            self.schema, self._batches = self._file.schema, self._file.batches
         metadata = self.schema.metadata or {}
-        self.own_clocks = metadata.get(_OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
+        self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
         self.origin = float(metadata.get(b"cdtool.origin_s", b"0")) if self.own_clocks else 0.0
+        self._starts: dict[str, Any] = {}  # of columns of time stamps
 
     def is_number(self, key: str) -> bool:
         """True for numbers, booleans and time stamps."""
@@ -85,36 +96,49 @@ class _Table:
             types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
         )
 
-    def columns(self, keys: Sequence[str]) -> Iterator[tuple[str, Column]]:
-        """The columns one by one, so that no more than one is there twice."""
-        check_size(self.path, self.rows * len(keys))
-        time = self._read(OWN_CLOCK)[0] if self.own_clocks else None
-        for key in keys:
-            if time is not None and key == OWN_CLOCK:
+    def headers(self, keys: Sequence[str]) -> dict[str, Column]:
+        """The columns without their rows."""
+        own = np.empty(0) if self.own_clocks else None
+        kept = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
+        return {key: Column(key, np.empty(0), own, self._unit(key)) for key in kept}
+
+    def pieces(self, keys: Sequence[str]) -> Iterator[Piece]:
+        """The rows of these columns, a group of rows at a time."""
+        read = list(dict.fromkeys((*keys, OWN_CLOCK) if self.own_clocks else keys))
+        for batch in self._batches(read):
+            self.rows += batch.num_rows
+            check_size(self.path, self.rows * len(keys))
+            found = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in read}
+            if not self.own_clocks:
+                yield Piece("", None, {key: values for key, (values, _) in found.items()}, batch.num_rows)
                 continue
-            values, absent = self._read(key)
-            unit = self._unit(key)
-            if time is None:
-                yield key, Column(key, values, unit=unit)
-            else:  # written by cdtool from several clocks: no value (null) means no sample of this column then
-                yield key, Column(key, values[~absent], time[~absent], unit)
+            time, _ = found.pop(OWN_CLOCK)
+            for key, (values, absent) in found.items():
+                # Written by cdtool from several clocks: no value (null) means no sample of this column then.
+                yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
 
-    def _read(self, key: str) -> tuple[FloatArray, Any]:
-        column = self._file.read(columns=[key]).column(0) if self._file is not None else self._table.column(key)
+    def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
+        check_size(self.path, self._file.metadata.num_rows * len(keys))
+        check_pages(self.path, self._file.metadata, keys)
+        return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_A_PIECE // len(keys)), columns=list(keys)))
+
+    def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
+        """Values, and which of them are absent (null)."""
+        absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
         if self.arrow.types.is_timestamp(column.type):
-            return self._seconds(key, column)
-        absent = np.asarray(column.is_null().to_numpy())
+            return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
         values = column.cast(self.arrow.float64(), safe=False) if absent.any() else column
-        return as_numbers(key, values.to_numpy(), self.findings), absent
+        return as_numbers(key, values.to_numpy(zero_copy_only=False), self.findings), absent
 
-    def _seconds(self, key: str, column: Any) -> tuple[FloatArray, Any]:
+    def _seconds(self, key: str, stamps: Any) -> tuple[FloatArray, Any]:
         """A time stamp as seconds from the first: what float64 can hold exactly."""
-        stamps = column.to_numpy().astype("datetime64[ns]")
         absent = np.isnat(stamps)
-        first = stamps[~absent][0] if not absent.all() else np.datetime64(0, "ns")
-        seconds = (stamps - first).astype(np.int64) / 1e9
+        if key not in self._starts and not absent.all():
+            self._starts[key] = stamps[~absent][0]
+            text = f"time stamps: taken as seconds from {self._starts[key]}"
+            self.findings.append(Finding(text, key, "note"))
+        seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
         seconds[absent] = np.nan
-        self.findings.append(Finding(f"time stamps: taken as seconds from {first}", key, "note"))
         return seconds, absent
 
     def _unit(self, key: str) -> str | None:
@@ -124,64 +148,43 @@ class _Table:
         told = next((metadata[name].decode("utf-8", "replace") for name in _UNIT_KEYS if name in metadata), None)
         return told or split_unit(key)[1]
 
-    def _feather(self) -> Any:
-        """The whole record batches of an Arrow file; of one that is cut off those before the cut."""
-        ipc = library("pyarrow.ipc", "parquet", self.path)
+
+class _Feather:
+    """An Arrow file by its record batches; of one that is cut off those before the cut."""
+
+    def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
+        self._path, self._arrow, self._findings = path, arrow, findings
+        self._ipc = library("pyarrow.ipc", "parquet", path)
+        check_batches(path)
         try:
-            with self.arrow.memory_map(str(self.path)) as file:
-                table = ipc.open_file(file).read_all()
-        except self.arrow.ArrowInvalid:
-            with self.path.open("rb") as stream:
-                stream.seek(8)  # behind the magic bytes and their padding an Arrow file is a stream
-                batches: list[Any] = []
-                reader = ipc.open_stream(stream)
-                with suppress(self.arrow.ArrowInvalid, OSError, StopIteration):
-                    while True:
-                        batches.append(reader.read_next_batch())
-                rows = sum(batch.num_rows for batch in batches)
-                text = f"the file is cut off or damaged behind row {rows}: what came after is lost"
-                self.findings.append(Finding(text, severity="loss"))
-                table = self.arrow.Table.from_batches(batches, reader.schema)
-        table.validate(full=True)  # Arrow trusts what a file declares unless it is asked to check
-        return table
+            self._whole = self._ipc.open_file(str(path))
+            self.schema = self._whole.schema
+        except arrow.ArrowInvalid:
+            self._whole = None
+            with path.open("rb") as stream:
+                self.schema = self._stream(stream).schema
 
+    def batches(self, keys: Sequence[str]) -> Iterator[Any]:
+        """The columns `keys`, batch by batch; Arrow trusts what a file declares unless it is asked to check."""
+        for batch in self._read() if self._whole is None else map(self._whole.get_batch, self._numbers()):
+            batch.validate(full=True)
+            yield batch.select(list(keys))
 
-def write_table(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
-    """Write one table: of several clocks the union of their times, without a value where a clock has no sample."""
-    arrow = library("pyarrow", "parquet", path)
-    own = len(groups) > 1
-    if own:
-        time = np.unique(np.concatenate([clock_of(path, group) for group in groups]))
-    else:
-        group = one_table(path, groups)
-        time = np.empty(0) if group.time is None or group.is_table else group.time
-    fields, arrays, names = [], [], []
-    if len(time):
-        fields.append(arrow.field(OWN_CLOCK, arrow.float64(), metadata={"unit": "s"}))
-        arrays.append(arrow.array(time))
-    for group in groups:
-        names.append([[part.name for part in parts] for parts in group.flat])
-        rows = np.searchsorted(time, clock_of(path, group)) if own else None
-        for column in chain(*group.flat):
-            fields.append(
-                arrow.field(column.name, arrow.float64(), metadata={"unit": column.unit} if column.unit else None)
-            )
-            arrays.append(_spread(arrow, column.values, rows, len(time)))
-    metadata = stored(provenance) | ({_OWN_CLOCKS.decode(): "1"} if own else {})
-    table = arrow.Table.from_arrays(arrays, schema=arrow.schema(fields, metadata=metadata))
-    if path.suffix == ".parquet":
-        library("pyarrow.parquet", "parquet", path).write_table(
-            table, path, row_group_size=_ROW_GROUP, compression="zstd"
-        )
-    else:
-        library("pyarrow.feather", "parquet", path).write_feather(table, str(path), compression="zstd")
-    return names
+    def _numbers(self) -> range:
+        return range(self._whole.num_record_batches)
 
+    def _read(self) -> Iterator[Any]:
+        """What lies before a cut."""
+        rows = 0
+        with self._path.open("rb") as stream, suppress(self._arrow.ArrowInvalid, OSError, StopIteration):
+            reader = self._stream(stream)
+            while True:
+                batch = reader.read_next_batch()
+                rows += batch.num_rows
+                yield batch
+        text = f"the file is cut off or damaged behind row {rows}: what came after is lost"
+        self._findings.append(Finding(text, severity="loss"))
 
-def _spread(arrow: Any, values: FloatArray, rows: Any, count: int) -> Any:
-    """Values as they are, or at their rows of a longer table, null elsewhere."""
-    if rows is None:
-        return arrow.array(values)
-    spread, absent = np.zeros(count), np.ones(count, dtype=bool)
-    spread[rows], absent[rows] = values, False
-    return arrow.array(spread, mask=absent)
+    def _stream(self, stream: Any) -> Any:
+        stream.seek(8)  # behind the magic bytes and their padding an Arrow file is a stream
+        return self._ipc.open_stream(stream)

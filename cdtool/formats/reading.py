@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
+import codecs
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
-import numpy as np
-
-from cdtool.channels import ChannelMap
+from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
 from cdtool.formats import FORMATS
 from cdtool.formats.channel_assembly import as_logged, assemble
+from cdtool.formats.csv.text import read_sample
 from cdtool.formats.own_clocks import with_own_clocks
-from cdtool.formats.source import Format, Source
+from cdtool.formats.parts import joined_recordings, joined_sources, lost_parts
+from cdtool.formats.source import Format, Source, is_absent
 from cdtool.machine_file import MachineFile
-from cdtool.recording import Recording, Series
+from cdtool.recording import GROUND_TRUTH, Finding, Recording
 
+# How a note about ground truth begins that is mapped and not in a log.
+ABSENT = "is not in this log"
 _KNOWN_CONTENTS = {
     b"\x89PNG": "a PNG image",
     b"\xff\xd8\xff": "a JPEG image",
@@ -31,6 +34,18 @@ _KNOWN_CONTENTS = {
     b"<": "HTML or XML",
     b"{": "JSON",
     b"[": "JSON",
+}
+_NEXT_STEPS = {
+    "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
+    "gzip-compressed": "unpack it first, e.g. with gunzip",
+    "zstd-compressed": "unpack it first, e.g. with unzstd",
+}
+# UTF-32 first: its mark begins with that of UTF-16.
+_WIDE = {
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
 }
 
 
@@ -49,19 +64,24 @@ def choose_format(path: Path) -> Format:
     for item in [*by_suffix, *formats]:
         if item.sniff(path) and not (claimed and item.name == "csv" and not _is_table(item, path)):
             return item
-    start = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise RecordingError(f"{path}: is written in UTF-16", "save it as UTF-8")
+    wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
+    start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
     seen = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+    if wide and not seen and _is_damaged_text(path, wide):
+        raise RecordingError(
+            f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it anew from where it was made"
+        )
     expected = f", nor a whole {by_suffix[0].name.upper()} file" if by_suffix and not seen else ""
     raise RecordingError(
         f"{path}: is not a recording{f': it is {seen}' if seen else expected}",
-        f"cdtool reads {', '.join(item.name for item in formats)}",
+        _NEXT_STEPS.get(seen, f"cdtool reads {', '.join(item.name for item in formats)}"),
     )
 
 
 def survey(path: Path) -> Source:
-    """All numeric columns of a file, with what is odd about it; raises RecordingError."""
+    """All numeric columns of a file, or of the folder that rosbag2 made, and what is odd; raises RecordingError."""
+    if path.is_dir():
+        return joined_sources(path, [choose_format(part).columns(part) for part in log_parts(path)])
     return choose_format(path).columns(path)
 
 
@@ -71,7 +91,9 @@ def read_recording(path: Path, machine_file: MachineFile) -> Recording:
     A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts.
     """
     if path.is_dir():
-        return replace(read_parts(log_parts(path), machine_file, path.name), source=str(path))
+        parts = log_parts(path)
+        recording = read_parts(parts, machine_file, path.name)
+        return replace(recording, source=str(path), findings=(*lost_parts(path, parts), *recording.findings))
     source, channels = mapped_source(path, machine_file)
     return assemble(source, channels, machine_file.machine)
 
@@ -81,15 +103,25 @@ def log_parts(path: Path) -> list[Path]:
     for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
         if parts := sorted(path.glob(pattern)):
             return parts
+    if path.is_dir() and (lost := lost_parts(path, [])):
+        raise RecordingError(f"{path}: {lost[0]}", "copy the whole folder that rosbag2 made")
     _head(path)
     return [path]
 
 
 def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
-    """One file's columns that the machine file maps, and the map that fits them; raises RecordingError."""
+    """One file's columns that the machine file maps, and the map that fits them; raises RecordingError.
+
+    A load cell or label that is mapped and not in the file is left out of the map, with a note.
+    """
     found = choose_format(path)
     channels = _map(found, machine_file, path)
-    return with_own_clocks(found.columns(path, channels), channels)
+    source, held = _held(found.columns(path, channels), channels)
+    if found.name == "mcap":
+        from cdtool.formats.mcap_writing import with_exact_times
+
+        source = with_exact_times(found, source, held)
+    return with_own_clocks(source, held)
 
 
 def has_topics(found: Format) -> bool:
@@ -107,41 +139,8 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> R
         source, channels = mapped_source(path, machine_file)
         low_pass = channels.speed_low_pass
         parts.append(as_logged(source, channels, machine_file.machine))
-    parts.sort(key=lambda part: part.origin + part.start)
-    recording: Recording = machine_file.machine.referred_to_load(_joined(parts, name), low_pass)
+    recording: Recording = machine_file.machine.referred_to_load(joined_recordings(parts, name), low_pass)
     return recording
-
-
-def _joined(parts: Sequence[Recording], name: str) -> Recording:
-    first = parts[0]
-    joined: dict[str, Series] = {}
-    for channel in first.channels:
-        pieces: list[Series] = []
-        for part in parts:
-            if channel not in part or part[channel].unit != first[channel].unit:
-                raise RecordingError(
-                    f"{part.source}: channel '{channel}' is not logged as in {first.source}",
-                    "parts of one log are alike",
-                )
-            shift = part.origin - first.origin
-            series = part[channel]
-            if pieces and series.time[0] + shift <= pieces[-1].time[-1]:
-                raise RecordingError(
-                    f"{part.source}: overlaps the part before it ({channel}: starts at {series.time[0] + shift:g} s, "
-                    f"before {pieces[-1].time[-1]:g} s)",
-                    "parts of one log share one clock and follow one another",
-                )
-            pieces.append(Series(series.time + shift, series.values, series.unit))
-        time = np.concatenate([piece.time for piece in pieces])
-        joined[channel] = Series(time, np.concatenate([piece.values for piece in pieces]), pieces[0].unit)
-    findings = tuple(
-        replace(found, message=f"{Path(part.source).name}: {found.message}")
-        for part in parts
-        for found in part.findings
-    )
-    digest = hashlib.sha256("".join(part.digest for part in parts).encode()).hexdigest()
-    source = ", ".join(part.source for part in parts)
-    return Recording(name, source, first.joints, joined, first.origin, findings, digest)
 
 
 def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
@@ -156,6 +155,30 @@ def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
     return channels
 
 
+def _held(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """The map without the ground truth that a file does not hold, which is noted."""
+    names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
+    absent = [
+        item
+        for item in channels.sources
+        if item.channel in GROUND_TRUTH
+        and any(is_absent(column, names) for column in ((item.described,) if channels.topics else item.columns))
+    ]
+    if not absent:
+        return source, channels
+    what = "topic" if channels.topics else "column"
+    told = [
+        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
+    ]
+    kept = tuple(item for item in channels.sources if item not in absent)
+    return replace(source, findings=(*source.findings, *told)), replace(channels, sources=kept)
+
+
+def _meant(item: ChannelSource, names: Sequence[str]) -> str:
+    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
 def _is_table(found: Format, path: Path) -> bool:
     try:
         return bool(found.columns(path).columns)
@@ -165,6 +188,14 @@ def _is_table(found: Format, path: Path) -> bool:
 
 def _suffixes() -> set[str]:
     return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
+
+
+def _is_damaged_text(path: Path, encoding: str) -> bool:
+    try:
+        codecs.getincrementaldecoder(encoding)().decode(read_sample(path))
+    except UnicodeError:
+        return True
+    return False
 
 
 def _head(path: Path) -> bytes:

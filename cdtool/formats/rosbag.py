@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
-from cdtool.errors import RecordingError, nearest
+from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container.definitions import Stream
@@ -18,12 +18,14 @@ from cdtool.formats.mcap.container.records import Channel, Schema
 from cdtool.formats.mcap.fields import parse_field
 from cdtool.formats.mcap.gathering import Gathering
 from cdtool.formats.mcap.topic_survey import TopicSurvey
-from cdtool.formats.source import Column, Source
+from cdtool.formats.pieces import Piece, Pieces, joined
+from cdtool.formats.source import Column, Source, with_topics
 from cdtool.recording import Finding
 
 _BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
 _FIRST_PAGE = 2**16  # the largest that SQLite has; its tables are named there
-_MESSAGES = 4096
+# What is handed on at once: so many messages of one topic, or bytes of all.
+_MESSAGES, _BYTES = 4096, 1 << 23
 # A batch's payloads stand behind the header that a message has in an MCAP file: publish time last.
 _HEADER = 22
 
@@ -44,13 +46,15 @@ class Rosbag:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
-        library("rosbags", "rosbag", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is no ROS bag", "see cdtool list formats")
-        bag = _Bag(path)
-        columns, findings = bag.survey() if wanted is None else bag.wanted(wanted)
-        details = {topic: f"{kind}, {count} messages" for topic, (kind, count) in bag.topics.items()}
-        return Source(path, self.name, columns, bag.origin / 1e9, tuple(findings), details, tuple(columns))
+        if wanted is None:
+            return joined(self.pieces(path), sort=True)
+        bag = self._bag(path)
+        return bag.source(*bag.wanted(wanted))
+
+    def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
+        """All numeric fields, some thousand messages of a topic at a time; raises RecordingError."""
+        bag = self._bag(path)
+        return bag.source(*(yield from bag.pieces()))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """The `name` list of a topic's first message; empty where it has none."""
@@ -63,6 +67,12 @@ class Rosbag:
                 return tuple(map(str, names)) if isinstance(names, list) else ()
         return ()
 
+    def _bag(self, path: Path) -> _Bag:
+        library("rosbags", "rosbag", path)
+        if not self.sniff(path):
+            raise RecordingError(f"{path}: is no ROS bag", "see cdtool list formats")
+        return _Bag(path)
+
 
 @dataclass
 class _Bag:
@@ -74,14 +84,20 @@ class _Bag:
     _read: dict[str, int] = field(default_factory=dict)
     _end: str = ""
 
-    def survey(self) -> tuple[dict[str, Column], list[Finding]]:
-        """Every numeric field."""
+    def source(self, columns: dict[str, Column], findings: list[Finding]) -> Source:
+        """The bag's columns with all that is known of it."""
+        details = {topic: f"{kind}, {count} messages" for topic, (kind, count) in self.topics.items()}
+        name = Rosbag.name
+        return Source(self.path, name, columns, self.origin / 1e9, tuple(findings), details, tuple(columns))
+
+    def pieces(self) -> Generator[Piece, None, tuple[dict[str, Column], list[Finding]]]:
+        """Every numeric field; at their end the columns, without rows, and what is odd."""
         topics: dict[str, TopicSurvey] = {}
         for stream, batch in self._batches(lambda _: True):
             name = stream.channel.topic
-            topics.setdefault(name, TopicSurvey(name, self.topics[name][1])).add(stream, batch)
+            yield from topics.setdefault(name, TopicSurvey(name)).pieces(stream, batch, self.origin)
         columns, findings = {}, self._losses()
-        for item in (item for topic in topics.values() for item in topic.found(self.origin)):
+        for item in (item for topic in topics.values() for item in topic.found()):
             if isinstance(item, Finding):
                 findings.append(item)
             else:
@@ -98,15 +114,12 @@ class _Bag:
         for name, texts in fields.items():
             where = f"{self.path}: {name}"
             parsed = [parse_field(text, where) for text in texts]
-            topics[name] = Gathering(where, name, parsed, wanted.time.clock, wanted.joints)
+            topics[name] = Gathering(where, name, parsed, wanted.time.clock, wanted.joint_names)
         for stream, batch in self._batches(fields.__contains__):
             topics[stream.channel.topic].add(stream, batch)
-        known = [name for name, (_, count) in self.topics.items() if count]
+        held = with_topics(self.path, wanted, [name for name, (_, count) in self.topics.items() if count])
+        topics = {name: topics[name] for name in dict.fromkeys(source.topic for source in held.sources)}
         columns, findings = {}, self._losses()
-        for source in wanted.sources:
-            if source.topic not in known:
-                text = f"{self.path}: no message of topic '{source.topic}' (channel '{source.channel}')"
-                raise RecordingError(text, nearest(source.topic, known))
         for name, topic in topics.items():
             if not topic.decoders.decoded:
                 text = f"{self.path}: no message of {name} can be decoded: {topic.decoders.reason}"
@@ -114,15 +127,15 @@ class _Bag:
             findings += topic.decoders.failure(name)
         if wanted.time.clock != "log":
             self.origin = min(topic.first_stamp or 0 for topic in topics.values())
-        for name, texts in fields.items():
-            for i in range(len(texts)):
-                column, found = topics[name].column(i, self.origin)
+        for name, topic in topics.items():
+            for i in range(len(fields[name])):
+                column, found = topic.column(i, self.origin)
                 columns[column.name] = column
                 findings += found
         return columns, findings
 
     def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[Stream, Batch]]:
-        """The messages of the topics that are asked for, some thousand of one topic at a time."""
+        """The messages of the topics that are asked for, batch by batch."""
         from rosbags.highlevel import AnyReader
 
         with one_line_errors(self.path, "a ROS bag"):
@@ -136,13 +149,15 @@ class _Bag:
                     self.topics[connection.topic] = (connection.msgtype, count)
                 self.origin = int(reader.start_time) if reader.message_count else 0
             kept: dict[int, list[tuple[int, bytes]]] = {}
+            size = 0
             for connection, time, raw in self._messages(reader, [c for c in reader.connections if asked(c.topic)]):
                 rows = kept.setdefault(connection.id, [])
                 rows.append((time, raw))
-                if len(rows) == _MESSAGES:
-                    yield streams[connection.id], _batch(kept.pop(connection.id))
-            for number, rows in kept.items():
-                yield streams[number], _batch(rows)
+                size += len(raw)
+                if len(rows) == _MESSAGES or size > _BYTES:  # all topics, so that none falls behind
+                    yield from ((streams[number], _batch(some)) for number, some in kept.items())
+                    kept, size = {}, 0
+            yield from ((streams[number], _batch(rows)) for number, rows in kept.items())
         finally:
             reader.close()
 

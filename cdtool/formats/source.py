@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Protocol
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError, nearest
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import GROUND_TRUTH, Finding, FloatArray
 
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
@@ -84,11 +84,19 @@ def column_key(column: str | int, names: Sequence[str]) -> str | None:
 
 
 def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[str]:
-    """The names of the columns that a channel map asks for, each once, in the file's order; raises RecordingError."""
+    """The names of the columns that a channel map asks for, each once, in the file's order; raises RecordingError.
+
+    Ground truth may be absent: the load cell is fitted for impact tests only.
+    """
     asked: list[tuple[str, str | int]] = []
     if wanted.time.column is not None:
         asked.append(("time", wanted.time.column))
-    asked += [(source.channel, column) for source in wanted.sources for column in source.columns]
+    asked += [
+        (source.channel, column)
+        for source in wanted.sources
+        for column in source.columns
+        if not (source.channel in GROUND_TRUTH and is_absent(column, names))
+    ]
     keys = {find_key(path, channel, column, names) for channel, column in asked}
     return [name for name in names if name in keys]
 
@@ -103,10 +111,31 @@ def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) 
             f"{path}: no column {column} (channel '{channel}')",
             f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
         )
-    same = [str(i) for i, name in enumerate(names) if column in (name.partition("#")[0], split_unit(name)[0])]
+    same = _alike(column, names)
     if len(same) > 1:
         raise RecordingError(
             f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
             f"give its number instead: {' or '.join(same)}",
         )
     raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names))
+
+
+def is_absent(column: str | int, names: Sequence[str]) -> bool:
+    """True where no column has that name or number; one that is there several times is not absent."""
+    return column_key(column, names) is None and (isinstance(column, int) or not _alike(column, names))
+
+
+def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> ChannelMap:
+    """The map without the ground truth that no message of a log holds; raises RecordingError for any other channel."""
+    held = tuple(item for item in wanted.sources if item.topic in known or item.channel not in GROUND_TRUTH)
+    for item in held:
+        if item.topic not in known:
+            raise RecordingError(
+                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
+            )
+    return replace(wanted, sources=held)
+
+
+def _alike(column: str, names: Sequence[str]) -> list[str]:
+    """The numbers of the columns of one name, whatever their units."""
+    return [str(i) for i, name in enumerate(names) if column in (name.partition("#")[0], split_unit(name)[0])]

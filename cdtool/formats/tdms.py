@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,8 +14,10 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.groups import Group, Written, stored
+from cdtool.formats.groups import Group, Part, Parts, Written, stored
 from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
+from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
@@ -42,13 +44,20 @@ class Tdms:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        return joined(self._read(path, wanted, None), sort=False)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
+        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        return self._read(path, None, keys)
+
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)
         if not self.sniff(path):
             raise RecordingError(f"{path}: is no TDMS file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "a TDMS file"), nptdms.TdmsFile.open(path) as file:
             channels = _channels(file, findings)
-            keys = asked_keys(path, wanted, tuple(channels))
+            keys = [key for key in asked_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
                 raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
             check_size(path, sum(len(channels[key]) for key in keys))
@@ -56,9 +65,11 @@ class Tdms:
                 text = "the last segment is not complete: what it lacks is lost"
                 findings.append(Finding(text, severity="loss"))
             origin = _origin(file, [channels[key] for key in keys])
-            columns = {key: _column(key, channels[key], channels, origin, findings) for key in keys}
+            columns = [_Channel(key, channels[key], channels, findings).sliced(origin) for key in keys]
+            yield from side_by_side(columns)
             details = {key: str(value)[:80] for key, value in file.properties.items()}
-        return Source(path, self.name, columns, origin, tuple(findings), details, tuple(channels))
+        headers = {column.name: header_of(column) for column in columns}
+        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
 
 
 def _channels(file: Any, findings: list[Finding]) -> dict[str, Any]:
@@ -95,57 +106,95 @@ def _start(channel: Any) -> float | None:
     return float(seconds) if seconds > 0 else None
 
 
-def _column(key: str, channel: Any, channels: Mapping[str, Any], origin: float, findings: list[Finding]) -> Column:
-    values = as_numbers(key, channel[:], findings)
-    if len(values) < len(channel):
-        text = f"{len(channel) - len(values)} of {len(channel)} values are missing"
-        findings.append(Finding(text, key, "loss"))
-    return Column(key, values, _clock(channel, len(values), channels, origin), _unit(channel))
+@dataclass(frozen=True)
+class _Channel:
+    """A channel of an open file, and those that may be its clock."""
 
+    key: str
+    channel: Any
+    channels: Mapping[str, Any]
+    findings: list[Finding]
 
-def _clock(channel: Any, count: int, channels: Mapping[str, Any], origin: float) -> FloatArray | None:
-    step = channel.properties.get("wf_increment")
-    if isinstance(step, float) and step > 0.0:
-        offset = float(channel.properties.get("wf_start_offset", 0.0))
-        start = _start(channel)
+    def sliced(self, origin: float) -> Sliced:
+        """The channel as a column, with a clock where the file knows it."""
+        channel, count = self.channel, len(self.channel)
+        step = channel.properties.get("wf_increment")
+        if isinstance(step, float) and step > 0.0:
+            first = self._first(origin)
+
+            def by_step(start: int, end: int) -> FloatArray:
+                return first + np.arange(start, end, dtype=np.float64) * step
+
+            return Sliced(self.key, count, self._values, f"{first!r} {step!r} {count}", by_step, _unit(channel))
+        clock, factor = self._clock()
+        if clock is None:
+            return Sliced(self.key, count, self._values, unit=_unit(channel))
+
+        def by_clock(start: int, end: int) -> FloatArray:
+            times = as_numbers(clock.name, clock[start:end], [])
+            return times if factor == 1.0 else times * factor
+
+        return Sliced(self.key, count, self._values, f"{clock.path} {count}", by_clock, _unit(channel))
+
+    def _values(self, start: int, end: int) -> FloatArray:
+        values = as_numbers(self.key, self.channel[start:end], self.findings)
+        if len(values) == end - start:
+            return values
+        text = f"{end - start - len(values)} values from number {start + len(values)} on are missing"
+        self.findings.append(Finding(text, self.key, "loss"))
+        return np.pad(values, (0, end - start - len(values)), constant_values=np.nan)
+
+    def _first(self, origin: float) -> float:
+        """Time [s] of a waveform's first sample."""
+        start = _start(self.channel)
         later = start - origin if start is not None and origin else 0.0
-        time: FloatArray = later + offset + np.arange(count, dtype=np.float64) * step
-        return time
-    for clock in channels.values():
-        beside = clock.group_name == channel.group_name and clock.name in _CLOCK_NAMES and clock is not channel
-        unit = find_unit(_unit(clock) or "?") if beside and channel.name not in _CLOCK_NAMES else None
-        if unit is not None and unit.si == "s" and len(clock) >= count:
-            values = as_numbers(clock.name, clock[:count], [])
-            return values if unit.factor == 1.0 else values * unit.factor
-    return None
+        return later + float(self.channel.properties.get("wf_start_offset", 0.0))
+
+    def _clock(self) -> tuple[Any, float]:
+        """The channel of times that stands beside it, and its factor to seconds; None where there is none."""
+        for clock in self.channels.values():
+            beside = clock.group_name == self.channel.group_name and clock.name in _CLOCK_NAMES
+            if not beside or clock is self.channel or self.channel.name in _CLOCK_NAMES:
+                continue
+            unit = find_unit(_unit(clock) or "?")
+            if unit is not None and unit.si == "s" and len(clock) >= len(self.channel):
+                return clock, unit.factor
+        return None, 1.0
 
 
 def _unit(channel: Any) -> str | None:
     return next((str(channel.properties[key]) for key in _UNIT_KEYS if channel.properties.get(key)), None)
 
 
-def write_tdms(path: Path, groups: Sequence[Group], provenance: Mapping[str, str]) -> Written:
-    """Write a channel a column with its unit, a group a clock, each with its `time`."""
+def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
+    """Write a channel a column with its unit, a group a clock, each with its `time`; a segment for each part."""
     nptdms = library("nptdms", "tdms", path)
-    names: Written = []
     many = len(groups) > 1
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with nptdms.TdmsWriter(str(path)) as writer:
-        root = nptdms.RootObject(properties=stored(provenance))
-        for group in groups:
-            columns = list(chain(*group.flat))
-            if group.time is not None and not group.is_table:
-                columns.insert(0, Column(OWN_CLOCK, group.time, unit="s"))
-            writer.write_segment([root, nptdms.GroupObject(group.name), *(_object(nptdms, group, c) for c in columns)])
-            names.append(
-                [
-                    [f"{group.name}/{part.name}" if many and shared[part.name] > 1 else part.name for part in parts]
-                    for parts in group.flat
-                ]
-            )
-    return names
+        objects = [nptdms.RootObject(properties=stored(provenance))]
+        objects += [nptdms.GroupObject(group.name) for group in groups]
+        writer.write_segment(objects)
+        for ready in parts:
+            filled = [item for group, part in zip(groups, ready, strict=True) for item in _filled(nptdms, group, part)]
+            writer.write_segment(filled)
+    return [
+        [
+            [f"{group.name}/{part.name}" if many and shared[part.name] > 1 else part.name for part in parts]
+            for parts in group.flat
+        ]
+        for group in groups
+    ]
 
 
-def _object(nptdms: Any, group: Group, column: Column) -> Any:
-    properties = {"unit_string": column.unit} if column.unit else {}
-    return nptdms.ChannelObject(group.name, column.name, np.ascontiguousarray(column.values), properties=properties)
+def _filled(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
+    """A group's channels with their next rows."""
+    if part is None:
+        return []
+    columns, values = list(chain(*group.flat)), part.flat
+    if group.own_clock and part.time is not None:
+        columns, values = [Column(OWN_CLOCK, part.time, unit="s"), *columns], [part.time, *values]
+    return [
+        nptdms.ChannelObject(group.name, column.name, item, {"unit_string": column.unit} if column.unit else {})
+        for column, item in zip(columns, values, strict=True)
+    ]

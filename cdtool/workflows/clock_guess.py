@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.clock import clean_time, gap_findings
+from cdtool.formats.distribution import Distribution
 from cdtool.formats.source import Column, Source
-from cdtool.recording import Finding, FloatArray, Series
+from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
+from cdtool.workflows.clean_pieces import CleanPieces, gaps_in
+from cdtool.workflows.log_figures import ClockFigures, ColumnFigures
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # Median step -> unit: log rates of 2 Hz to 2 MHz in each of them.
@@ -24,6 +27,13 @@ _DAY = 86400.0
 _FORWARD, _REGULAR = 0.95, 0.8
 
 
+# Stamps of a clock that are kept rather than read again: 32 MiB.
+_KEPT = 1 << 22
+
+# The pieces of a column's values, from the first again with each call.
+Reread = Callable[[str], Iterable[FloatArray]]
+
+
 @dataclass(frozen=True)
 class GuessedClock:
     """The column taken for the clock, its times [s], and what is odd about them."""
@@ -33,29 +43,76 @@ class GuessedClock:
     findings: tuple[Finding, ...]
 
 
+@dataclass(frozen=True)
+class TableClock:
+    """The column of a table taken for its clock: how its stamps become seconds, its figures, what is odd about it."""
+
+    column: str
+    origin: float
+    factor: float
+    figures: ClockFigures
+    findings: tuple[Finding, ...]
+
+    def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
+        """The stamps' pieces as times [s] that strictly increase; as long as the pieces where nothing is dropped."""
+        clean = CleanPieces()
+        return (clean.times((piece - self.origin) * self.factor, piece) for piece in stamps)
+
+
 def guess_clock(source: Source) -> GuessedClock | None:
-    """A table's clock by the name of a column, else by its steps; None where no column looks like one."""
+    """The clock of a table that is in memory; None where no column looks like one."""
+    figures: dict[str, ColumnFigures] = {}
+    for name, column in source.columns.items():
+        figures[name] = ColumnFigures()
+        figures[name].add(column.values, in_table=True)
+    found = find_clock(source, figures, lambda name: [source.columns[name].values])
+    if found is None:
+        return None
+    return GuessedClock(found.column, next(found.times([source.columns[found.column].values])), found.findings)
+
+
+def find_clock(source: Source, figures: Mapping[str, ColumnFigures], reread: Reread) -> TableClock | None:
+    """A table's clock by the name of a column, else by its steps; None where no column looks like one.
+
+    `source` may be without its rows: `figures` are those of its columns, and `reread` gives their values.
+    """
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
     # A counter may bear such a name beside the real clock: it comes last.
-    named = sorted((c for c in tables if _NAMES.match(c.name)), key=lambda c: bool(np.all(np.diff(c.values) == 1.0)))
-    for column in [*named, *tables]:
-        if _looks_like_a_clock(column.values):
-            return _described(column, source.first_row)
+    named = sorted((c for c in tables if _NAMES.match(c.name)), key=lambda c: figures[c.name].by_one)
+    for column in dict.fromkeys(column.name for column in (*named, *tables)):
+        known = figures[column]
+        if known.steps < 3 or known.forward < _FORWARD * known.steps:
+            continue
+        stamps = _stamps(column, known.present, reread)
+        step = _usual_step(stamps())
+        if step is not None:
+            return _described(source.columns[column], source.first_row, known.first, step, stamps)
     return None
 
 
-def _looks_like_a_clock(values: FloatArray) -> bool:
-    steps = np.diff(values[np.isfinite(values)])
-    if len(steps) < 3:
-        return False
-    median = float(np.median(steps))
-    near = np.abs(steps - median) <= 0.5 * median
-    return median > 0.0 and float(np.mean(steps >= 0.0)) >= _FORWARD and float(np.mean(near)) >= _REGULAR
+def _stamps(column: str, count: int, reread: Reread) -> Callable[[], Iterable[FloatArray]]:
+    """A column's pieces: few are kept, many are read again each time."""
+    if count > _KEPT:
+        return lambda: reread(column)
+    kept = [piece.copy() for piece in reread(column)]  # a piece of many columns is not kept for the sake of one
+    return lambda: kept
 
 
-def _described(column: Column, first_row: int) -> GuessedClock:
-    finite = column.values[np.isfinite(column.values)]
-    step, start = float(np.median(np.diff(finite))), float(finite[0])
+def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
+    """The median step between stamps, where a clock may have such steps."""
+    steps, last = Distribution(), np.empty(0)
+    for piece in stamps:
+        known = np.concatenate((last, piece[np.isfinite(piece)]))
+        steps.add(np.diff(known))
+        last = known[-1:]
+    median = steps.median
+    regular = median > 0.0 and steps.share(0.5 * median, 1.5 * median) >= _REGULAR
+    return median if regular else None
+
+
+def _described(
+    column: Column, first_row: int, start: float, step: float, stamps: Callable[[], Iterable[FloatArray]]
+) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
     epoch = next((name for low, high, name in _EPOCHS if low <= start < high), "")
     if known is not None and known.si == "s":
@@ -68,9 +125,17 @@ def _described(column: Column, first_row: int) -> GuessedClock:
         unit, why = next(name for most, name in _UNITS if step < most), f"from its steps of {step:.4g}"
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is taken off before scaling, so that no digit is lost.
-    stamps = column.values - start if epoch or unit == "days" else column.values
-    clean = clean_time(stamps * factor, first_row, "line" if first_row else "sample")
+    origin = start if epoch or unit == "days" else 0.0
     text = f"taken to be the clock, in {unit} ({why}); a machine file says it for sure"
-    series = Series(clean.time, np.zeros(len(clean.time)), "s")
-    findings = (Finding(text, column.name, "note"), *clean.findings, *gap_findings(series, column.name))
-    return GuessedClock(column.name, clean.time, findings)
+    clock = TableClock(column.name, origin, factor, ClockFigures(), (Finding(text, column.name, "note"),))
+    return _checked(clock, first_row, stamps)
+
+
+def _checked(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
+    """The clock with its figures and all that is odd about it."""
+    clean = CleanPieces()
+    for piece in stamps():
+        times = clean.times((piece - clock.origin) * clock.factor, piece)
+        clock.figures.add(times, len(times))
+    gaps = gaps_in(clock.times(stamps()), clock.figures.steps.median, clock.column)
+    return replace(clock, findings=(*clock.findings, *clean.findings(first_row), *gaps))

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.clock import integrate, previous_value
-from cdtool.detectors.base import of_joint
-from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.motion import motion_class
-from cdtool.operations import operations_of
-from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.recording import Finding, Recording, Series
 from cdtool.workflows.accelerometer_check import accelerometer_findings
-from cdtool.workflows.clock_guess import guess_clock
-from cdtool.workflows.runs import read_log
+from cdtool.workflows.motion_check import bandwidth_findings, motion_findings
 
-# Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
-# one correlates with the other's more than the second, have their columns mixed up.
-_OWN_FIT, _OTHER_FIT = 0.9, 0.99
+if TYPE_CHECKING:
+    from cdtool.formats.source import Column, Source
+    from cdtool.workflows.log_figures import ClockFigures, LogFigures
 
 
 @dataclass(frozen=True)
@@ -55,39 +52,83 @@ class Info:
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
-    """Survey a log; with a machine file also map it, cut it and check the accelerometer. Raises RecordingError."""
-    from cdtool.formats.csv import TableSource
-    from cdtool.formats.reading import choose_format, survey
+    """Survey a log, piece by piece; with a machine file map it instead, cut it and check the accelerometer.
 
-    machine_file = machine if isinstance(machine, MachineFile) or machine is None else read_machine_file(machine)
-    if machine_file is None or not machine_file.columns.sources or (found := choose_format(Path(log))).name != "csv":
-        source = survey(Path(log))
-    else:  # a table whose dialect is pinned may not be readable without the pins
-        source = found.columns(Path(log), machine_file.columns)
+    Then the mapped channels are held in memory. Raises RecordingError.
+    """
+    if machine is None:
+        return _survey(Path(log))
+    return _mapped(Path(log), machine if isinstance(machine, MachineFile) else read_machine_file(machine))
+
+
+def _survey(log: Path) -> Info:
+    from cdtool.formats.csv import TableSource
+    from cdtool.formats.part_pieces import in_time_order, log_pieces
+    from cdtool.workflows.clock_guess import find_clock
+    from cdtool.workflows.log_figures import LogFigures
+
+    figures = LogFigures(partial(log_pieces, log), in_time_order(log))
+    source = figures.source
+    clock = find_clock(source, figures.columns, figures.values_of)
+    channels = [_described(column, figures, clock.figures if clock else None) for column in source.columns.values()]
+    findings = [*source.findings, *(clock.findings if clock else ())]
+    findings += [
+        Finding(f"{channel.missing} of {channel.samples} values are missing (NaN)", channel.name)
+        for channel in channels
+        if channel.missing
+    ]
     dialect = source.dialect if isinstance(source, TableSource) else ""
-    if machine_file is None:
-        clock = guess_clock(source)
-        table_time = clock.time if clock else None
-        channels = [
-            _describe(name, column.unit or "", column.values, column.time if column.time is not None else table_time)
-            for name, column in source.columns.items()
-        ]
-        findings = [*source.findings, *(clock.findings if clock else ())]
-        findings += [
-            Finding(f"{channel.missing} of {channel.samples} values are missing (NaN)", channel.name)
-            for channel in channels
-            if channel.missing
-        ]
-        return Info(str(log), source.format, source.details, tuple(channels), tuple(findings), dialect)
-    recording = read_log(log, machine_file)
+    return Info(str(log), source.format, source.details, tuple(channels), tuple(findings), dialect)
+
+
+def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
+    """A column by its figures; those of a table are on the table's clock."""
+    known, samples = figures.columns[column.name], figures.rows(column.name)
+    clock = table_clock if column.time is None else figures.clocks[figures.clock_of[column.name]]
+    timed = clock is not None and clock.rows > 0
+    return ChannelInfo(
+        name=column.name,
+        unit=column.unit or "",
+        samples=samples,
+        missing=samples * math.prod(column.values.shape[1:]) - known.present,
+        rate_hz=clock.rate if clock else None,
+        start_s=clock.first if clock and timed else None,
+        duration_s=clock.last - clock.first if clock and timed else None,
+        minimum=known.minimum if known.present else None,
+        maximum=known.maximum if known.present else None,
+    )
+
+
+def _mapped(log: Path, machine_file: MachineFile) -> Info:
+    from cdtool.formats.csv import TableSource
+
+    told, recording = _read(log, machine_file)
     channels = [
-        _describe(_label(name, recording, j), series.unit, series.values[:, j], series.time)
+        _channel(_label(name, recording, j), series, j)
         for name, series in recording.channels.items()
         for j in range(series.joint_count)
     ]
-    findings = [*recording.findings, *_motion_findings(recording), *accelerometer_findings(recording)]
-    findings += _bandwidth_findings(recording, machine_file)
-    return Info(str(log), source.format, source.details, tuple(channels), tuple(dict.fromkeys(findings)), dialect)
+    findings = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording)]
+    findings += bandwidth_findings(recording, machine_file)
+    dialect = told.dialect if isinstance(told, TableSource) else ""
+    return Info(str(log), told.format, told.details, tuple(channels), tuple(dict.fromkeys(findings)), dialect)
+
+
+def _read(log: Path, machine_file: MachineFile) -> tuple[Source, Recording]:
+    """What the file itself tells, without its columns, and the recording; that of a log in parts too."""
+    from cdtool.formats.channel_assembly import assemble
+    from cdtool.formats.part_pieces import log_pieces
+    from cdtool.formats.pieces import Run
+    from cdtool.formats.reading import mapped_source, read_recording
+
+    if log.is_dir():
+        run = Run(log_pieces(log))
+        for _ in run:
+            pass
+        return run.source, read_recording(log, machine_file)
+    source, channel_map = mapped_source(log, machine_file)
+    recording: Recording = assemble(source, channel_map, machine_file.machine)
+    return replace(source, columns={}), recording
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:
@@ -95,110 +136,17 @@ def _label(name: str, recording: Recording, joint: int) -> str:
     return f"{name} [{recording.joints[joint]}]" if many else name
 
 
-def _describe(name: str, unit: str, values: FloatArray, time: FloatArray | None) -> ChannelInfo:
-    numbers = values.astype(np.float64).ravel()
-    present = numbers[np.isfinite(numbers)]
-    steps = np.diff(time) if time is not None and len(time) > 1 else np.empty(0)
-    period = float(np.median(steps)) if len(steps) else 0.0
+def _channel(name: str, series: Series, joint: int) -> ChannelInfo:
+    values, time = series.values[:, joint], series.time
+    present = values[np.isfinite(values)]
     return ChannelInfo(
         name=name,
-        unit=unit,
+        unit=series.unit,
         samples=len(values),
-        missing=len(numbers) - len(present),
-        rate_hz=1.0 / period if period > 0.0 else None,
-        start_s=float(time[0]) if time is not None and len(time) else None,
-        duration_s=float(time[-1] - time[0]) if time is not None and len(time) else None,
+        missing=len(values) - len(present),
+        rate_hz=1.0 / series.period if len(time) > 1 else None,
+        start_s=float(time[0]) if len(time) else None,
+        duration_s=float(time[-1] - time[0]) if len(time) else None,
         minimum=float(present.min()) if len(present) else None,
         maximum=float(present.max()) if len(present) else None,
     )
-
-
-def _motion_findings(recording: Recording) -> list[Finding]:
-    if "speed" not in recording:
-        return [Finding("neither speed nor position is mapped: no operation can be cut or classed", "speed", "note")]
-    motion = motion_class(recording)
-    if motion.direction == 0:
-        return [Finding("the axis does not move", "speed", "note")]
-    unit = recording["speed"].unit
-    try:
-        strokes = len(operations_of(recording, "motion"))
-    except CdtoolError:
-        strokes = 0
-    word = "forward" if motion.direction > 0 else "backward"
-    cut = f"{strokes} {'stroke' if strokes == 1 else 'strokes'} by motion"
-    text = f"{cut}; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
-    return [Finding(text, "speed", "note"), *_consistency(recording)]
-
-
-def _consistency(recording: Recording) -> list[Finding]:
-    """Does the mapped speed fit the derivative of the mapped position?"""
-    derived = any(
-        item.channel in ("speed", "position") and "not in the log" in item.message for item in recording.findings
-    )
-    if derived or "position" not in recording:
-        return []
-    found = []
-    speed, position = recording["speed"], recording["position"]
-    for j in range(speed.joint_count):
-        way = _travelled(speed, j)
-        seen = float(np.nanmax(position.values[:, j]) - np.nanmin(position.values[:, j]))
-        signed = (
-            float(position.values[-1, j] - position.values[0, j])
-            if np.isfinite(position.values[[0, -1], j]).all()
-            else 0.0
-        )
-        if way[1] <= 0.0 or seen <= 0.0:
-            continue
-        if not 0.8 < way[1] / seen < 1.25:
-            found.append(Finding(f"integrates to {way[1]:.4g}, the position spans {seen:.4g}: check units", "speed"))
-        elif abs(signed) > 0.5 * seen and np.sign(signed) != np.sign(way[0]):
-            found.append(Finding("has the opposite sign of the position's derivative", "speed"))
-    return [*found, *_swapped(recording)]
-
-
-def _swapped(recording: Recording) -> list[Finding]:
-    """Joints whose position follows another joint's speed: columns in the wrong order."""
-    speed, position = recording["speed"], recording["position"]
-    if speed.joint_count < 2 or len(speed) < 3 or len(position) < 3:
-        return []
-    ways = previous_value(integrate(speed, position.unit), position.time)
-    known = np.isfinite(position.values).all(axis=1) & np.isfinite(ways).all(axis=1)
-    ways, places = ways[known], position.values[known]
-    if len(places) < 3:
-        return []
-    joints = speed.joint_count
-    with np.errstate(invalid="ignore", divide="ignore"):  # a joint that stands still fits nothing
-        fit = np.nan_to_num(np.corrcoef(ways.T, places.T)[:joints, joints:])
-    found = []
-    for j, joint in enumerate(recording.joints):
-        best = int(np.argmax(fit[:, j]))
-        if fit[best, j] > _OTHER_FIT and max(fit[j, j], fit[best, best]) < _OWN_FIT:
-            text = f"that of {joint} follows the speed of {recording.joints[best]}: columns in another order?"
-            found.append(Finding(text, "position"))
-    return found
-
-
-def _travelled(speed: Series, joint: int) -> tuple[float, float]:
-    path = integrate(speed, "").values[:, joint]
-    return float(path[-1]), float(path.max() - path.min())
-
-
-def _bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
-    """How fast the friction EKF can be on this log: its poles at the nominal speed of an axis."""
-    if machine_file.machine.coupled or not all(channel in recording for channel in ("torque", "speed", "acceleration")):
-        return []
-    motion = motion_class(recording)
-    detector = of_joint(machine_file.detector("friction_ekf"), motion.joint, len(recording.joints))
-    if motion.nominal_speed < detector.minimum_speed:
-        return [
-            Finding(f"nominal speed below minimum_speed ({detector.minimum_speed:g}): not applicable", "friction_ekf")
-        ]
-    inertia = float(machine_file.machine.nominal_inertia[motion.joint])
-    if inertia <= 0.0:
-        return []
-    force = np.nanmedian(np.abs(recording["torque"].values[:, motion.joint]))
-    friction = float(force) / motion.nominal_speed
-    poles, _ = detector.steady_state(inertia, motion.nominal_speed, friction, recording["speed"].period)
-    slow, quick = float(poles[0]), float(poles[1])
-    text = f"poles at {motion.nominal_speed:.3g} {recording['speed'].unit}: {slow:.3g} and {quick:.3g} rad/s"
-    return [Finding(text, "friction_ekf", "note")]

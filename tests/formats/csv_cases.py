@@ -229,10 +229,11 @@ _refused(
 )
 
 
-@_case("a first row with a number in brackets keeps its place")
+@_case("a first row with a number in brackets keeps its place", said="'(1.5)' cannot be read")
 def _(table: Table) -> Made:
     truth = table.truth()
-    return _with_cell(table, "(1.5)", 0), {"t": truth["t"], "b": truth["b"]}
+    truth["a"][0] = math.nan
+    return _with_cell(table, "(1.5)", 0), truth
 
 
 @_case("1,234 pinned as thousands", pins='thousands = ","\ndecimal = "."')
@@ -354,6 +355,8 @@ _plain("a separator behind the rows only", lambda table: table.text(trail=","))
 _plain("a separator behind the header only", lambda table: table.text(head_trail=","))
 _plain("a separator behind the rows, no header", lambda table: table.text(trail=",", header=False), ("0", "1", "2"))
 _plain("a footer", lambda table: table.text() + "End of file\n", said="words below")
+_plain("a footer with sums", lambda table: table.text() + "\nSum,1.5,2\nMean,0.1,0.2\n", said="a footer")
+_plain("a footer padded to the width", lambda table: table.text(";", ",") + "End of file;;\n", said="a footer")
 _plain(
     "a scope: x-axis and second",
     lambda table: table.text(header=False, above="x-axis,1,2\nsecond,Volt,Volt"),

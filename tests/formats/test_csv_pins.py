@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.last_line import is_whole
+from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.reading import read_recording
+from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS
+from tests.formats.csv_cases import cases
+
+READABLE = [case for case in cases(4) if case.columns is not None and not case.pins]
 
 ROWS = "t;i_motor;n_motor\n" + "".join(f"{10 * i};{i % 7 + 1},{i % 9}25;{i}\n" for i in range(20))
 
@@ -60,10 +66,47 @@ def test_a_pinned_mark_decides_what_the_file_leaves_open(log, machine):
 def test_what_info_prints_can_be_pasted_and_reads_the_same(log, machine):
     path = log("rig 4\n\nt;i_motor;n_motor\nms;A;rad/s\n" + ROWS.partition("\n")[2].replace("25;", "5;"))
     found = cdtool.info(path)
-    assert tomllib.loads(found.dialect)["csv"]["header"] == 3
+    assert "header" not in tomllib.loads(found.dialect)["csv"] and "# header = 3  (in this file" in found.dialect
     again = cdtool.info(path, machine=machine(COLUMNS + found.dialect + "\n"))
     assert again.dialect == found.dialect
     assert again.channels[0].samples == 20
+
+
+@pytest.mark.parametrize("case", READABLE, ids=[case.name for case in READABLE])
+def test_what_is_printed_for_any_table_reads_it_to_the_same_numbers(log, case):
+    path = log(case.content)
+    found = Csv().columns(path)
+    pins = read_pins(Table(tomllib.loads(found.dialect)["csv"], "machine.toml", "csv."))
+    numbers = [i for i, name in enumerate(found.names) if name in found.columns and found.columns[name].unit != "s"]
+    sources = tuple(
+        ChannelSource(f"c{i}", (i,)) for i in {*numbers, len(found.names) - 1} if found.names[i] in found.columns
+    )
+    wanted = ChannelMap(TimeSource(rate=1.0), sources, ("axis",), pins=pins)
+    if any("cannot be read" in str(finding) for finding in found.findings):  # a survey forgives it, nothing else does
+        with pytest.raises(RecordingError, match=r"is not a number"):
+            Csv().columns(path, wanted)
+        return
+    again = Csv().columns(path, wanted)
+    for name in again.columns:
+        assert np.array_equal(again.columns[name].values, found.columns[name].values, equal_nan=True), name
+
+
+@pytest.mark.parametrize("above", ["# made by hand\n", "rig 4\n\n", "rig 4\nrun 7\n\n"])
+def test_the_block_of_one_log_reads_the_next_with_another_line_above(log, machine, above):
+    table = "t;i_motor;n_motor\nms;A;rad/s\n" + ROWS.partition("\n")[2].replace("25;", "5;")
+    block = Csv().columns(log("rig 4\n\n" + table)).dialect
+    assert (
+        Csv().columns(log(above + table), machine(COLUMNS + block + "\n").columns).columns["n_motor"].values[19] == 19
+    )
+
+
+@pytest.mark.parametrize("head", ["# t x", "%t,x", "// t x", "# t x\n# [s] [N]"])
+def test_the_block_of_a_table_with_its_names_in_a_comment_can_be_pasted(log, machine, head):
+    separator = "," if "," in head else " "
+    path = log(head + "\n" + "".join(f"{i}{separator}{i}.5\n" for i in range(9)))
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
+    wanted = machine(channels + Csv().columns(path).dialect + "\n").columns
+    assert Csv().columns(path, wanted).columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
 
 
 def test_info_with_a_machine_file_needs_its_pins_only(log, machine):

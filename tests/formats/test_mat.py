@@ -53,14 +53,6 @@ def test_structs_cells_and_texts_are_named_and_left_out(saved):
     assert list(source.columns) == ["t"]
 
 
-def test_a_v73_file_says_how_to_save_it(log):
-    path = log(
-        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM".ljust(388) + b"\x89HDF\r\n\x1a\n", "a.mat"
-    )
-    with pytest.raises(RecordingError, match=r"v7\.3 .*-v7"):
-        survey(path)
-
-
 def test_a_damaged_kind_of_numbers_is_an_error_not_the_end_of_the_process(saved):
     """scipy's reader crashes the interpreter here."""
     path = saved({"q": np.arange(50.0)})

@@ -37,6 +37,11 @@ def test_the_first_bytes_decide_where_the_suffix_is_wrong(log, tmp_path):
         (b"\x89MCAP", "a.mcap", "is not a recording, nor a whole MCAP file"),
         (bytes(200), "a.dat", "is not a recording"),
         ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "holds no row of numbers"),
+        ("<p>1,2</p>".encode("utf-16"), "a.csv", "is not a recording: it is HTML or XML"),
+        (b"\xfe\xff" + '{"a": 1}'.encode("utf-16-be"), "a.json", "it is JSON"),
+        ("<p>1,2</p>".encode("utf-32"), "a.csv", "it is HTML or XML"),
+        (b"\xff\xfe" + bytes(30), "a.csv", "is not a recording"),
+        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "nor a whole MCAP file"),
         (b"", "a.csv", "is empty"),
         (b"a sentence.\nAnd another one.\n", "a.txt", "holds no row of numbers"),
     ],
@@ -48,6 +53,14 @@ def test_what_is_no_recording_is_told_in_one_line_with_its_name(log, content, na
     assert fault.value.message.startswith(f"{path}: ")
     assert fault.value.hint
     assert "\n" not in str(fault.value)
+
+
+def test_damaged_utf_16_is_told_as_damage_and_no_conversion_is_asked_for(log):
+    table = ROWS.encode("utf-16")
+    path = log(table[:90] + b"\x00\xdc" + table[92:])  # the second half of a pair, without its first
+    with pytest.raises(RecordingError, match="begins as UTF-16 does, but does not go on as it") as fault:
+        survey(path)
+    assert "copy" in fault.value.hint and "UTF-8" not in str(fault.value)
 
 
 def test_a_folder_a_missing_file_and_a_pipe_are_told(tmp_path):

@@ -32,16 +32,21 @@ STAMP_LIKE = re.compile(
 def split_line(line: str, separator: str) -> list[str]:
     """Cells without their outer blanks and quotes."""
     if separator == " " and '"' not in line:
-        return line.split()
+        return _words(line)
     if '"' not in line:
         return [cell.strip(" \t\r\n") for cell in line.split(separator)]
     if separator == " ":
-        line = " ".join(line.split())
+        line = " ".join(_words(line))
     try:
         cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     except csv.Error:  # stray quotes: told with their line when the rows are read
         cells = line.split(separator)
     return [cell.strip(" \t\r\n") for cell in cells]
+
+
+def _words(line: str) -> list[str]:
+    """A line cut at its blanks and tabs: a blank that does not break is within a number."""
+    return [word for word in line.strip(" \t\r\n").replace("\t", " ").split(" ") if word]
 
 
 def kind(cell: str) -> str:

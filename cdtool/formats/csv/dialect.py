@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,16 @@ from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
 from cdtool.formats.csv.doubtful_commas import refuse_commas_that_may_be_decimal, refuse_one_column_of_decimals
+from cdtool.formats.csv.doubtful_points import settled_marks
 from cdtool.formats.csv.encoding import find_text
+from cdtool.formats.csv.footer import find_footer
 from cdtool.formats.csv.head import Head, HeadFinder
 from cdtool.formats.csv.head_words import column_kinds
-from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, sample_lines
+from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines, shown_lines
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
+from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.separator import find_separator
+from cdtool.formats.csv.shown_pins import shown_pins
 from cdtool.formats.csv.stamps import Stamped, find_layout
 from cdtool.formats.csv.text import Text
 from cdtool.recording import Finding
@@ -33,19 +37,25 @@ class Dialect:
 
     `kinds` has one letter a cell: N numbers, T stamps, X words, M nothing in the sample. `trailing`: each row ends
     with a separator, so that its last cell is none. `stamped` and `words` are of the columns T and X, by their number.
+    `commented`: the sample has comments that are no rows; `sampled` counts its rows; `preamble`: lines above them.
     """
 
     text: Text
+    pins: TablePins
     separator: str
     marks: Marks
     comment: str
+    commented: bool
     missing: tuple[str, ...]
     header: tuple[str, ...] | None
     header_line: int
     units: tuple[str, ...]
     units_line: int
     header_text: tuple[str, ...]
+    from_comment: bool
+    preamble: tuple[int, ...]
     first_line: int
+    sampled: int
     offset: int
     width: int
     kinds: str
@@ -79,24 +89,29 @@ class Dialect:
     @property
     def as_pins(self) -> str:
         """The dialect as `[csv]` of a machine file, to be pasted."""
-        lines = ["[csv]"]
-        if self.width > 1:
-            lines.append(f"separator = {_quoted(SEPARATORS.get(self.separator, self.separator))}")
-        lines += [f"decimal = {_quoted(self.marks.decimal)}", f"thousands = {_quoted(self.marks.thousands)}"]
-        lines.append(f"encoding = {_quoted(self.text.encoding)}")
-        if not self.header or self.header_line:
-            lines.append(f"header = {self.header_line if self.header else 'false'}")
-        if self.header:
-            lines.append(f"units = {self.units_line or 'false'}")
-        layouts = {item.layout.pattern for item in self.stamped.values() if item.layout}
-        if len(layouts) == 1:
-            lines.append(f"time_format = {_quoted(layouts.pop())}")
-        return "\n".join(lines)
+        return shown_pins(self)
 
 
 def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
-    """The dialect of a text file by its first bytes; raises RecordingError for no table, or one of two readings."""
+    """The dialect of a text file by its first bytes; raises RecordingError for no table, or one of two readings.
+
+    Its text ends where the rows do: a footer with figures is none of it, and is told.
+    """
     text, stream = find_text(path, sample, pins.encoding)
+    dialect = _dialect(path, text, stream, pins)
+    footer = find_footer(dialect)
+    findings: list[Finding] = []
+    if footer is not None:
+        dialect = _dialect(path, *footer.without(text, stream), pins)
+        findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
+    marks = dialect.marks if dialect.marks.sure else settled_marks(dialect)
+    if marks.note:
+        findings.append(Finding(marks.note, severity="warning"))
+    return replace(dialect, marks=marks, findings=(*dialect.findings, *findings))
+
+
+def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    refuse_long_line(text, stream)
     every = sample_lines(text, stream)
     lines = [line for line in every if not line.blank and line.number > pins.skip_lines]
     skipped = [line.number for line in every if not line.blank and line.number <= pins.skip_lines]
@@ -112,6 +127,7 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
         path,
         [x for x in lines if not is_ruler(x.text)] or lines,
         pins.separator or (told.separator or "" if told else ""),
+        pins.decimal,
     )
     separator = cut.separator
     rows = [(line, split_line(line.text, separator)) for line in lines]
@@ -123,31 +139,43 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
     kinds = column_kinds([cells for _, cells in spread(data)], cut.width)
     marks = _marks(path, data, kinds, separator, pins)
     if head.names is None and not pins.separator and not told:
-        refuse_commas_that_may_be_decimal(path, data, kinds, separator)
+        named = any(len(line.text.strip(mark).split()) == 1 for line in comments if line.number < head.first.number)
+        refuse_commas_that_may_be_decimal(path, data, kinds, separator, named)
     if cut.width == 2 and separator == "," and not pins.separator:
         refuse_one_column_of_decimals(path, rows, head, data)
-    findings += _findings(text, head, marks, told)
+    findings += _findings(text, head, told)
     trailing = _trailing(head, kinds, data)
+    below = [line for line in comments if line.number > head.first.number]
+    full = {line.number for line in below if len(split_line(line.text, separator)) == cut.width}
     layout = pins.time_format if "%" in pins.time_format else ""
     columns: dict[int, list[str]] = {
-        i: [cells[i] for _, cells in data] for i, letter in enumerate(kinds) if letter in "TX"
+        i: [cells[i] for _, cells in data if cells[i] not in pins.missing]
+        for i, letter in enumerate(kinds)
+        if letter in "TX"
     }
     stamped = {i: found for i, cells in columns.items() if (found := _stamped(cells, layout)).layouts}
+    days = [i for i, found in stamped.items() if found.layouts[0].dated]
+    stamped |= {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
     words = {i: _first_words(data, i) for i, letter in enumerate(kinds) if letter in "TX"}
     names = head.names[: cut.width - trailing] if head.names is not None else None
     header_text = tuple(line.text for line in lines if line.number in (head.header_line, head.units_line))
     return Dialect(
         text=text,
+        pins=pins,
         separator=separator,
         marks=marks,
         comment=mark,
+        commented=pins.comment is not None or any(line.number not in full for line in comments),
         missing=pins.missing,
         header=tuple(_unique(names)) if names is not None else None,
         header_line=head.header_line,
         units=head.units,
         units_line=head.units_line,
         header_text=header_text,
+        from_comment=head.from_comment,
+        preamble=head.preamble,
         first_line=head.first.number,
+        sampled=len(data),
         offset=head.first.start,
         width=cut.width,
         kinds=kinds,
@@ -197,7 +225,7 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
     return head.names is None or not head.names[-1]
 
 
-def _findings(text: Text, head: Head, marks: Marks, told: Line | None) -> list[Finding]:
+def _findings(text: Text, head: Head, told: Line | None) -> list[Finding]:
     found = []
     shown = _SHOWN_ENCODINGS.get(text.encoding)
     if shown:
@@ -210,27 +238,10 @@ def _findings(text: Text, head: Head, marks: Marks, told: Line | None) -> list[F
         )
     if head.from_comment:
         found.append(Finding(f"the names are those of the comment in line {head.header_line}", severity="note"))
-    if marks.note:
-        found.append(Finding(marks.note, severity="warning"))
     return found
-
-
-def shown_lines(numbers: Sequence[int]) -> str:
-    """`line 3`, `lines 1 to 7`, `4 lines (3, 9, 12, ...)`."""
-    if len(numbers) == 1:
-        return f"line {numbers[0]}"
-    if numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"lines {numbers[0]} to {numbers[-1]}"
-    listed = ", ".join(str(number) for number in numbers[:3])
-    return f"{len(numbers)} lines ({listed}{', ...' if len(numbers) > 3 else ''})"
 
 
 def _unique(cells: Sequence[str]) -> list[str]:
     # A name that is there twice can be asked for by its number only: each bears it.
     counts = Counter(cells)
     return [str(i) if not cell else f"{cell}#{i}" if counts[cell] > 1 else cell for i, cell in enumerate(cells)]
-
-
-def _quoted(text: str) -> str:
-    """A TOML string."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -18,6 +18,8 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]")
+# A text may hold so many of them by a slip, or this share of its bytes: it is refused with their line.
+_FEW, _SHARE = 3, 0.02
 _OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
 
 
@@ -39,9 +41,18 @@ def looks_like_text(sample: bytes) -> bool:
         text = head[mark:].rstrip(b"\0")  # a file system pads the end of a file that was cut by a loss of power
     # NUL bytes between lines are what a loss of power leaves; a binary file has other control characters too.
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
-    return bool(text) and not (
-        _CONTROL.search(text) or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"["))
-    )
+    if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
+        return False
+    return _CONTROL.search(text) is None or _has_few_controls(text)
+
+
+def _has_few_controls(text: bytes) -> bool:
+    count = len(_CONTROL.findall(text))
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(text)
+    except UnicodeDecodeError:
+        return False
+    return b"\0" not in text and count <= max(_FEW, _SHARE * len(text))
 
 
 def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]:
@@ -64,6 +75,13 @@ def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]
             raise RecordingError(f"{path}: is damaged: no {encoding.upper()}", "save it anew as UTF-8") from fault
     elif pinned:
         _check_pinned(path, stream, encoding)
+    control = _CONTROL.search(stream[:4096])
+    if control is not None:
+        line = stream.count(b"\n", 0, control.start()) + 1
+        raise RecordingError(
+            f"{path}: line {line} holds a control character (byte 0x{control[0][0]:02x})",
+            "save the table as plain text, without the colours of a terminal",
+        )
     # One line feed at the very end does not make a file of carriage returns one of line feeds.
     inner = stream.rstrip(b"\r\n")
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.channels import TablePins
@@ -15,6 +15,8 @@ from cdtool.formats.csv.lines import Line, is_ruler
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
+# LabVIEW's measurement files name the units of Y in the preamble, below a word of their own instead of that of X.
+_LABVIEW_UNITS = "Y_Unit_Label"
 
 
 @dataclass(frozen=True)
@@ -54,32 +56,40 @@ class HeadFinder:
     def find(self, lines: Sequence[Line], comments: Sequence[Line]) -> Head:
         """The head; `lines` are those that are neither blank nor comments. Raises RecordingError."""
         cut: list[_Cut] = []
+        empty: list[int] = []  # cells without anything in them, above the rows
         start = None
         for line in lines:
             if is_ruler(line.text):
                 continue
-            cut.append(self._cut(line))
+            row = self._cut(line)
+            if start is None and not any(row.cells):
+                empty.append(line.number)
+                continue
+            cut.append(row)
             if start is None and self._is_row(cut[-1]):
                 start = len(cut) - 1
             if start is not None and len(cut) > start + _LOOKED_BELOW and line.number > int(self.pins.header or 0):
                 break
         if start is None:
             raise self._no_rows(cut)
-        if self.pins.header is not None:
-            return self._pinned(cut, start)
+        head = self._pinned(cut, start) if self.pins.header is not None else self._found(cut, start, comments)
+        return replace(head, preamble=tuple(sorted((*head.preamble, *empty))))
+
+    def _found(self, cut: Sequence[_Cut], start: int, comments: Sequence[Line]) -> Head:
         while start and self._is_damaged_row(cut, start - 1):
             start -= 1
         above = cut[:start]
         if not above:
             self._refuse_numbers_that_may_be_names(cut)
             return self._from_comments(cut, comments)
-        if self.pins.units:
-            above = [row for row in above if row.line.number != self.pins.units]
+        units = next((row for row in above if row.line.number == self.pins.units), None)
+        above = [row for row in above if row is not units]
         names = self._names(above[-1]) if above else None
         if names is None:
-            self._refuse_other_width(above, cut[start])
+            if above:
+                self._refuse_other_width(above, cut[start])
             return self._from_comments(cut[start:], comments, above)
-        header, units = above[-1], None
+        header = above[-1]
         if len(above) > 1 and self.pins.units is None and (self._are_units(header) or are_types(header.cells)):
             upper = self._names(above[-2])
             if upper is not None and (above[-2].kinds.count("N") == 0 or are_numbered(above[-2].cells)):
@@ -88,11 +98,12 @@ class HeadFinder:
         return self._head(names, header, units, cut[start].line, above)
 
     def _head(self, names: list[str], header: _Cut, units: _Cut | None, first: Line, above: Sequence[_Cut]) -> Head:
+        if units is None and self.pins.units is None:
+            units = next((row for row in above if row.cells[0] == _LABVIEW_UNITS), None)
         told: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
+        if told and told[0] == _LABVIEW_UNITS:
+            told = ("", *told[1:])
         line = 0 if units is None else units.line.number
-        if self.pins.units:
-            line = int(self.pins.units)
-            told = next((row.cells for row in (*above,) if row.line.number == line), told)
         used = {header.line.number, line}
         preamble = tuple(row.line.number for row in above if row.line.number not in used)
         return Head(tuple(names), header.line.number, tuple(told), line, first, preamble)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -77,7 +76,7 @@ def are_types(cells: Sequence[str]) -> bool:
 
 def is_unit(cell: str) -> bool:
     """True for a unit: a known one, one of the words for units, or anything in brackets."""
-    bare = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", cell)
-    if bare is not None:
-        return kind(bare[1]) == "X" or bare[1] in ("", "1")
+    if cell[:1] in ("[", "(") and cell[-1:] in ("]", ")"):
+        bare = cell[1:-1].strip()
+        return kind(bare) == "X" or bare in ("", "1")
     return find_unit(cell) is not None or cell.lower() in _UNIT_WORDS

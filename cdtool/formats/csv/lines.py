@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cdtool.errors import RecordingError
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
 COMMENTS = ("#", "%", "//")
-_RULER = re.compile(r"[-=+|\s:]*[-=]{2,}[-=+|\s:]*")
+_RULER, _DRAWN = re.compile(r"[-=+|\s:]*"), re.compile(r"[-=]{2}")
+# What Excel writes where a formula has no value: no comment, though it begins with the mark of one.
+_ERROR_VALUE = re.compile(r'#(?:(?:N/A|N/D|NV|DIV/0!)(?=[\s,;|"]|$)|[^\s,;|"#]{2,12}[!?](?=[\t,;|"]|$)|#+(?=[\t,;|"]))')
 _EXCEL = re.compile(r'"?sep=(?P<separator>.|\\t)?"?[,;\t ]*', re.IGNORECASE)
 _HEAD_LINES, _MOST_JOINED = 100, 6
 
@@ -37,12 +41,18 @@ class Line:
 
     def is_comment(self, mark: str) -> bool:
         """True for a line that starts with the mark."""
-        return bool(mark) and self.text.lstrip().startswith(mark)
+        return begins_comment(self.text, mark)
+
+
+def begins_comment(text: str, mark: str) -> bool:
+    """True for a line that starts with the mark ("": none does) and not with `#N/A` or `#DIV/0!`."""
+    text = text.lstrip()
+    return bool(mark) and text.startswith(mark) and _ERROR_VALUE.match(text) is None
 
 
 def is_ruler(text: str) -> bool:
     """True for a line that only draws: `---+---` or `====`."""
-    return _RULER.fullmatch(text) is not None
+    return _DRAWN.search(text) is not None and _RULER.fullmatch(text) is not None
 
 
 def sample_lines(text: Text, stream: bytes) -> list[Line]:
@@ -63,6 +73,17 @@ def sample_lines(text: Text, stream: bytes) -> list[Line]:
     return lines
 
 
+def refuse_long_line(text: Text, stream: bytes) -> None:
+    """Raise RecordingError for a line that fills half of the sample and goes on behind it: no row may be seen."""
+    left = len(stream) - stream.rfind(text.line_end) - 1
+    if text.size > SAMPLE_BYTES and 2 * left > SAMPLE_BYTES:
+        raise RecordingError(
+            f"{text.path}: line {stream.count(text.line_end) + 1} goes on beyond the {SAMPLE_BYTES >> 10} KB in which "
+            "the head of a table is looked for",
+            "is it a table? one of fewer columns can be read",
+        )
+
+
 def comment_mark(lines: list[Line], pinned: str | None) -> str:
     """The mark that begins comment lines; the first of the usual ones that begins a line."""
     if pinned is not None:
@@ -72,6 +93,16 @@ def comment_mark(lines: list[Line], pinned: str | None) -> str:
             if line.is_comment(mark):
                 return mark
     return COMMENTS[0]
+
+
+def shown_lines(numbers: Sequence[int]) -> str:
+    """`line 3`, `lines 1 to 7`, `4 lines (3, 9, 12, ...)`."""
+    if len(numbers) == 1:
+        return f"line {numbers[0]}"
+    if numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"lines {numbers[0]} to {numbers[-1]}"
+    listed = ", ".join(str(number) for number in numbers[:3])
+    return f"{len(numbers)} lines ({listed}{', ...' if len(numbers) > 3 else ''})"
 
 
 def _joined(raw: list[bytes], first: int) -> int:

@@ -1,7 +1,7 @@
 """Decimal mark and thousands separator, by the evidence of every number of the sample.
 
 `1,5`, `0,250` and `1234,567` can only have a decimal comma; `1.234,5` and `1,234,567` show both marks or the groups.
-`1,234` alone says nothing, and is refused.
+`1,234` alone says nothing, and is refused; so is `1.234` among whole numbers (doubtful_points.py).
 """
 
 from __future__ import annotations
@@ -31,11 +31,15 @@ class Seen:
 
 @dataclass(frozen=True)
 class Marks:
-    """The decimal mark, the thousands separator ("" for none), and what is to be said of them."""
+    """The decimal mark, the thousands separator ("" for none), and what is to be said of them.
+
+    Not `sure`: no number showed a decimal mark, and a point is taken for one.
+    """
 
     decimal: str
     thousands: str = ""
     note: str = ""
+    sure: bool = True
 
 
 class _Evidence:
@@ -89,7 +93,7 @@ def find_marks(
     # One cell with a blank in it may be two cells that ran together.
     if evidence.blank_groups < 2 or separator == " ":
         evidence.thousands.pop(" ", None)
-    found = decimal or _decimal(path, evidence)
+    found = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
     if thousands is not None:
         return Marks(found, thousands)
     other = "." if found == "," else ","
@@ -108,13 +112,14 @@ def find_marks(
     if len(groups) > 1:
         shown = " and ".join(str(seen) for seen in groups.values())
         raise RecordingError(f"{path}: thousands are parted in two ways: {shown}", "pin thousands in [csv]")
-    mark = next(iter(groups), "")
+    parted = next(iter(groups), "")
     note = ""
     alone = evidence.either.get(found)
-    if separator == ";" and found == "." and alone and not evidence.decimal and not groups:
+    certain = bool(decimal or evidence.decimal or groups)
+    if separator != "," and found == "." and alone and not certain:
         whole = alone.text.replace(".", "")
         note = f"{alone} is read as {alone.text}, not as {whole}: pin decimal and thousands in [csv] if that is wrong"
-    return Marks(found, mark, note)
+    return Marks(found, parted, note, certain)
 
 
 def _decimal(path: Path, evidence: _Evidence) -> str:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.errors import RecordingError
-from cdtool.formats.csv.cells import kind, number, split_line
-from cdtool.formats.csv.dialect import Dialect, shown_lines
-from cdtool.formats.csv.lines import is_ruler
+from cdtool.formats.csv.cells import STAMP_LIKE, kind, number, split_line
+from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
+from cdtool.formats.csv.shown_pins import quoted
 from cdtool.recording import Finding
+
+# A survey keeps a column of numbers with so many cells that are none, or with this share of the rows.
+_FEW, _SHARE = 3, 0.05
+_LAYOUT = 'repair it, or pin time_format in [csv], e.g. "%d.%m.%Y %H:%M:%S.%f"'
 
 if TYPE_CHECKING:
     from cdtool.formats.csv.rows import Rows
@@ -29,10 +35,12 @@ class OddLine:
 
 @dataclass
 class OddLines:
-    """What became of the lines that are not plain. With `survey` a column that holds a word is left out, not an error.
+    """What became of the lines that are not plain.
 
-    `dropped` are the rows that are none, with their lines; `left_out` the columns that are not numeric, with why;
-    `cut_line` is the half-written last line (0: none), `blank` are lines that hold nothing, `words` perhaps a footer.
+    With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
+    `unread` are these cells by column, each with its line. `dropped` are the rows that are none, with their lines;
+    `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none), `blank`
+    are lines that hold nothing, `words` perhaps a footer.
     """
 
     path: Path
@@ -40,6 +48,7 @@ class OddLines:
     survey: bool
     dropped: dict[int, int] = field(default_factory=dict)
     left_out: dict[int, Finding] = field(default_factory=dict)
+    unread: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     skipped: dict[str, list[int]] = field(default_factory=dict)
     cut_line: int = 0
     blank: list[int] = field(default_factory=list)
@@ -63,8 +72,11 @@ class OddLines:
     def findings(self, last_line: int) -> list[Finding]:
         """What was skipped, each kind once; blank lines behind the last row are not worth a word."""
         found = list(self.left_out.values())
+        found += [self._unread(column) for column in self.unread if column not in self.left_out]
         blank = [line for line in self.blank if line < last_line]
-        if blank:
+        if blank and self.dialect.width == 1 and 2 * len(blank) < last_line - self.dialect.first_line:
+            found.append(Finding(f"{shown_lines(blank)} skipped: blank, perhaps missing samples", severity="loss"))
+        elif blank:
             found.append(Finding(f"{shown_lines(blank)} skipped: blank", severity="note"))
         for what, lines in self.skipped.items():
             severity = "loss" if "NUL" in what else "note"
@@ -78,7 +90,7 @@ class OddLines:
 
     def _is_skipped(self, item: OddLine, line: int) -> bool:
         text = self.dialect.text.decode(item.text).rstrip("\r")
-        if self.dialect.comment and text.lstrip().startswith(self.dialect.comment):
+        if self._is_comment(text):
             self._drop(item, line, "comments")
         elif text.strip() in {told.strip() for told in self.dialect.header_text}:
             self._drop(item, line, "the header again")
@@ -89,6 +101,15 @@ class OddLines:
         else:
             return False
         return True
+
+    def _is_comment(self, text: str) -> bool:
+        """A line of full width in a table without comments is a row, unless it is one that was made a comment."""
+        mark = self.dialect.comment
+        if not begins_comment(text, mark):
+            return False
+        rest = text.lstrip()[len(mark) :]
+        cells = split_line(rest, self.dialect.separator)
+        return self.dialect.commented or len(cells) != self.dialect.width or rest[:1] == " " or kind(cells[0]) != "X"
 
     def _judge(self, item: OddLine, line: int) -> None:
         text = self.dialect.text.decode(item.text).rstrip("\r")
@@ -156,9 +177,36 @@ class OddLines:
                 return
         name = self.dialect.names[column]
         if not self.survey:
-            raise not_a_number(self.path, self.dialect, line, name, cell)
-        self.targets[column] = LEFT
-        self.left_out[column] = not_numeric(name, line, cell)
+            raise self._unreadable(line, column, target, cell)
+        if target <= STAMP:
+            self.rows.stamps[STAMP - target, item.row] = MISSING_STAMP
+        else:
+            self.rows.numbers[target, item.row] = math.nan
+        unread = self.unread.setdefault(column, [])
+        unread.append((line, cell))
+        rows = max(self.dialect.sampled, line - self.dialect.first_line)
+        if len(unread) > max(_FEW, _SHARE * rows):
+            self.targets[column] = LEFT
+            text = f"{not_numeric(name, *unread[0]).message}; {_hint(self.dialect, unread[0][1])}"
+            self.left_out[column] = Finding(text)
+
+    def _unreadable(self, line: int, column: int, target: int, cell: str) -> RecordingError:
+        """A cell of a wanted column that cannot be read."""
+        found = self.dialect.stamped.get(column)
+        what, hint = "is not a number", _hint(self.dialect, cell)
+        if found is not None and target <= STAMP:
+            what = f"is no time written as {found.layouts[0].pattern}"
+        elif found is not None and STAMP_LIKE.fullmatch(cell):
+            what, hint = "is a date or time, not a number", "of the channels only time may be one"
+        elif STAMP_LIKE.fullmatch(cell):
+            what = "is not a number, nor a date or time in a layout that is known"
+        where = f"line {line}, column '{self.dialect.names[column]}'"
+        return RecordingError(f"{self.path}: {where}: {cell[:60]!r} {what}", hint)
+
+    def _unread(self, column: int) -> Finding:
+        cells = self.unread[column]
+        text = f"{shown_lines([line for line, _ in cells])}: {cells[0][1][:40]!r} cannot be read, taken as missing"
+        return Finding(f"{text}; {_hint(self.dialect, cells[0][1])}", self.dialect.names[column], "loss")
 
     def _number(self, cell: str) -> float | None:
         if cell in self.dialect.missing:
@@ -171,12 +219,14 @@ class OddLines:
 
 def not_numeric(name: str, line: int, cell: str) -> Finding:
     """A column that is left out of a survey."""
-    return Finding(f"column '{name}' is not numeric (line {line} holds {cell[:40]!r}): left out", severity="note")
+    text = f"column '{name}' is not numeric (line {line} holds {cell[:40]!r}): left out"
+    return Finding(f"{text}; {_LAYOUT}" if STAMP_LIKE.fullmatch(cell) else text, severity="note")
 
 
-def not_a_number(path: Path, dialect: Dialect, line: int, name: str, cell: str) -> RecordingError:
-    """A cell of a wanted column that cannot be read."""
-    return RecordingError(
-        f"{path}: line {line}, column '{name}': {cell[:60]!r} is not a number",
-        f"decimal mark: {dialect.details['decimal mark']}; empty and nan are missing values",
-    )
+def _hint(dialect: Dialect, cell: str) -> str:
+    """What to do about a cell that cannot be read."""
+    if STAMP_LIKE.fullmatch(cell):
+        return _LAYOUT
+    if any(letter.isdigit() for letter in cell):
+        return f"decimal mark: {dialect.details['decimal mark']}; empty and nan are missing values"
+    return f"if it stands for a missing value, missing = [{quoted(cell[:40])}] in [csv] of the machine file says so"

@@ -6,6 +6,7 @@ import codecs
 
 from cdtool.channels import TablePins
 from cdtool.formats.csv.stamps import check_pattern
+from cdtool.formats.csv.text import UNIT_BYTES
 from cdtool.tables import Table
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "blanks": " "}
@@ -65,13 +66,12 @@ def _encoding(table: Table) -> str:
         return ""
     try:
         known = codecs.lookup(name).name
-        b"1,2\n".decode(known)
         narrow = "1,2\n".encode(known) == b"1,2\n"
     except (LookupError, UnicodeError, AssertionError):
         raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
     # The numbers are read byte by byte: they have to be ASCII, or of the encodings that are recoded.
     known = {"iso8859-1": "latin-1"}.get(known, known)
-    if not narrow and known not in ("utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"):
+    if not narrow and known not in UNIT_BYTES:
         raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
     return known
 

@@ -27,14 +27,19 @@ class Split:
     numeric: float
 
 
-def find_separator(path: Path, lines: Sequence[Line], pinned: str = "") -> Split:
-    """The separator of lines that hold cells; raises RecordingError where a pinned one cuts none of them."""
+def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal: str = "") -> Split:
+    """The separator of lines that hold cells; raises RecordingError where a pinned one cuts none of them.
+
+    A pinned separator beside a pinned decimal comma may cut none: the table has one column.
+    """
     body = lines[len(lines) // 3 :] if len(lines) >= 6 else lines[1:] or lines
     texts = [line.text for line in body]
     scored = texts if len(texts) <= 2 * _SCORED else texts[:_SCORED] + texts[-_SCORED:]
     if pinned:
         split = _split(scored, pinned)
-        if split.width < 2 and any(_split(scored, other).width > 1 for other in SEPARATORS if other != pinned):
+        if split.width < 2 and any(
+            _split(scored, other).width > 1 for other in SEPARATORS if other not in (pinned, decimal)
+        ):
             raise RecordingError(
                 f"{path}: line {body[0].number} has one cell by the separator {pinned!r}: {body[0].text[:40]!r}",
                 "correct or remove separator in [csv], or the line sep= of the file",

@@ -2,15 +2,17 @@
 
 A layout is written as for `strptime`: `%d.%m.%Y %H:%M:%S.%f`, with `%f` for any number of digits and `%z` for a zone.
 `03.04.2025` is the third of April, as it is wherever points are used; `03/04/2025` and `03-04-2025` may be the fourth
-of March: unless a day above 12 decides, they are refused.
+of March: unless a day above 12 decides, they are refused. So are `00:05`, five minutes or five seconds, and `:9`, `:10`
+behind the seconds, parts of a second or milliseconds.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,6 +39,8 @@ _DATES = (
     *("%d-%b-%Y", "%d/%b/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y%m%d"),
 )
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
+_MINUTES = "%M:%S.%f"
+_FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:])(?P<digits>[0-9]+)(?P<after>.*)")
 _LOOKED = 200
 NS = 1_000_000_000
 _DAY = 86400 * NS
@@ -108,48 +112,84 @@ def check_pattern(pattern: str) -> str:
 
 @dataclass(frozen=True)
 class Stamped:
-    """The layouts that every cell of a column fits: none (words), one, or two that mean different days."""
+    """The layouts that the cells of a column fit: none (words), one, or two that mean different times.
+
+    `doubt` says why the digits of a second may be read in two ways ("": they may not).
+    """
 
     layouts: tuple[Layout, ...]
     example: str = ""
+    doubt: str = ""
 
     @property
     def layout(self) -> Layout | None:
         """The layout, if it is certain."""
-        return self.layouts[0] if len(self.layouts) == 1 else None
+        return self.layouts[0] if len(self.layouts) == 1 and not self.doubt else None
 
     @property
     def readings(self) -> str:
         """The two readings, for a message."""
-        shown = []
-        for layout in self.layouts:
-            value = layout.read(self.example)
-            day = np.datetime64((value or 0) // NS, "s").astype("datetime64[D]")
-            shown.append(f"{day} ({layout.pattern})")
-        return f"'{self.example}' is {' or '.join(shown)}"
+        if self.doubt:
+            return self.doubt
+        times = [np.datetime64((layout.read(self.example) or 0) // NS, "s") for layout in self.layouts]
+        days = [time.astype("datetime64[D]") for time in times]
+        shown = days if len(set(days)) > 1 else [str(time)[-8:] for time in times]
+        read = [f"{text} ({layout.pattern})" for text, layout in zip(shown, self.layouts, strict=True)]
+        return f"'{self.example}' is {' or '.join(read)}"
+
+    def beside_days(self) -> Stamped:
+        """Next to a column of days `12:05` is a time of day."""
+        hours = tuple(layout for layout in self.layouts if layout.pattern != _MINUTES)
+        return replace(self, layouts=hours or self.layouts)
 
 
 def find_layout(cells: Sequence[str], pinned: str = "") -> Stamped:
-    """The layout of a column by its cells."""
+    """The layout of a column by its cells: that of all, else that of most of them, so that the others can be named."""
     texts = [cell for cell in dict.fromkeys(cells) if cell not in MISSING]
-    if not texts or not (pinned or STAMP_LIKE.fullmatch(texts[0])):
+    likely = [
+        texts[i] for i in sorted({0, len(texts) // 2, len(texts) - 1}) if texts and STAMP_LIKE.fullmatch(texts[i])
+    ]
+    if not texts or not (pinned or likely):
         return Stamped(())
-    fitting = [Layout(pinned)] if pinned else [item for item in _known() if item.read(texts[0]) is not None]
+    possible = [Layout(pinned)] if pinned else [x for x in _known() if any(x.read(text) is not None for text in likely)]
     # All days decide between two orders of day and month; some times of day are enough.
-    first_of_day = {text.split()[0]: text for text in texts} if len(fitting) > 1 else {}
-    looked = [*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values()]
+    first_of_day = {text.split()[0]: text for text in texts} if len(possible) > 1 else {}
+    looked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
+    fitting = possible
     for text in looked:
         fitting = [item for item in fitting if item.read(text) is not None]
+    if not fitting:
+        read = {item: sum(item.read(text) is not None for text in looked) for item in possible}
+        most = max(read.values(), default=0)
+        fitting = [item for item in possible if read[item] == most and 2 * most >= len(looked)]
     different: dict[tuple[int | None, ...], Layout] = {}
     for item in fitting:
         different.setdefault(tuple(item.read(text) for text in looked), item)
     example = next((text for text in looked if len({item.read(text) for item in different.values()}) > 1), texts[0])
-    return Stamped(tuple(different.values()), example)
+    return Stamped(tuple(different.values()), example, "" if pinned or not different else _counted(texts))
+
+
+def _counted(texts: Sequence[str]) -> str:
+    """Why `:9`, `:10` behind the seconds may be milliseconds: as parts of a second they run backward; else empty."""
+    parts = [found for text in texts if (found := _FRACTION.fullmatch(text))]
+    if len({len(part["digits"]) for part in parts}) < 2:
+        return ""
+    back: tuple[str, str] | None = None
+    for part, after in pairwise(parts):
+        if (part["before"], part["after"]) != (after["before"], after["after"]):
+            continue
+        if int(part["digits"]) > int(after["digits"]):
+            return ""
+        if back is None and part["digits"].ljust(9, "0") > after["digits"].ljust(9, "0"):
+            back = part[0], after["digits"]
+    if back is None:
+        return ""
+    return f"'{back[1]}' behind '{back[0]}' is 0.{back[1]} s or {back[1]} ms: write each with three digits"
 
 
 @cache
 def _known() -> tuple[Layout, ...]:
-    patterns = [*_TIMES, *(date for date in _DATES if date != "%Y%m%d")]
+    patterns = [*_TIMES, _MINUTES, *(date for date in _DATES if date != "%Y%m%d")]
     for date in _DATES:
         for time in _TIMES:
             patterns += [f"{date} {time}", f"{date} {time}%z"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,9 +14,9 @@ from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.last_line import RECENT, is_whole
 from cdtool.formats.csv.odd_lines import OddLines, not_numeric
-from cdtool.formats.csv.row_kernel import MISSING_STAMP
 from cdtool.formats.csv.rows import RowReader, Rows
-from cdtool.formats.csv.stamps import NS, over_midnight, seconds_since
+from cdtool.formats.csv.stamp_columns import StampColumns
+from cdtool.formats.csv.stamps import NS
 from cdtool.recording import Finding, FloatArray
 
 # Days since 1899-12-30, as Excel counts them, of 1970; and of the years 2000 to 2100.
@@ -40,37 +40,74 @@ class Table:
     unbroken: bool = True
 
 
+@dataclass(frozen=True)
+class Asked:
+    """The columns of a table that are read, by number: of numbers, of stamps, the days beside some of these.
+
+    `left_out` are those that a survey does not read, and why.
+    """
+
+    numeric: tuple[int, ...]
+    stamps: tuple[int, ...]
+    dates: Mapping[int, int]
+    left_out: dict[int, Finding]
+
+    @classmethod
+    def of(cls, path: Path, dialect: Dialect, keys: Collection[str], clock: str | None, survey: bool) -> Asked:
+        """By their names; raises RecordingError where a stamp can be read in two ways."""
+        columns = [i for i, name in enumerate(dialect.names) if name in keys]
+        numeric, stamps, left_out = _sorted_out(path, dialect, columns, clock, survey)
+        dates = {column: date for column in stamps if (date := _date_beside(path, dialect, column)) is not None}
+        return cls(tuple(numeric), tuple(sorted({*stamps, *dates.values()})), dates, left_out)
+
+
 def read_table(
-    path: Path, dialect: Dialect, keys: Sequence[str], clock: str | None, wanted: ChannelMap | None
+    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None
 ) -> Table:
     """The columns `keys`; `clock` is the one that the machine file calls the time. Raises RecordingError."""
     survey = wanted is None
-    place = {name: i for i, name in enumerate(dialect.names)}
-    numeric, stamps, left_out = _sorted_out(path, dialect, [place[key] for key in keys], clock, survey)
-    dates = {column: date for column in stamps if (date := _date_beside(path, dialect, column)) is not None}
-    read = sorted({*stamps, *dates.values()})
-    odd = OddLines(path, dialect, survey, left_out=left_out)
-    reader = RowReader(path, dialect, numeric, read)
+    asked = Asked.of(path, dialect, keys, clock, survey)
+    odd = OddLines(path, dialect, survey, left_out=asked.left_out)
+    reader = RowReader(path, dialect, asked.numeric, asked.stamps)
     rows = reader.read(odd)
+    findings = end_findings(dialect, asked, odd, reader.ended, rows)
+    values = {
+        dialect.names[column]: rows.numbers[k] for k, column in enumerate(asked.numeric) if column not in odd.left_out
+    }
+    stamped = StampColumns(dialect, asked.stamps, asked.dates)
+    values |= stamped.seconds(rows)
+    findings += stamped.findings()
+    table = Table(values, findings, (stamped.origin or 0) / NS, set(stamped.names), not len(rows.not_rows))
+    if survey and not table.values:
+        raise no_numbers(path, findings)
+    if clock is not None and wanted is not None:
+        _set_clock(path, table, clock, wanted)
+    table.values = {key: table.values[key] for key in dialect.names if key in table.values}
+    return table
+
+
+def no_numbers(path: Path, findings: Sequence[Finding]) -> RecordingError:
+    """A survey found nothing."""
+    return RecordingError(f"{path}: no column holds numbers only", str(findings[0]) if findings else "")
+
+
+def end_findings(
+    dialect: Dialect, asked: Asked, odd: OddLines, ended: bool, rows: Rows, before: int = 0
+) -> list[Finding]:
+    """What was skipped, and what became of the end; `rows` are the last ones, behind `before` others, and may lose one.
+
+    `ended`: the last line has its line end.
+    """
     findings = odd.findings(rows.line(rows.count - 1))
-    if not reader.ended and not odd.cut_line:
-        findings += _judge_last_line(dialect, rows, numeric, read)
+    if not ended and not odd.cut_line:
+        findings += _judge_last_line(dialect, rows, asked, before)
     if odd.cut_line or dialect.text.padding:
         line = odd.cut_line or rows.line(rows.count)
         findings.insert(0, Finding(f"the last line ({line}) is cut off: dropped", severity="loss"))
     if dialect.text.padding:
         text = f"the file ends in {dialect.text.padding} NUL bytes: was the power lost?"
         findings.append(Finding(text, severity="loss"))
-    named = dialect.names
-    values = {named[column]: rows.numbers[k] for k, column in enumerate(numeric) if column not in odd.left_out}
-    table = Table(values, findings, unbroken=not len(rows.not_rows))
-    _add_stamps(table, dialect, rows, read, dates)
-    if survey and not table.values:
-        raise RecordingError(f"{path}: no column holds numbers only", str(findings[0]) if findings else "")
-    if clock is not None and wanted is not None:
-        _set_clock(path, table, clock, wanted)
-    table.values = {key: table.values[key] for key in named if key in table.values}
-    return table
+    return findings
 
 
 def _sorted_out(
@@ -124,36 +161,6 @@ def _date_beside(path: Path, dialect: Dialect, column: int) -> int | None:
     return None
 
 
-def _add_stamps(table: Table, dialect: Dialect, rows: Rows, read: Sequence[int], dates: dict[int, int]) -> None:
-    """Stamps -> seconds since the first of them that has a date, or since midnight."""
-    origin: int | None = None
-    used = set(dates.values())
-    for column in read:
-        if column in used:
-            continue
-        name, layout = dialect.names[column], dialect.stamped[column].layouts[0]
-        stamps = rows.stamps[read.index(column)].copy()
-        known = stamps != MISSING_STAMP
-        dated = layout.dated or column in dates
-        text = ""
-        if column in dates:
-            days = rows.stamps[read.index(dates[column])]
-            known &= days != MISSING_STAMP
-            stamps[known] += days[known]
-            text = f"joined with the days of column '{dialect.names[dates[column]]}'; "
-        elif not layout.dated and (nights := over_midnight(stamps, known)):
-            text = f"passes midnight {nights} times; "
-        if dated and origin is None and known.any():
-            origin = int(stamps[known][0])
-        start = origin if dated and origin is not None else 0
-        since = f"{np.datetime64(start, 'ns')}" if dated else "midnight"
-        text += f"written as {layout.pattern}; in s since {since}"
-        table.findings.append(Finding(text, name, "note"))
-        table.values[name] = seconds_since(stamps, known, start)
-        table.stamped.add(name)
-    table.origin = (origin or 0) / NS
-
-
 def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None:
     """Hold the machine file's unit against what the clock's column is."""
     if clock in table.stamped:
@@ -181,10 +188,10 @@ def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None
         )
 
 
-def _judge_last_line(dialect: Dialect, rows: Rows, numeric: Sequence[int], stamps: Sequence[int]) -> list[Finding]:
+def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) -> list[Finding]:
     """A plain last line without its end: keep it, keep it and say so, or drop it."""
     last = dialect.width - 1
-    if rows.count < 1 or dialect.trailing or last not in (*numeric, *stamps):
+    if rows.count < 1 or dialect.trailing or last not in (*asked.numeric, *asked.stamps):
         return []
     *others, unfinished = dialect.text.tail()
     if not unfinished.strip():
@@ -198,7 +205,7 @@ def _judge_last_line(dialect: Dialect, rows: Rows, numeric: Sequence[int], stamp
             break
     text = dialect.text.decode(unfinished).rstrip()
     cell = '"' if text.endswith('"') else split_line(text, dialect.separator)[-1]
-    whole, certain = is_whole(cell, above[: rows.count - 1])
+    whole, certain = is_whole(cell, above[: before + rows.count - 1])
     line = rows.line(rows.count - 1)
     if whole and (certain or not dialect.text.padding):
         if certain:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
-from cdtool.errors import RecordingError, nearest
+from cdtool.errors import RecordingError
 from cdtool.formats.mcap.columns import UndecodableError
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.fields import parse_field
 from cdtool.formats.mcap.gathering import Decoders, Gathering
 from cdtool.formats.mcap.topic_survey import TopicSurvey
-from cdtool.formats.source import Column, Source
+from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.source import Column, Source, with_topics
 from cdtool.recording import Finding
 
 __all__ = ["Mcap"]
@@ -37,7 +40,28 @@ class Mcap:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
-        return _survey(path) if wanted is None else _wanted(path, wanted)
+        return joined(self.pieces(path), sort=True) if wanted is None else _wanted(path, wanted)
+
+    def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
+        """All numeric fields, some MiB of the file at a time; raises RecordingError."""
+        log = Log(path)
+        topics: dict[str, TopicSurvey] = {}
+        origin: int | None = None
+        for piece in ahead(log.pieces()):
+            origin = _origin(path, log) if origin is None else origin
+            for messages in piece:
+                name = messages.stream.channel.topic
+                survey = topics.setdefault(name, TopicSurvey(name))
+                yield from survey.pieces(messages.stream, messages.batch, origin)
+        findings = log.findings()
+        columns: dict[str, Column] = {}
+        for name in log.topics:
+            for item in topics[name].found() if name in topics else ():
+                if isinstance(item, Finding):
+                    findings.append(item)
+                else:
+                    columns[item.name] = item
+        return _source(path, log, columns, findings, log.origin)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""
@@ -65,7 +89,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
             name,
             [parse_field(text, f"{path}: {name}") for text in fields],
             wanted.time.clock,
-            wanted.joints,
+            wanted.joint_names,
             log.expected(name),
         )
         for name, fields in texts.items()
@@ -74,7 +98,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
         for messages in piece:
             topics[messages.stream.channel.topic].add(messages.stream, messages.batch)
     findings = log.findings()
-    _check_topics(path, wanted, log)
+    wanted = with_topics(path, wanted, [topic.name for topic in log.topics.values() if topic.count])
     for name in dict.fromkeys(source.topic for source in wanted.sources):
         decoders = topics[name].decoders
         if not decoders.decoded:
@@ -82,7 +106,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
                 f"{path}: no message of {name} can be decoded: {decoders.reason}",
                 "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
             )
-        findings += decoders.failure(name)
+        findings += decoders.failure(name) + topics[name].orders.findings()
     # A header's clock may be another one (simulated time): its own first stamp is its origin.
     stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
     origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
@@ -95,32 +119,15 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     return _source(path, log, columns, findings, origin)
 
 
-def _check_topics(path: Path, wanted: ChannelMap, log: Log) -> None:
-    known = [topic.name for topic in log.topics.values() if topic.count]
-    for source in wanted.sources:
-        if source.topic not in known:
-            raise RecordingError(
-                f"{path}: no message of topic '{source.topic}' (channel '{source.channel}')",
-                nearest(source.topic, known),
-            )
-
-
-def _survey(path: Path) -> Source:
-    log = Log(path)
-    topics: dict[str, TopicSurvey] = {}
-    for piece in ahead(log.pieces()):
-        for messages in piece:
-            name = messages.stream.channel.topic
-            topics.setdefault(name, TopicSurvey(name, log.expected(name))).add(messages.stream, messages.batch)
-    findings = log.findings()
-    columns: dict[str, Column] = {}
-    for name in log.topics:
-        for item in topics[name].found(log.origin) if name in topics else ():
-            if isinstance(item, Finding):
-                findings.append(item)
-            else:
-                columns[item.name] = item
-    return _source(path, log, columns, findings, log.origin)
+def _origin(path: Path, log: Log) -> int:
+    """Time [ns] of a log's first message, once its first piece is there."""
+    first = log.section.room.first_time or 0
+    if first >= NO_DATE:  # those so far are of no clock: which is the first that is shows at the end
+        log = Log(path)
+        for _ in log.pieces():
+            pass
+        return log.origin
+    return first
 
 
 def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:

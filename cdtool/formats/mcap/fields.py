@@ -57,7 +57,7 @@ class Field:
                 numbers = [_number(item, self.text) for item in value]
                 order = order_of(len(numbers), _element_names(parent), joints)
                 return numbers if order is None else [numbers[place] for place in order]
-            if index.isdigit():
+            if is_element_number(index):
                 if len(value) == 0:
                     return math.nan
                 if int(index) >= len(value):
@@ -78,6 +78,11 @@ class Field:
         if _is_array(value):
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
         return _number(value, self.text)
+
+
+def is_element_number(index: str) -> bool:
+    """An index is an element's number: any other one is a name, that of \u00b2 too."""
+    return index.isascii() and index.isdigit()
 
 
 def parse_field(text: str, where: str) -> Field:
@@ -141,10 +146,15 @@ def _texts(names: Any) -> list[str]:
 def order_of(count: int, names: Sequence[str], joints: Sequence[str]) -> list[int] | None:
     """Which of `count` elements called `names` are those of the joints, in their order; raises FieldMissingError.
 
-    None: as they are, since the message does not name them or there is but one.
+    None: as they are, since the message does not name them, or nobody said what the joints are called.
     """
-    if not joints or not count or len(names) != count or len(joints) == count == 1:
+    if not joints or not count or not names:
         return None
+    if len(names) != count:
+        raise FieldMissingError(
+            f"its messages have {len(names)} names for {count} elements: which is whose cannot be told",
+            advice="name elements by their numbers, e.g. position[0]",
+        )
     places = {name: place for place, name in reversed(list(enumerate(names)))}
     absent = [joint for joint in joints if joint not in places]
     if absent:

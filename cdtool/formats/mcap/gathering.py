@@ -15,10 +15,9 @@ from cdtool.formats.mcap.columns.gathered import ABSENT, DECODED, OTHER_JOINTS
 from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.fields import Field, FieldMissingError, missing
 from cdtool.formats.mcap.rows import Rows
+from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
 from cdtool.formats.source import Column
 from cdtool.recording import Finding, FloatArray
-
-Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
 
 
 class Decoders:
@@ -124,6 +123,7 @@ class Gathering:
         self._wanted = list(fields)
         # A header's stamp may lie before 1970.
         self._stamps = Rows(expected, np.int64 if clock == "header" else np.uint64)
+        self.orders = StampOrders(topic)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     @property
@@ -146,7 +146,9 @@ class Gathering:
         whole = self.decoders.keep(gathered)
         all_whole = bool(whole.all())
         stamps = self._stamps_of(batch, gathered, whole)
-        self._stamps.append(stamps if all_whole else stamps[whole])
+        stamps = stamps if all_whole else stamps[whole]
+        self._stamps.append(stamps)
+        self.orders.add(stream.channel.id, stamps)
         for field, picked in zip(self._fields, gathered.picked, strict=True):
             if picked.fault is not None and bool(np.any(whole & (picked.state == ABSENT))):
                 raise missing(self.where, field.field.text, picked.fault)

@@ -6,7 +6,7 @@ import typer
 from typer.testing import CliRunner
 
 from cdtool.cli.recover import recover
-from cdtool.errors import ExitStatus
+from cdtool.errors import ExitStatus, UsageError
 from tests.formats.mcap.small_files import small_file
 
 APP = typer.Typer()
@@ -32,7 +32,23 @@ def test_a_cut_file_ends_with_status_3_and_says_what_is_lost_and_left_out(tmp_pa
     assert done.exit_code == ExitStatus.INCOMPLETE
     assert "loss: damaged at byte" in done.output
     assert "(--unverified keeps them)" in done.output
-    kept = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap", "--unverified")
+    kept = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap", "--unverified", "--force")
     assert kept.exit_code == ExitStatus.INCOMPLETE
     assert f"{len(sent) - 1} messages" in kept.output
     assert "left out" not in kept.output
+
+
+def test_a_file_that_is_there_is_overwritten_with_force_only_and_the_source_never(tmp_path):
+    for name in ("log.mcap", "other.mcap"):
+        small_file(tmp_path / name, messages=12 if name == "log.mcap" else 24)
+    other, source = (tmp_path / "other.mcap").read_bytes(), (tmp_path / "log.mcap").read_bytes()
+    refused = run(tmp_path / "log.mcap", "-o", tmp_path / "other.mcap")
+    assert isinstance(refused.exception, UsageError) and "--force" in str(refused.exception)
+    assert (tmp_path / "other.mcap").read_bytes() == other
+    assert run(tmp_path / "log.mcap", "-o", tmp_path / "other.mcap", "--force").exit_code == 0
+    assert (tmp_path / "other.mcap").read_bytes() != other
+    (tmp_path / "link.mcap").symlink_to(tmp_path / "log.mcap")
+    for name in ("log.mcap", "link.mcap"):
+        refused = run(tmp_path / "log.mcap", "-o", tmp_path / name, "--force")
+        assert "is the file to recover from" in str(refused.exception)
+    assert (tmp_path / "log.mcap").read_bytes() == source

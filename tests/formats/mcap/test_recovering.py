@@ -96,8 +96,8 @@ def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path
     assert read(output)[2].unverified == 0
     source.write_bytes(source.read_bytes().replace(sent[5][2], sent[6][2]))
     with pytest.raises(RecordingError, match="no checksum covers"):
-        recover(source, output)
-    done = recover(source, output, unverified=True)
+        recover(source, output, force=True)
+    done = recover(source, output, unverified=True, force=True)
     assert not done.whole
     assert "the checksum of the data section does not fit" in said(output)["lost"]
     assert read(output)[2].unverified == len(sent)

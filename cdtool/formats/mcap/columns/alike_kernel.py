@@ -19,7 +19,7 @@ _MOST_AHEAD = 1024  # bytes of a message
 
 
 @kernel(
-    f"b1(Array(uint64, 1, 'A', readonly=True, aligned=False), {PLACES}, {PLACES}, int64, "
+    f"b1(Array(uint64, 1, 'A', readonly=True, aligned=False), {PLACES}, {PLACES}, int64, int64, "
     "uint64[::1], uint64[::1], uint64[::1], uint64[::1], int64[::1], int64[::1], uint64[::1])"
 )
 def take_alike(
@@ -27,6 +27,7 @@ def take_alike(
     start: IntArray,
     length: IntArray,
     shortest: int,
+    longest: int,
     compared: WordArray,
     mask: WordArray,
     pattern: WordArray,
@@ -37,12 +38,12 @@ def take_alike(
 ) -> bool:
     """Copy the word at `copied[k]` of message i to `taken[first[k] + i step[k]]`; False where a message is not alike.
 
-    `words[p]` are the 8 bytes from byte p on. Alike: at least `shortest` bytes, and at `compared` (m,) the bits of
-    `mask` as in `pattern`. All these places begin at least 8 bytes before `shortest`.
+    `words[p]` are the 8 bytes from byte p on. Alike: from `shortest` to `longest` bytes, and at `compared` (m,) the
+    bits of `mask` as in `pattern`. All these places begin at least 8 bytes before `shortest`.
     """
     span = min(shortest, _MOST_AHEAD)
     for i in range(start.size):
-        if length[i] < shortest:
+        if length[i] < shortest or length[i] > longest:
             return False
         if i + _AHEAD < start.size:
             for place in range(start[i + _AHEAD], start[i + _AHEAD] + span, _LINE):

@@ -15,7 +15,7 @@ from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns.gathered import UndecodableError
 from cdtool.formats.mcap.columns.slots import Found, Place
 from cdtool.formats.mcap.columns.typed import TypedDecoder
-from cdtool.formats.mcap.columns.walk_kernel import OTHER_KIND
+from cdtool.formats.mcap.columns.walk_kernel import LONG, OTHER_KIND
 from cdtool.formats.mcap.columns.walk_program import Program, compile_program
 from cdtool.formats.mcap.columns.walked import Pattern, pattern_of, walk_all
 from cdtool.formats.mcap.layouts.layout import Schema, Text
@@ -60,6 +60,8 @@ class WalkFinder:
         first = int(np.flatnonzero(found.status)[0])
         length = int(batch.length[first])
         reason = f"a decoding error: its {length} bytes end before its last field"
+        if found.status[first] == LONG:
+            reason = f"a decoding error: its {length} bytes go on behind its last field: written by another definition"
         if found.status[first] == OTHER_KIND:
             begin = int(batch.start[first])
             shown = batch.data[begin : begin + min(length, 4)].tobytes().hex()

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS, THERE, IntArray, Picked
+from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS, THERE, ByteArray, IntArray, Picked
 from cdtool.formats.mcap.columns.slots import Found, Place
-from cdtool.formats.mcap.fields import Field, FieldMissingError, order_of
+from cdtool.formats.mcap.fields import Field, FieldMissingError, is_element_number, order_of
 from cdtool.recording import FloatArray
 
 WHOLE = ":"
@@ -41,6 +41,15 @@ class Plan:
         return (self.place, *(array for array, _ in self.arrays), *(() if self.names is None else (self.names,)))
 
 
+@dataclass(frozen=True)
+class Called:
+    """Which element bears a name in each message: `element` (n,), -1: none; `state` (n,); the first fault's row."""
+
+    element: IntArray
+    state: ByteArray
+    fault: tuple[int, FieldMissingError] | None
+
+
 def nowhere(n: int, fault: FieldMissingError) -> Picked:
     """A field that none of n messages can have."""
     return Picked(np.full(n, math.nan), None, np.full(n, ABSENT, dtype=np.uint8), fault)
@@ -51,6 +60,13 @@ def pick(plan: Plan, found: Found, joints: Sequence[str]) -> Picked:
     return _picked_at_once(plan, found, joints) or _Picking(plan, found, joints).picked()
 
 
+def elements_called(plan: Plan, found: Found) -> Called:
+    """Which element of the plan's array its names call `plan.index`."""
+    picking = _Picking(plan, found, ())
+    element = picking.element(plan.index or "")
+    return Called(element, picking.state, picking.fault)
+
+
 def _picked_at_once(plan: Plan, found: Found, joints: Sequence[str]) -> Picked | None:
     """The field where all messages have as many elements with the same names; None where that is not known."""
     slot = found.slots[plan.place]
@@ -59,7 +75,7 @@ def _picked_at_once(plan: Plan, found: Found, joints: Sequence[str]) -> Picked |
         return None
     n = len(found.status)
     state = np.broadcast_to(_THERE, n)
-    if index is None or (index.isdigit() and int(index) < elements):
+    if index is None or (is_element_number(index) and int(index) < elements):
         return Picked(slot.numbers(None, int(index or 0), 1)[:, 0], None, state, alike=True)
     if index != WHOLE:
         return None
@@ -96,7 +112,7 @@ class _Picking:
             return self.whole()
         if index is None:
             values = self.numbers(self.rows[self.slot.count[self.rows] > 0], 0)
-        elif index.isdigit():
+        elif is_element_number(index):
             self.rows = self.beyond(str(self.plan.place[-1]), self.slot.count, int(index))
             values = self.numbers(self.rows, int(index))
         else:
@@ -126,16 +142,24 @@ class _Picking:
         return values
 
     def joint(self, name: str) -> FloatArray:
-        """The element that the names call `name`; where they are shorter than that, NaN."""
+        """The element that the names call `name`; where the array is shorter than that, NaN."""
         values = np.full(len(self.state), math.nan)
+        element = self.element(name)
+        for place in np.unique(element[element >= 0]).tolist():
+            there = np.flatnonzero(element == place)
+            values[there] = self.slot.numbers(there, place, 1)[:, 0]
+        return values
+
+    def element(self, name: str) -> IntArray:
+        """(n,): which element the names call `name`, -1 where the array is shorter or they name others only."""
+        found = np.full(len(self.state), -1)
         for names, rows in self.found.groups(self.plan.names or (), self.rows):
             if name not in names:
                 self.state[rows] = OTHER_JOINTS
                 continue
             place = names.index(name)
-            there = rows[self.slot.count[rows] > place]
-            values[there] = self.slot.numbers(there, place, 1)[:, 0]
-        return values
+            found[rows[self.slot.count[rows] > place]] = place
+        return found
 
     def whole(self) -> Picked:
         """The array, in the order of the joints where the messages name its elements."""

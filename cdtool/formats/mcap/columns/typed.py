@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns.gathered import Gathered, IntArray
+from cdtool.formats.mcap.columns.by_name import NamedPlan, gather_by_name, numbered
+from cdtool.formats.mcap.columns.gathered import ByteArray, Gathered, IntArray
 from cdtool.formats.mcap.columns.picking import WHOLE, Plan, nowhere, pick
 from cdtool.formats.mcap.columns.slots import Found, Place
-from cdtool.formats.mcap.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError
+from cdtool.formats.mcap.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
 from cdtool.formats.mcap.layouts.layout import Layout, Member, Message, Number, Schema, Text
 
 _MOST_FIELDS = 4096
@@ -35,7 +36,7 @@ class TypedDecoder:
 
     schema: Schema
     finder: Finder
-    _plans: dict[Field, Plan | FieldMissingError] = field(default_factory=dict)
+    _plans: dict[Field, Plan | NamedPlan | FieldMissingError] = field(default_factory=dict)
 
     def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema tells them, whatever the messages are)
         """Every numeric field but the header's stamp, in the order of the schema; of arrays those that may be short."""
@@ -52,20 +53,36 @@ class TypedDecoder:
         """The wanted fields of all messages; one that the schema does not have is absent in all, with its fault."""
         plans = [self.plan(each) for each in wanted]
         stamp = self.stamp_places() if stamps else ()
-        places = dict.fromkeys(place for plan in plans if isinstance(plan, Plan) for place in plan.places)
-        found = self.finder.find(batch, (*places, *(place for place in stamp if place not in places)))
-        picked = tuple(
-            pick(plan, found, joints) if isinstance(plan, Plan) else nowhere(len(batch), plan) for plan in plans
+        places = dict.fromkeys(
+            place for plan in plans if not isinstance(plan, FieldMissingError) for place in plan.places
         )
+        found = self.finder.find(batch, (*places, *(place for place in stamp if place not in places)))
+        parts = [self._gathered(plan, found, batch, joints) for plan in plans]
+        picked = tuple(part.picked[0] for part in parts)
+        status, reason = _damaged(found, parts)
         if not stamps:
-            return Gathered(picked, found.status, found.reason)
+            return Gathered(picked, status, reason)
         times, there = stamp_times(found, stamp)
-        return Gathered(picked, found.status, found.reason, times, there)
+        return Gathered(picked, status, reason, times, there)
+
+    def _gathered(
+        self, plan: Plan | NamedPlan | FieldMissingError, found: Found, batch: Batch, joints: Sequence[str]
+    ) -> Gathered:
+        """One field of all messages, and those that are damaged where only this field shows it."""
+        if isinstance(plan, FieldMissingError):
+            return Gathered((nowhere(len(batch), plan),), found.status, found.reason)
+        if isinstance(plan, Plan):
+            return Gathered((pick(plan, found, joints),), found.status, found.reason)
+
+        def gather(rows: IntArray, field: Field) -> Gathered:
+            return self.gather(_some(batch, rows), [field], joints)
+
+        return gather_by_name(plan, found, gather)
 
     def names(self, batch: Batch, field: Field) -> list[str]:
         """What the first ten messages call the elements of the field's array, sorted."""
         plan = self.plan(field)
-        place = plan.names if isinstance(plan, Plan) else None
+        place = None if isinstance(plan, FieldMissingError) else plan.names
         if place is None:
             return []
         found = self.finder.find(batch, (place,))
@@ -79,7 +96,7 @@ class TypedDecoder:
         found = self.finder.find(batch.first(1), (place,))
         return found.names[place].of(0) if len(found.rows) else ()
 
-    def plan(self, field: Field) -> Plan | FieldMissingError:
+    def plan(self, field: Field) -> Plan | NamedPlan | FieldMissingError:
         """The field's place, or why the schema has none."""
         if field not in self._plans:
             try:
@@ -104,7 +121,25 @@ class TypedDecoder:
         return self.schema.nested(member.kind).member(name)
 
 
-def resolve(field: Field, schema: Schema) -> Plan:
+def _some(batch: Batch, rows: IntArray) -> Batch:
+    """The messages `rows` of a batch."""
+    if len(rows) == len(batch):
+        return batch
+    return Batch(batch.data, batch.start[rows], batch.length[rows], batch.log_time[rows])
+
+
+def _damaged(found: Found, parts: Sequence[Gathered]) -> tuple[ByteArray, str]:
+    """Which messages are damaged, also where only one field shows it, and why the first of them is."""
+    status, reason = found.status, found.reason
+    for part in parts:
+        more = (part.status != 0) & (status == 0)
+        if more.any():
+            first = not status.any() or np.argmax(more) < np.argmax(status != 0)
+            status, reason = np.maximum(status, part.status), part.reason if first else reason
+    return status, reason
+
+
+def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
     """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
     layout = schema.root
     place: Place = ()
@@ -118,10 +153,10 @@ def resolve(field: Field, schema: Schema) -> Plan:
         if index is not None and member.array is None:
             raise FieldMissingError(f"'{name}' is not an array", [name])
         if index == WHOLE or (i == last and index is not None):
-            names = _names_place(layout, parent) if index == WHOLE or not index.isdigit() else None
-            if index != WHOLE and not index.isdigit() and names is None:
-                problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
-                raise FieldMissingError(problem, layout.names)
+            if index == WHOLE:
+                names = _names_place(layout, parent)
+            else:
+                names = None if is_element_number(index or "") else _named_place(layout, parent)
             _require_number(field, member)
             return Plan(field, place, index, tuple(arrays), names)
         if member.array is not None and index is None:
@@ -130,10 +165,14 @@ def resolve(field: Field, schema: Schema) -> Plan:
                 [f"{field.text}[0]", f"{field.text}[:]"] if i == last else (),
             )
         if index is not None:
-            if not index.isdigit():
+            if isinstance(member.kind, Message) and schema.nested(member.kind).entry:
                 raise FieldMissingError(
-                    f"'{name}[{index}]' is a message found by a name", advice="give the element's number instead"
+                    f"'{name}' is a map, whose entries have no order", advice="log the value in a field of its own"
                 )
+            if not is_element_number(index):
+                plan = NamedPlan(Plan(field, place, index, tuple(arrays), _named_place(layout, parent)), i)
+                resolve(numbered(field, i, 0), schema)  # whichever element it is, what stands behind it must be there
+                return plan
             arrays.append((place, int(index)))
             place = (*place, int(index))
         if i == last:
@@ -148,6 +187,15 @@ def _require_number(field: Field, member: Member) -> None:
         raise FieldMissingError(f"'{field.text}' holds a text, not a number")
     if isinstance(member.kind, Message):
         raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
+
+
+def _named_place(layout: Layout, parent: Place) -> Place:
+    """The place of the texts that must be there; raises FieldMissingError."""
+    place = _names_place(layout, parent)
+    if place is None:
+        problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
+        raise FieldMissingError(problem, layout.names)
+    return place
 
 
 def _names_place(layout: Layout, parent: Place) -> Place | None:

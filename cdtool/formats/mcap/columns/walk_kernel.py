@@ -27,7 +27,8 @@ STOP = 9  # at the slot's end
 
 COLUMNS = 5
 DEEPEST = 8  # loops within loops
-WHOLE, CUT, OTHER_KIND = 0, 1, 2  # what becomes of a message
+WHOLE, CUT, OTHER_KIND, LONG = 0, 1, 2, 3  # what becomes of a message
+PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a multiple of 4
 
 BYTES = "Array(uint8, 1, 'C', readonly=True)"
 QUADS = "Array(uint32, 1, 'A', readonly=True, aligned=False)"
@@ -69,7 +70,7 @@ def walk(
         status[i] = WHOLE
         lengths[0] = 0
         if header > 0:
-            if length[i] < header or data[p + 1] > 1:
+            if length[i] < header or data[p] != 0 or data[p + 1] > 1:
                 status[i] = OTHER_KIND
                 continue
             swapped[i] = 1 - data[p + 1]
@@ -161,6 +162,8 @@ def walk(
         lengths[1] = p
         if p > end:
             status[i] = CUT
+        elif status[i] == WHOLE and end - p > (PADDING if header > 0 else 0):
+            status[i] = LONG
 
 
 @kernel(f"b1({BYTES}, {PLACES}, {PLACES}, int64, uint8[::1], uint8[::1])")

@@ -98,7 +98,7 @@ def _texts(count: int, phase: int, big: bool, block: bytes, aligned: bool) -> It
         at += -(at + phase) % 4 if aligned else 0
         size = int.from_bytes(block[at : at + 4], "big" if big else "little")
         text = block[at + 4 : at + 4 + size]
-        yield (text[:-1] if aligned else text).decode(errors="replace")
+        yield (text.removesuffix(b"\0") if aligned else text).decode(errors="replace")
         at += 4 + size
 
 
@@ -118,6 +118,8 @@ class TakenSlot:
     def numbers(self, rows: IntArray | None, first: int, width: int) -> FloatArray:
         """(rows, width) float64; an int64 beyond 2^53 is rounded to the nearest."""
         words = self.words[:, first : first + width]
+        if words.shape[1] < width:  # no message has them: no rows are asked for
+            return np.empty((0, width))
         raw = (words if rows is None else words[rows]).view(f"<{self.kind.dtype}")
         return raw if raw.dtype == np.float64 else raw.astype(np.float64)
 
@@ -127,7 +129,7 @@ class Pattern:
     """What was found in one message, and the words that another one must have for the same to hold.
 
     `places` are offset, count and type, `names` the texts, `taken` the places whose numbers are copied, each with how
-    many words of a message are copied before it; `shortest`, `compared`, `mask`, `pattern`, `copied` are take_alike's,
+    many words of a message are copied before it; `shortest` to `copied` are take_alike's,
     `before` and `step` (k,) its `first`, for one message, and `step`.
     """
 
@@ -135,6 +137,7 @@ class Pattern:
     names: dict[Place, FixedNames]
     taken: dict[Place, int]
     shortest: int
+    longest: int
     compared: WordArray
     mask: WordArray
     pattern: WordArray
@@ -149,7 +152,7 @@ class Pattern:
         copied = np.empty(n * len(self.copied), dtype=np.uint64)
         first = self.before * (n - 1) + np.arange(len(self.copied))
         alike = self.compared, self.mask, self.pattern, self.copied, first, self.step, copied
-        if not take_alike(words_of(batch.data), batch.start, batch.length, self.shortest, *alike):
+        if not take_alike(words_of(batch.data), batch.start, batch.length, self.shortest, self.longest, *alike):
             return None
         slots: dict[Place, Slot] = {}
         for place, (offset, count, kind) in self.places.items():
@@ -170,7 +173,7 @@ def pattern_of(program: Program, batch: Batch, header: int) -> Pattern | None:
     if walked.status[0] or walked.swapped[0] or lengths[0] > _MOST_LENGTHS or size < WORD:
         return None
     mask = np.zeros(size, dtype=np.uint8)
-    mask[1 : 2 if header else 0] = 255  # the byte order
+    mask[: 2 if header else 0] = 255  # the kind and the byte order
     for at in (lengths[2 : 2 + int(lengths[0])] - begin).tolist():
         mask[at : at + 4] = 255
     places, names, taken = {}, {}, {}
@@ -190,11 +193,12 @@ def pattern_of(program: Program, batch: Batch, header: int) -> Pattern | None:
             copied += range(at, at + count * WORD, WORD)
     compared = compared_words(mask, batch.data[begin : begin + size])
     layout = (np.array(before, dtype=np.int64), np.array(step, dtype=np.int64))
-    return Pattern(places, names, taken, size, *compared, np.array(copied, dtype=np.uint64), *layout)
+    longest = size + (walk_kernel.PADDING if header else 0)
+    return Pattern(places, names, taken, size, longest, *compared, np.array(copied, dtype=np.uint64), *layout)
 
 
 def walk_all(program: Program, batch: Batch, header: int) -> Found:
-    """The places of all messages, one after another; `status` is walk_kernel's WHOLE, CUT or OTHER_KIND."""
+    """The places of all messages, one after another; `status` is walk_kernel's."""
     walked = _Walked(program, batch, header, 0)
     swapped = walked.swapped if walked.swapped.any() else None
     slots = {

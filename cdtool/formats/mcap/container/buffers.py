@@ -14,7 +14,7 @@ import numpy as np
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
 _LARGE_PAGE = 2 << 20
-_MOST_KEPT = 4
+_MOST_KEPT = 3
 
 
 class Buffers:

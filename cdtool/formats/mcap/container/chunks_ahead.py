@@ -27,7 +27,7 @@ from cdtool.formats.mcap.container.walk_kernel import Bytes
 
 # Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
 # through the processor's cache, with less, what there is to do for each piece of memory counts.
-JOINED = 10 << 20
+JOINED = 14 << 20
 _LARGEST = 16 << 20  # chunks beyond this size are read one by one
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4

@@ -22,7 +22,7 @@ _HEADER = 31  # opcode, length, channel id, sequence, two times: what stands bef
 class CleanFile:
     """A file under way; `finish` makes it whole. Uncovered chunks carry no CRC, and then neither does the summary."""
 
-    def __init__(self, file: IO[bytes]) -> None:
+    def __init__(self, file: IO[bytes], profile: str = "") -> None:
         import zstandard
 
         self._file = file
@@ -38,7 +38,7 @@ class CleanFile:
         self._times: list[tuple[int, int]] = []
         self._unverified = False
         file.write(MAGIC)
-        self._write(written.Header(profile="", library="cdtool"))
+        self._write(written.Header(profile=profile, library="cdtool"))
 
     def add_messages(self, messages: Sequence[Messages], covered: bool) -> None:
         """One chunk of them, in the order of the file they come from; without a CRC where none covered them."""

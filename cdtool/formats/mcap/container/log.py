@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import Definitions, Stream
+from cdtool.formats.mcap.container.ends import end_of_log, profile_of
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.room import Piece
@@ -33,12 +34,13 @@ class Messages:
 
 @dataclass
 class Topic:
-    """All channels of one topic: what they say of themselves, and how many messages there are."""
+    """All channels of one topic: what the first says of itself, how many have messages, and how many messages."""
 
     name: str
     schema: str
     encoding: str
     count: int = 0
+    channels: int = 0
 
 
 class Log:
@@ -64,6 +66,7 @@ class Log:
         self._skip = skippable(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
         self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
+        self.profile = profile_of(self._file)
         self.counts: Counter[int] = Counter()
         self.topics: dict[str, Topic] = {}
         self.origin = 0
@@ -125,8 +128,10 @@ class Log:
             schema = stream.schema.name if stream.schema is not None else "no schema"
             topic = self.topics.setdefault(name, Topic(name, schema, stream.channel.message_encoding))
             topic.count += self.counts[stream.channel.id]
+            topic.channels += bool(self.counts[stream.channel.id])
         self.origin = section.room.first_time or 0
         self._check_data_crc()
+        self._look_behind()
         if self._strict and not self.count and section.losses:
             self._raise_nothing_left()
 
@@ -145,6 +150,15 @@ class Log:
             text = "the checksum of the data section does not fit"
             text += "" if self.unverified else " (those of the chunks with messages do)"
             self.section.losses.add(Loss(self.section.end_at, 0, text))
+
+    def _look_behind(self) -> None:
+        """Bytes behind the end: of a file that is joined to it, whose summary is none of this log's."""
+        if not self.summary.problem or self.section.end is None:
+            return
+        end = end_of_log(self._file, self.section.end_at)
+        if end is not None and end < self._file.size:
+            self.section.losses.add(Loss(end, self._file.size - end, "the log ends here: another file joined to it?"))
+            self.summary = replace(self.summary, problem="")
 
     def _raise_nothing_left(self) -> None:
         losses = self.section.losses
@@ -169,6 +183,10 @@ class Log:
         if self.unverified:
             text = f"{self.unverified} of {self.count} messages carry no checksum: unverified"
             found.append(Finding(text, severity="note"))
+        for topic in self.topics.values():
+            if topic.channels > 1 and self._wanted(topic.name):
+                text = f"{topic.channels} channels write to it: their messages are one column, sorted by time"
+                found.append(Finding(text, topic.name))
         if not self.count:
             found.append(Finding("holds no message"))
         return found

@@ -88,10 +88,11 @@ class Member:
 
 @dataclass(frozen=True)
 class Layout:
-    """A message type: its members in the order of the schema."""
+    """A message type: its members in the order of the schema; `entry`: that of a map."""
 
     name: str
     members: tuple[Member, ...]
+    entry: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -33,6 +33,7 @@ _TYPES = {
     18: ("sint64", "int64"),
 }
 _REPEATED = 3  # FieldDescriptorProto.Label
+_MAP_ENTRY = 7  # of MessageOptions
 _IMPLICIT = 2  # FeatureSet.FieldPresence
 _DELIMITED = 2  # FeatureSet.MessageEncoding
 _Fields = dict[int, list[int | bytes]]
@@ -83,11 +84,13 @@ def parse_protobuf(name: str, data: bytes) -> Schema:
 def _layouts(message: int | bytes, prefix: str, features: _Features) -> Iterator[tuple[str, Layout]]:
     found = _fields(message)
     name = prefix + _text(found.get(1, [b""])[-1])
-    features = features.with_options(found.get(7, []), 12)
+    options = found.get(7, [])
+    features = features.with_options(options, 12)
+    entry = any(_fields(option).get(_MAP_ENTRY, [0])[-1] for option in options)
     members = tuple(_member(field, features) for field in found.get(2, []))
     if len({member.name for member in members}) < len(members):
         raise SchemaError(f"{name} has two fields of the same name")
-    yield name, Layout(name, members)
+    yield name, Layout(name, members, entry)
     for nested in found.get(3, []):
         yield from _layouts(nested, f"{name}.", features)
 

@@ -1,0 +1,148 @@
+"""Peak memory of commands on a long MCAP log that is mostly images: do 2 GB of an hour at 1 kHz pass through 1 GB?
+
+Writes logs of an hour and of ten minutes, without and with compression, into a temporary folder (5 GB), and runs each
+command on them in a process of its own. Peaks are read from /proc: of the whole process, of its own (anonymous) memory,
+and of file pages, which are libraries mostly and can be dropped when memory is short. Linux only.
+
+python benchmarks/memory.py [GB of the hour]
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, sleep
+
+from memory_logs import MACHINE_CHANNELS, write_log
+from timing import main, table
+
+import cdtool
+from cdtool.formats.channel_assembly import as_logged
+from cdtool.formats.reading import mapped_source
+from cdtool.machine_file import read_machine_file
+from cdtool.recording import Recording
+
+GIGABYTES = 2.0
+HOUR_S, SHORT_S = 3600.0, 600.0
+DETECT_AT_MOST_MB, GROWTH_AT_MOST_MB = 1000, 50
+GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
+DETECTORS = ("gm", "feekf")
+_COMMAND = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
+_EVERY_S = 0.005
+_FIGURES = ("VmHWM", "RssAnon", "RssFile")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Most memory [MB] of a process: in all, its own, of files; and how long it ran [s]."""
+
+    whole: float
+    own: float
+    files: float
+    seconds: float
+
+
+def measure() -> bool:
+    if not Path("/proc/self/status").exists():
+        sys.exit("error: peaks are read from /proc, which this system does not have")
+    size = 1e9 * (float(sys.argv[1]) if len(sys.argv) > 1 else GIGABYTES)
+    held = True
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        prepared = _prepare(folder)
+        for compression in ("none", "zstd"):
+            logs = {"1 h": folder / "hour.mcap", "10 min": folder / "short.mcap"}
+            for log, seconds in zip(logs.values(), (HOUR_S, SHORT_S), strict=True):
+                write_log(log, prepared, seconds, size * seconds / HOUR_S, compression)
+            print(f"\ncompression {compression}: {logs['1 h'].stat().st_size / 1e9:.2f} GB of 1 h", flush=True)
+            held &= _measured(folder, logs)
+    return held
+
+
+def _prepare(folder: Path) -> Recording:
+    """The machine file of the long logs, signatures for it, and the run that the logs repeat."""
+    known = read_machine_file(GATE / "machine.toml")
+    text = (GATE / "machine.toml").read_text(encoding="utf-8")
+    (folder / "machine.toml").write_text(text.partition("[channels]")[0] + MACHINE_CHANNELS, encoding="utf-8")
+    free = sorted(map(str, (GATE / "free").iterdir()))
+    for detector in DETECTORS:
+        learn = ["learn-signature", *free, "--machine", str(GATE / "machine.toml"), "--detector", detector]
+        _peak([*learn, "-o", str(folder / f"{detector}.json")])
+    source, channels = mapped_source(GATE / "free" / "01.mcap", known)
+    recording: Recording = as_logged(source, channels, known.machine)
+    return recording
+
+
+def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
+    machine = ["--machine", str(folder / "machine.toml")]
+    detect = {
+        f"detect {name}": ["detect", "LOG", *machine, "--signature", str(folder / f"{name}.json")] for name in DETECTORS
+    }
+    detect["detect gm --plot"] = [*detect["detect gm"], "--plot", str(folder / "plot.png")]
+    bounded = {
+        "info": ["info", "LOG"],
+        "convert to .parquet": ["convert", "LOG", str(folder / "out.parquet"), "--force"],
+        "convert to .mcap": ["convert", "LOG", str(folder / "out.mcap"), "--force"],
+        "recover": ["recover", "LOG", "-o", str(folder / "recovered.mcap"), "--unverified", "--force"],
+    }
+    held, rows = True, []
+    for task, arguments in (detect | bounded).items():
+        peaks = {}
+        for length, log in logs.items():
+            peaks[length] = _peak([str(log) if part == "LOG" else part for part in arguments])
+            peak = peaks[length]
+            figures = (f"{megabytes:.0f}" for megabytes in (peak.whole, peak.own, peak.files))
+            rows.append((task, length, *figures, f"{peak.seconds:.1f}"))
+        hour, growth = peaks["1 h"].whole, peaks["1 h"].whole - peaks["10 min"].whole
+        if task in detect:
+            held &= _verdict(f"{task} of 1 h, peak MB", hour, DETECT_AT_MOST_MB)
+        else:
+            held &= _verdict(f"{task}: 1 h over 10 min, MB more", growth, GROWTH_AT_MOST_MB)
+    table(("command", "log", "peak MB", "own", "files", "s"), rows)
+    return held
+
+
+def _peak(arguments: Sequence[str]) -> Peak:
+    """A command in a fresh process; stops the benchmark where it fails."""
+    package = str(Path(cdtool.__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, os.environ.get("PYTHONPATH"))))}
+    begin = perf_counter()
+    most = dict.fromkeys(_FIGURES, 0)
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _COMMAND, *arguments], env=environment, stdout=output, stderr=subprocess.STDOUT
+        )
+        while process.poll() is None:
+            for name, kilobytes in _status(process.pid).items():
+                most[name] = max(most[name], kilobytes)
+            sleep(_EVERY_S)
+        if process.returncode:
+            output.seek(0)
+            sys.exit(f"error: cdtool {arguments[0]}: status {process.returncode}\n{output.read()}")
+    figures = (most[name] * 1024 / 1e6 for name in _FIGURES)
+    return Peak(*figures, perf_counter() - begin)
+
+
+def _status(number: int) -> dict[str, int]:
+    """Kilobytes of a process; nothing of one that has just ended."""
+    try:
+        lines = Path(f"/proc/{number}/status").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return {}
+    pairs = (line.partition(":")[::2] for line in lines)
+    return {name: int(value.split()[0]) for name, value in pairs if name in _FIGURES}
+
+
+def _verdict(name: str, megabytes: float, at_most: float) -> bool:
+    held = megabytes <= at_most
+    print(f"{'ok  ' if held else 'FAIL'}  {name}: {megabytes:.0f} wanted at most {at_most:g}", flush=True)
+    return held
+
+
+if __name__ == "__main__":
+    main("memory of long logs", measure)

@@ -1,0 +1,103 @@
+"""Causal alignment of channels to a detector's clock, and what is odd about time stamps.
+
+Nothing here looks at a later sample: a value at time t comes from samples at or before t. stamps.py makes a log's
+stamps strictly increase, coarse.py those of a clock that is coarser than the samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.clock.coarse import recent_medians
+from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recording import FloatArray, Series
+
+__all__ = [
+    "EPOCH",
+    "GAP_PERIODS",
+    "HOLD_PERIODS",
+    "CleanTime",
+    "clean_time",
+    "differentiate",
+    "epoch_start",
+    "gap_findings",
+    "integrate",
+    "previous_value",
+]
+
+# A held value older than this many of its own periods is missing, not valid.
+HOLD_PERIODS = 5.0
+
+
+def previous_value(series: Series, clock: FloatArray) -> FloatArray:
+    """(m, J): at each time of `clock` [s] the last sample at or before it; NaN where there is none or it is too old."""
+    if series.time is clock or (len(series.time) == len(clock) and np.array_equal(series.time, clock)):
+        return series.values
+    at = np.searchsorted(series.time, clock, side="right") - 1
+    held = series.values[np.maximum(at, 0)]
+    age = clock - series.time[np.maximum(at, 0)]
+    oldest = HOLD_PERIODS * _recent_period(series.time)[np.maximum(at, 0)]
+    return np.where(((at < 0) | (age > oldest))[:, np.newaxis], np.nan, held)
+
+
+def _recent_period(time: FloatArray) -> FloatArray:
+    """At each sample the median of its last steps [s]; infinite at the first, which has none."""
+    period = np.full(len(time), np.inf)
+    if len(time) > 1:
+        steps = np.diff(time)
+        period[1:] = recent_medians(steps, float(steps[0]))
+    return period
+
+
+def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
+    """Causal derivative of a position: backward difference, then two first-order low-passes at `low_pass_hz`.
+
+    A missing sample is skipped: the difference runs over the longer step. The first sample is NaN.
+    """
+    rates = np.full(series.values.shape, np.nan)
+    for joint in range(series.joint_count):
+        # Copies: a Series is read-only, and the kernel's signature is of arrays that are not.
+        column = series.values[:, joint].copy()
+        _differentiate(series.time, column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
+    return Series(series.time, rates, unit)
+
+
+def integrate(series: Series, unit: str) -> Series:
+    """Causal integral of a speed from 0 (trapezoid); over a missing sample the last speed is held."""
+    speed = np.where(np.isfinite(series.values), series.values, np.nan)
+    filled = _hold_last(speed)
+    steps = np.diff(series.time)[:, np.newaxis] * 0.5 * (filled[1:] + filled[:-1])
+    travel = np.vstack((np.zeros((1, series.joint_count)), np.cumsum(steps, axis=0)))
+    return Series(series.time, travel, unit)
+
+
+def _hold_last(values: FloatArray) -> FloatArray:
+    rows = np.where(np.isfinite(values), np.arange(len(values))[:, np.newaxis], 0)
+    last = np.maximum.accumulate(rows, axis=0)
+    held: FloatArray = np.take_along_axis(values, last, axis=0)
+    return np.nan_to_num(held, nan=0.0)
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[:])")
+def _differentiate(time: FloatArray, position: FloatArray, cutoff: float, out: FloatArray) -> None:
+    last = -1
+    first_stage = 0.0
+    second_stage = 0.0
+    started = False
+    for k in range(len(time)):
+        if not np.isfinite(position[k]):
+            continue
+        if last >= 0:
+            step = time[k] - time[last]
+            rate = (position[k] - position[last]) / step
+            if started:
+                weight = 1.0 - np.exp(-cutoff * step)
+                first_stage += weight * (rate - first_stage)
+                second_stage += weight * (first_stage - second_stage)
+            else:
+                first_stage = rate
+                second_stage = rate
+                started = True
+            out[k] = second_stage
+        last = k

@@ -1,0 +1,77 @@
+"""Columns of dates and times of day as seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
+from cdtool.formats.csv.rows import Rows
+from cdtool.formats.csv.stamps import NS, over_midnight, seconds_since
+from cdtool.recording import Finding, FloatArray
+
+_DAY = 86400 * NS
+
+
+class StampColumns:
+    """Stamps -> seconds since the first of them that has a date, or since midnight; `origin` [ns] is that first one.
+
+    Rows may come piece by piece, in the file's order.
+    """
+
+    def __init__(self, dialect: Dialect, read: Sequence[int], dates: Mapping[int, int]) -> None:
+        self._dialect, self._read, self._dates = dialect, read, dates
+        self._columns = [column for column in read if column not in dates.values()]
+        self.origin: int | None = None
+        self._nights = dict.fromkeys(self._columns, 0)
+        self._last: dict[int, Integers] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """The columns that it makes."""
+        return [self._dialect.names[column] for column in self._columns]
+
+    def seconds(self, rows: Rows) -> dict[str, FloatArray]:
+        """The next rows."""
+        return {self._dialect.names[column]: self._of(column, rows) for column in self._columns}
+
+    def _of(self, column: int, rows: Rows) -> FloatArray:
+        stamps = rows.stamps[self._read.index(column)].copy()
+        known = stamps != MISSING_STAMP
+        dated = self._dated(column)
+        if column in self._dates:
+            days = rows.stamps[self._read.index(self._dates[column])]
+            known &= days != MISSING_STAMP
+            stamps[known] += days[known]
+        elif not dated and known.any():
+            # Before them the last stamp so far: midnight may lie between two pieces.
+            times = np.concatenate((self._last.get(column, stamps[known][:1]), stamps[known]))
+            self._last[column] = times[-1:].copy()
+            passed = over_midnight(times, np.ones(len(times), dtype=bool))
+            stamps[known] = times[1:] + self._nights[column] * _DAY
+            self._nights[column] += passed
+        if dated and self.origin is None and known.any():
+            self.origin = int(stamps[known][0])
+        return seconds_since(stamps, known, self._start(column))
+
+    def _dated(self, column: int) -> bool:
+        return self._dialect.stamped[column].layouts[0].dated or column in self._dates
+
+    def _start(self, column: int) -> int:
+        return self.origin if self._dated(column) and self.origin is not None else 0
+
+    def findings(self) -> list[Finding]:
+        """How each is written, and what its seconds count from."""
+        found = []
+        for column in self._columns:
+            text = ""
+            if column in self._dates:
+                text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
+            elif self._nights[column]:
+                text = f"passes midnight {self._nights[column]} times; "
+            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else "midnight"
+            text += f"written as {self._dialect.stamped[column].layouts[0].pattern}; in s since {since}"
+            found.append(Finding(text, self._dialect.names[column], "note"))
+        return found

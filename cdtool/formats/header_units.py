@@ -1,0 +1,92 @@
+"""Does a log's header measure a channel in the unit that the machine file states for it?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.source import Column, Source, find_key, split_unit
+from cdtool.recording import Finding
+from cdtool.units import RAW_UNITS, Unit, find_unit
+
+# Plain numbers, whatever they are called.
+_PLAIN = ("1", "count")
+# A scale that makes up for another unit is often rounded: 0.1047 for rpm. No two units of one kind are so close.
+_ROUNDED = 1e-3
+
+
+def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
+    """A warning for each channel whose columns' units contradict the machine file, in kind or by a factor.
+
+    An explicit scale that leads from the header's unit to the channel's is no contradiction; a header without a unit,
+    with one that is not known, or with "1", says nothing. Raises RecordingError where a column is not in the file.
+    """
+    names = source.names or tuple(source.columns)
+    found = []
+    for item in channels.sources:
+        columns = [source.columns[find_key(source.path, item.channel, column, names)] for column in item.columns]
+        found += channel_unit_findings(item, columns)
+    return found
+
+
+def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
+    """The warnings of one channel, one for each unit that contradicts: `columns` are those of its joints."""
+    stated = find_unit(item.stated) if item.stated else None
+    if stated is None:
+        return []
+    by_unit: dict[str, list[Column]] = {}
+    for column, factor in zip(columns, item.factor, strict=False):
+        told = find_unit(column.unit) if column.unit else None
+        if told is not None and not _fits(told, stated, item.unit, abs(factor)):
+            by_unit.setdefault(str(column.unit), []).append(column)
+    return [Finding(_contradiction(item, stated, unit, found), item.channel) for unit, found in by_unit.items()]
+
+
+def time_unit_findings(time: TimeSource, column: Column) -> list[Finding]:
+    """The warning on a clock whose column has another unit than the machine file states, or is no time at all."""
+    told = find_unit(column.unit) if column.unit else None
+    if told is None or told.si in _PLAIN or (told.si == "s" and math.isclose(told.factor, time.factor)):
+        return []
+    stated = f"counts samples at {time.rate:g} Hz" if time.rate else time.unit
+    text = f"the header says '{_shown(column)}', the machine file {stated}"
+    advice = f'write unit = "{column.unit}" if the header is right' if told.si == "s" else "is it another column?"
+    return [Finding(f"{text}{_ratio(told, Unit('s', time.factor))}: {advice}", "time")]
+
+
+def _fits(told: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
+    if told == Unit("1", 1.0) and stated.si != "1":  # what some loggers write where they know no unit
+        return True
+    alike = told.si == stated.si or (told.si in _PLAIN and stated.si in _PLAIN)
+    if stated.si == "SI":  # of joints of both kinds each has its own SI unit
+        alike = told.si not in RAW_UNITS
+    if alike and math.isclose(told.factor, stated.factor):
+        return True
+    return told.si == channel_unit and math.isclose(told.factor, factor, rel_tol=_ROUNDED)
+
+
+def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> str:
+    told = find_unit(unit)
+    assert told is not None
+    more = f" and {len(columns) - 1} more so" if len(columns) > 1 else ""
+    text = f"the header says '{_shown(columns[0])}'{more}, the machine file {item.stated}{_ratio(told, stated)}"
+    advice = f'write unit = "{unit}"'
+    if item.duty is None and told.si in RAW_UNITS and stated.si != told.si:
+        advice += f" with a scale in {item.unit} per {told.si}"
+    elif told.si == item.unit and stated.si in RAW_UNITS:
+        advice += " without that scale"
+    elif told.si not in (item.unit, stated.si, *RAW_UNITS):
+        return f"{text}: is it another column?"
+    return f"{text}: {advice} if the header is right"
+
+
+def _ratio(told: Unit, stated: Unit) -> str:
+    """By how much values of one kind are wrong where the header is right."""
+    if told.si != stated.si:
+        return ""
+    ratio = told.factor / stated.factor
+    return f" (a factor of {max(ratio, 1.0 / ratio):.4g})"
+
+
+def _shown(column: Column) -> str:
+    return column.name if split_unit(column.name)[1] is not None else f"{column.name} [{column.unit}]"

@@ -1,0 +1,58 @@
+"""The mapped channels of a log as `cdtool convert` writes them: as they were logged, in SI, held in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.formats.channel_assembly import as_logged
+from cdtool.formats.groups import Group, Part
+from cdtool.formats.reading import mapped_source
+from cdtool.formats.source import Column
+from cdtool.machine_file import MachineFile
+from cdtool.recording import FloatArray, Recording, Series
+
+# Rows of the longest clock that are handed on at once.
+_ROWS = 1 << 16
+
+
+class ChannelRows:
+    """A recording's groups, the channels of one clock together, and their rows as often as they are asked for."""
+
+    def __init__(self, path: Path, machine_file: MachineFile) -> None:
+        source, channels = mapped_source(path, machine_file)
+        self._recording: Recording = as_logged(source, channels, machine_file.machine)
+        self.origin, self.findings = self._recording.origin, self._recording.findings
+        clocks: dict[bytes, list[str]] = {}
+        for name, series in self._recording.channels.items():
+            clocks.setdefault(series.time.tobytes(), []).append(name)
+        self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
+
+    def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
+        """The rows of these groups, from one sample of the longest clock to another."""
+        series = [[self._recording[column.name] for column in group.columns] for group in groups]
+        times = [channels[0].time for channels in series]
+        before = [0] * len(times)
+        for end in (*max(times, key=len)[_ROWS::_ROWS].tolist(), np.inf):
+            to = [int(np.searchsorted(time, end, side="left")) for time in times]
+            yield [
+                Part(channels[0].time[a:b], tuple(_values(item, slice(a, b)) for item in channels)) if b > a else None
+                for channels, a, b in zip(series, before, to, strict=True)
+            ]
+            before = to
+
+    def _group(self, name: str, channels: Sequence[str]) -> Group:
+        first = self._recording[channels[0]]
+        columns = tuple(_header(channel, self._recording[channel]) for channel in channels)
+        return Group(name, columns, len(first), True, float(first.time[0]), self._recording.joints)
+
+
+def _header(name: str, series: Series) -> Column:
+    shape = (0, series.joint_count) if series.joint_count > 1 else (0,)
+    return Column(name, np.empty(shape), None, None if series.unit == "1" else series.unit)
+
+
+def _values(series: Series, rows: slice) -> FloatArray:
+    return series.values[rows] if series.joint_count > 1 else series.values[rows, 0]

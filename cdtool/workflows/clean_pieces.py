@@ -1,0 +1,153 @@
+"""clock.clean_time and clock.gap_findings of a clock that comes piece by piece: the same times, the same findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.clock import GAP_PERIODS
+from cdtool.formats.distribution import Distribution
+from cdtool.recording import BoolArray, Finding, FloatArray
+
+_SHOWN = 3
+# As in clock/stamps.py; a test holds the two alike.
+_STRAY_SHARE, _RESTART_ROWS = 0.01, 3
+_COUNTERS = (16, 32)
+
+
+class _Dropped:
+    """Rows that were dropped: how many, and which the first were."""
+
+    def __init__(self, what: str) -> None:
+        self.what, self.count = what, 0
+        self._first: list[int] = []
+
+    def add(self, rows: npt.NDArray[np.intp], before: int) -> None:
+        """Some rows of a piece that begins behind `before` others."""
+        self.count += len(rows)
+        self._first += (rows[: _SHOWN - len(self._first)] + before).tolist()
+
+    def finding(self, rows: int, first_row: int, why: str) -> Finding:
+        """They are a loss where there is a reason, or where they are more than strays."""
+        name, share = "line" if first_row else "sample", self.count / rows
+        shown = ", ".join(str(row + first_row) for row in self._first)
+        where = f"{name} {shown}{', ...' if self.count > _SHOWN else ''}"
+        text = f"{self.count} time stamps {self.what} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
+        return Finding(text, "time", "loss" if why or share > _STRAY_SHARE else "warning")
+
+
+class _Restart:
+    """Why stamps run backward where that is no stray one: a counter wraps, or the clock starts again."""
+
+    def __init__(self) -> None:
+        self._steps = Distribution()
+        self._last = np.empty(0)
+        self._whole, self._largest = True, 0.0
+        self._fall: tuple[float, float] | None = None
+        self._run = self._longest = 0  # of rows that run backward
+
+    def add(self, stamps: FloatArray, backward: BoolArray) -> None:
+        """The finite stamps of a piece as the file has them, and which of them run backward."""
+        known = np.concatenate((self._last, stamps))
+        steps = np.diff(known)
+        self._steps.add(steps[steps > 0.0])
+        self._whole = self._whole and bool(np.all(stamps == np.floor(stamps)))
+        self._largest = max(self._largest, float(np.max(np.abs(stamps), initial=0.0)))
+        falls = np.flatnonzero(backward)
+        if len(falls) and self._fall is None:
+            at = int(falls[0]) + len(self._last)
+            self._fall = float(known[at - 1]), float(known[at])
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], backward, [False])).astype(np.int8)))
+        runs = (edges[1::2] - edges[::2]).tolist()
+        if len(backward) and not backward[0]:
+            self._run = 0
+        if runs and edges[0] == 0:
+            runs[0] += self._run
+        self._longest = max(self._longest, *runs, 0)
+        self._run = (runs[-1] if runs and edges[-1] == len(backward) else 0) if len(backward) else self._run
+        self._last = known[-1:]
+
+    def why(self) -> str:
+        """Empty where there is no more to say."""
+        if self._fall is None:
+            return ""
+        usual = self._steps.median if self._steps.count else 0.0
+        for bits in _COUNTERS if self._whole else ():
+            wide = 2.0**bits
+            if self._largest < wide and 0.0 < self._fall[1] - self._fall[0] + wide <= GAP_PERIODS * usual:
+                return (
+                    f"; the counter of {bits} bits wraps there: log a wider one, "
+                    f"or add {int(wide)} to the stamps from each wrap on"
+                )
+        if self._longest >= _RESTART_ROWS:
+            return (
+                "; the clock starts again there, or has jumped ahead before: cut the log there, or correct its stamps"
+            )
+        return ""
+
+
+class CleanPieces:
+    """Stamps [s] -> strictly increasing times; what is missing, repeated or runs backward is dropped.
+
+    A coarse clock, whose stamps repeat (clean_time makes a straight line of it), does not come here: guess_clock takes
+    no column for a clock that stands still at more than a fifth of its steps.
+    """
+
+    def __init__(self) -> None:
+        self._unknown, self._repeated = _Dropped("are no number"), _Dropped("repeat")
+        self._backward, self._restart = _Dropped("run backward"), _Restart()
+        self._highest = -np.inf
+        self._rows = 0
+
+    def times(self, stamps: FloatArray, counted: FloatArray) -> FloatArray:
+        """The times of those rows of a piece that are kept; `counted` are the stamps as the file has them."""
+        known = np.isfinite(stamps)
+        before, self._rows = self._rows, self._rows + len(stamps)
+        index, kept = np.flatnonzero(known), stamps[known]
+        highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
+        repeated, backward = kept == highest[:-1], kept < highest[:-1]
+        self._highest = float(highest[-1])
+        self._unknown.add(np.flatnonzero(~known), before)
+        self._backward.add(index[backward], before)
+        self._repeated.add(index[repeated], before)
+        self._restart.add(counted[known], backward)
+        times: FloatArray = kept[~(backward | repeated)]
+        return times
+
+    def findings(self, first_row: int) -> list[Finding]:
+        """What was dropped; `first_row` is the file's line of the first sample (0: not known)."""
+        kinds = ((self._unknown, ""), (self._backward, self._restart.why()), (self._repeated, ""))
+        return [rows.finding(self._rows, first_row, why) for rows, why in kinds if rows.count]
+
+
+def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Finding]:
+    """Gaps and jitter of strictly increasing times [s] whose median step is `period` [s]."""
+    last, count, total = np.empty(0), 0, 0
+    shown: list[str] = []
+    regular, mean, squares = 0, 0.0, 0.0  # steps that are no gaps, and their spread so far
+    for piece in times:
+        total += len(piece)
+        time = np.concatenate((last, piece))
+        steps = np.diff(time)
+        gaps = np.flatnonzero(steps > GAP_PERIODS * period)
+        count += len(gaps)
+        shown += [f"{time[i]:.3f} s ({steps[i] * 1e3:.0f} ms)" for i in gaps[: _SHOWN - len(shown)]]
+        usual = steps[steps <= GAP_PERIODS * period]
+        if len(usual):
+            share = len(usual) / (regular + len(usual))
+            off = float(usual.mean()) - mean
+            squares += float(usual.var()) * len(usual) + off * off * regular * share
+            regular, mean = regular + len(usual), mean + off * share
+        last = time[-1:]
+    found = []
+    if total > 2:  # fewer stamps have no usual step
+        if count:
+            more = f" and {count - _SHOWN} more" if count > _SHOWN else ""
+            found.append(Finding(f"{count} gaps after {', '.join(shown)}{more}", channel))
+        jitter = float(np.sqrt(squares / regular)) / period if regular else 0.0
+        if jitter > 0.1:
+            text = f"the sample period varies by {100 * jitter:.0f} % (std) about {period * 1e3:.3g} ms"
+            found.append(Finding(text, channel))
+    return found

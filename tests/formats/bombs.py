@@ -1,0 +1,140 @@
+"""Small files that claim to become large: made in a moment, without ever holding what they claim."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+MIB = 2**20
+# MATLAB's own header of a file of version 7.3, in front of HDF5.
+MAT_HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan  6 09:00:00 2025 HDF5 schema 1.00 ."
+
+
+def deflated_zeros(mib: int) -> bytes:
+    """A zlib stream of so many MiB of zeros: one block of 1 MiB, again and again."""
+    packer = zlib.compressobj(9)
+    first = packer.compress(bytes(MIB)) + packer.flush(zlib.Z_FULL_FLUSH)
+    block = packer.compress(bytes(MIB)) + packer.flush(zlib.Z_FULL_FLUSH)
+    checksum = struct.pack(">HH", mib * MIB % 65521, 1)  # Adler-32 of zeros
+    return first + block * (mib - 1) + b"\x03\x00" + checksum
+
+
+def with_mat_header(path: Path) -> Path:
+    """Write MATLAB's header into the user block of an HDF5 file."""
+    with path.open("r+b") as file:
+        file.write(MAT_HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
+    return path
+
+
+def hdf5_never_written(path: Path) -> Path:
+    """A dataset of 75 GiB of which nothing was written."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("a", shape=(1, 10**10), chunks=(1, 1000), dtype="f8").attrs["MATLAB_class"] = b"double"
+    return with_mat_header(path) if path.suffix == ".mat" else path
+
+
+def hdf5_one_chunk(path: Path, mib: int = 4096) -> Path:
+    """1000 values in one chunk of 4 GiB."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        chunk = (1, mib * MIB // 8)
+        dataset = file.create_dataset("a", (1, 1000), "f8", maxshape=(1, None), chunks=chunk, compression="gzip")
+        dataset.attrs["MATLAB_class"] = b"double"
+        dataset.id.write_direct_chunk((0, 0), deflated_zeros(mib))
+    return with_mat_header(path) if path.suffix == ".mat" else path
+
+
+def hdf5_packed_twice(path: Path, mib: int = 4096) -> Path:
+    """1000 values in a chunk of 8 kB, whose bytes unpack, twice, to 4 GiB."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        packing = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        packing.set_chunk((1, 1000))
+        packing.set_deflate(9)
+        packing.set_deflate(9)
+        space = h5py.h5s.create_simple((1, 1000))
+        h5py.h5d.create(file.id, b"a", h5py.h5t.IEEE_F64LE, space, packing).write_direct_chunk(
+            (0, 0), zlib.compress(deflated_zeros(mib), 9)
+        )
+        file["a"].attrs["MATLAB_class"] = b"double"
+    return with_mat_header(path) if path.suffix == ".mat" else path
+
+
+def parquet_of_zeros(path: Path, rows: int = 10**8) -> Path:
+    """100 million times false, which is 763 MiB as numbers: of a run of them no more than its length is written."""
+    import pyarrow as arrow
+    import pyarrow.parquet as parquet
+
+    table = arrow.table({"a": np.zeros(10**7, dtype=bool)})
+    with parquet.ParquetWriter(path, table.schema, compression="zstd") as writer:
+        for _ in range(rows // 10**7):
+            writer.write_table(table, row_group_size=10**7)
+    return path
+
+
+def parquet_with_false_rows(path: Path, rows: int = 10**8) -> Path:
+    """The same, but its footer says 10 rows where it says how many there are in all."""
+    content = bytearray(parquet_of_zeros(path, rows).read_bytes())
+    footer = len(content) - 8 - struct.unpack("<I", content[-8:-4])[0]
+    told = b"\x16" + varint(2 * rows)  # the field behind the schema: a long, the next number
+    at = content.index(told, footer)
+    padded = bytes([20 | 128]) + b"\x80" * (len(told) - 3) + b"\0"  # 10, in as many bytes
+    content[at + 1 : at + len(told)] = padded
+    path.write_bytes(content)
+    return path
+
+
+def parquet_with_a_false_page(path: Path, claimed: int = 2**31 - 8) -> Path:
+    """12,288 values whose page says that it unpacks to 2 GiB."""
+    import pyarrow as arrow
+    import pyarrow.parquet as parquet
+
+    rows = 12_288
+    schema = arrow.schema([arrow.field("a", arrow.float64(), nullable=False)])
+    table = arrow.table({"a": np.random.default_rng(0).random(rows)}, schema=schema)
+    parquet.write_table(table, path, compression="zstd", use_dictionary=False, write_statistics=False)
+    chunk = parquet.read_metadata(path).row_group(0).column(0)
+    total, start = chunk.total_compressed_size, chunk.data_page_offset
+    header = next(
+        made for size in range(total - 60, total) if len(made := _page_header(claimed, size, rows)) + size == total
+    )
+    content = bytearray(path.read_bytes())
+    content[start : start + len(header)] = header
+    path.write_bytes(content)
+    return path
+
+
+def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -> Path:
+    """1.5 GiB of zeros in batches of 80 MB."""
+    import pyarrow as arrow
+    import pyarrow.ipc as ipc
+
+    batch = arrow.record_batch({"a": np.zeros(10**7)})
+    options = ipc.IpcWriteOptions(compression=compression)
+    with arrow.OSFile(str(path), "wb") as file, ipc.new_file(file, batch.schema, options=options) as writer:
+        for _ in range(batches):
+            writer.write_batch(batch)
+    return path
+
+
+def varint(value: int) -> bytes:
+    """An unsigned integer as Thrift and protobuf write it."""
+    made = bytearray()
+    while value > 127:
+        made.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*made, value])
+
+
+def _page_header(unpacked: int, packed: int, values: int) -> bytes:
+    """A data page's header, in Thrift's compact protocol: fields 1, 2, 3 and 5, which holds four of its own."""
+    sizes = b"".join(b"\x15" + varint(2 * number) for number in (0, unpacked, packed))
+    inner = b"".join(b"\x15" + varint(2 * number) for number in (values, 0, 3, 3))
+    return sizes + b"\x2c" + inner + b"\0\0"

@@ -1,0 +1,151 @@
+"""Logs that are whole and yet odd: clocks that run back, several writers of a topic, joined files, misfits."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap import Mcap
+from cdtool.workflows.recovering import recover
+from tests.formats.mcap.small_files import small_file
+
+MS = 10**6
+FORCE = "float64 force\nfloat64 temperature"
+STATE = "string[] name\nfloat64[] position"
+
+
+def wanted(*fields, joints=("axis",), clock="log", named=True):
+    sources = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in fields)
+    return ChannelMap(TimeSource(clock=clock), sources, joints, topics=True, named=named)
+
+
+def write(path, messages, schema=FORCE, encoding="cdr", channels=1):
+    """Messages (channel number, log time [ns], payload) of topic /a; `channels` write to it."""
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=200)
+        writer.start("ros2")
+        number = writer.register_schema("a/msg/A", "ros2msg", schema.encode()) if encoding == "cdr" else 0
+        made = [writer.register_channel("/a", encoding, number, {"publisher": str(i)}) for i in range(channels)]
+        for channel, time, payload in messages:
+            writer.add_message(made[channel], time, payload, time)
+        writer.finish()
+    return path
+
+
+def cdr(*numbers):
+    return b"\0\1\0\0" + struct.pack(f"<{len(numbers)}d", *numbers)
+
+
+def json_state(names, position):
+    import json
+
+    return json.dumps({"name": names, "position": position}).encode()
+
+
+def texts(source):
+    return [str(finding) for finding in source.findings if finding.severity != "note"]
+
+
+@pytest.mark.parametrize(("late", "told"), [(2, "note"), (300, "warning")])
+@pytest.mark.parametrize("survey", [True, False])
+def test_stamps_that_run_back_are_told_with_the_message(tmp_path, late, told, survey):
+    times = [1000 + i for i in range(400)]
+    times[350] -= late
+    path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
+    source = Mcap().columns(path, None if survey else wanted(("/a", "force")))
+    (finding,) = [item for item in source.findings if "stand behind later ones" in item.message]
+    assert finding.severity == told
+    assert f"1 of 400 messages stand behind later ones, by up to {late - 1} ms" in finding.message
+    assert (told == "note") or f"message 350 is stamped {(late - 1) / 1e3:g} s before" in finding.message
+
+
+def test_stamps_in_order_are_not_told(tmp_path):
+    path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
+    assert not texts(Mcap().columns(path))
+
+
+def test_two_channels_of_a_topic_are_told(tmp_path):
+    messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
+    path = write(tmp_path / "log.mcap", messages, channels=2)
+    for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
+        assert texts(source) == ["/a: 2 channels write to it: their messages are one column, sorted by time"]
+    path = write(tmp_path / "log.mcap", [(0, time, payload) for _, time, payload in messages], channels=2)
+    assert not texts(Mcap().columns(path))
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_path, every):
+    payloads = [cdr(float(i), 1.0) if i % every else cdr(1e9, float(i), 1.0) for i in range(30)]
+    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
+    if every == 1:
+        with pytest.raises(RecordingError, match="go on behind its last field: written by another definition"):
+            Mcap().columns(path, wanted(("/a", "force")))
+        return
+    source = Mcap().columns(path, wanted(("/a", "force")))
+    assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
+    assert "10 of 30 messages cannot be decoded" in texts(source)[0]
+
+
+def test_up_to_three_bytes_of_padding_are_none_of_the_message(tmp_path):
+    payloads = [cdr(float(i), 1.0) + bytes(i % 4) for i in range(30)]
+    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
+    assert Mcap().columns(path, wanted(("/a", "force"))).columns["/a force"].values.tolist() == list(range(30))
+
+
+@pytest.mark.parametrize("head", ["0101", "8001", "0003", "0007"])
+def test_other_encapsulations_are_refused(tmp_path, head):
+    payload = bytes.fromhex(head) + cdr(1.0, 2.0)[2:]
+    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)])
+    with pytest.raises(RecordingError, match=f"not plain CDR .starts with {head}"):
+        Mcap().columns(path, wanted(("/a", "force")))
+
+
+def test_names_decide_for_a_single_joint_too(tmp_path):
+    payloads = [json_state(["grip"], [-99.0]) if i % 2 else json_state(["arm"], [float(i)]) for i in range(10)]
+    path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
+    with pytest.raises(RecordingError, match="its messages name grip, not 'arm'"):
+        Mcap().columns(path, wanted(("/a", "position[:]"), joints=("arm",)))
+    found = Mcap().columns(path, wanted(("/a", "position[arm]"), joints=("arm",)))
+    assert found.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
+
+
+def test_a_joint_that_nobody_named_may_be_called_anything(tmp_path):
+    path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["motor"], [1.0])) for i in range(3)], encoding="json")
+    found = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
+    assert found.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
+
+
+def test_other_numbers_of_names_than_elements_are_refused(tmp_path):
+    payload = json_state(["a", "b", "c"], [1.0, 2.0])
+    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)], encoding="json")
+    with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be told"):
+        Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
+
+
+def test_an_index_of_other_digits_than_ascii_is_a_name(tmp_path):
+    path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["a"], [1.0])) for i in range(3)], encoding="json")
+    with pytest.raises(RecordingError, match="no message names this joint"):
+        Mcap().columns(path, wanted(("/a", "position[\u00b2]")))
+
+
+def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_path):
+    first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    small_file(first)
+    small_file(second, messages=30)
+    size, behind = first.stat().st_size, second.stat().st_size
+    first.write_bytes(first.read_bytes() + second.read_bytes())
+    (text,) = texts(Mcap().columns(first))
+    assert f"damaged at byte {size} (the log ends here: another file joined to it?): {behind} bytes" in text
+
+
+def test_what_is_recovered_keeps_the_profile(tmp_path):
+    path = write(tmp_path / "log.mcap", [(0, i * MS, cdr(float(i), 0.0)) for i in range(50)])
+    path.write_bytes(path.read_bytes()[:-100])
+    recover(path, tmp_path / "clean.mcap")
+    with (tmp_path / "clean.mcap").open("rb") as file:
+        assert make_reader(file).get_header().profile == "ros2"

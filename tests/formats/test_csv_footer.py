@@ -1,0 +1,160 @@
+"""A line of sums below the rows is no sample: it is left out with its line. What only looks like one stays an error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.errors import RecordingError
+from cdtool.formats.csv import Csv
+from cdtool.formats.reading import read_recording
+
+FOOTERS = {
+    "a sum": ["Sum,7"],
+    "a sum behind a blank line": ["", "Sum,7"],
+    "statistics": ["Sum,7", "Mean,1.5", "Max,4", "", "Std. dev.,0.3"],
+    "words and figures": ["Statistics", "\u03a3,7", "\u2211 a,7", "exported by hand"],
+    "words that fill the row": ["End of file,"],
+    "a drawn line and a sum": ["---------", "Sum,7"],
+    "a quoted sum": ['"Sum, all",7'],
+    "a name for the sum of words": ["Sum,none"],
+}
+ENDS = {"LF": "\n", "CRLF": "\r\n", "CR": "\r"}
+
+
+def rows(count: int) -> list[str]:
+    return [f"{i},{2 * i}.5" for i in range(count)]
+
+
+def written(lines: list[str], end: str = "\n", last: bool = True, encoding: str = "utf-8") -> bytes:
+    return (end.join(["t,a", *lines]) + (end if last else "")).encode(encoding)
+
+
+def told(source) -> list[str]:
+    return [str(found) for found in source.findings if "footer" in str(found)]
+
+
+def check(source, count: int) -> None:
+    np.testing.assert_array_equal(source.columns["t"].values, np.arange(count))
+    np.testing.assert_array_equal(source.columns["a"].values, 2.0 * np.arange(count) + 0.5)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+@pytest.mark.parametrize("last", [True, False], ids=["ended", "without a line end"])
+@pytest.mark.parametrize("footer", FOOTERS.values(), ids=FOOTERS.keys())
+def test_words_with_figures_below_the_rows_are_no_samples(log, footer, last, encoding):
+    source = Csv().columns(log(written(rows(9) + footer, last=last, encoding=encoding)))
+    check(source, 9)
+    (text,) = told(source)
+    first = next(line for line in footer if line.strip("-"))
+    assert text.endswith(f"skipped: a footer ({first!r}), no sample")
+    assert not [found for found in source.findings if found.severity == "loss"]
+
+
+@pytest.mark.parametrize("end", ENDS.values(), ids=ENDS.keys())
+@pytest.mark.parametrize(
+    ("count", "footer", "lines"),
+    [
+        (3, ["Sum,7"], "line 5"),
+        (3, ["", "Sum,7", "Mean,2"], "lines 6 to 7"),
+        (50_000, ["Sum,7", "", "Mean,2"], "2 lines (50002, 50004)"),
+    ],
+    ids=["short", "two lines", "longer than the sample"],
+)
+def test_a_footer_is_told_with_its_lines(log, end, count, footer, lines):
+    source = Csv().columns(log(written(rows(count) + footer, end)))
+    check(source, count)
+    assert told(source) == [f"{lines} skipped: a footer ('Sum,7'), no sample"]
+
+
+def test_a_footer_in_a_wide_encoding_behind_the_sample_is_found(log):
+    source = Csv().columns(log(written([*rows(50_000), "Sum,7"], encoding="utf-16")))
+    check(source, 50_000)
+    assert told(source) == ["line 50002 skipped: a footer ('Sum,7'), no sample"]
+
+
+@pytest.mark.parametrize("clock", ['column = "t", unit = "ms"', 'column = "t", unit = "s"'])
+def test_a_footer_is_left_out_with_a_machine_file_too(log, machine, clock):
+    lines = "t,i_motor,n_motor\n" + "".join(f"{10 * i},{i},{i + 1}\n" for i in range(20))
+    channels = (
+        f'[channels]\ntime = {{ {clock} }}\nspeed = {{ column = "n_motor", unit = "rad/s" }}\n'
+        'torque = { column = "i_motor", unit = "A", scale = 0.5 }\n'
+    )
+    plain = read_recording(log(lines, "plain.csv"), machine(channels))
+    found = read_recording(log(lines + "Sum,190,210\n"), machine(channels))
+    for channel in plain.channels:
+        np.testing.assert_array_equal(found[channel].values, plain[channel].values)
+    assert "line 22 skipped: a footer ('Sum,190,210'), no sample" in map(str, found.findings)
+
+
+def test_a_footer_below_dates_does_not_hide_that_they_are_dates(log):
+    lines = [f"2025-01-01 00:00:{i:02d},{i}" for i in range(30)]
+    source = Csv().columns(log(written([*lines, "Sum,435"])))
+    np.testing.assert_array_equal(source.columns["t"].values, np.arange(30.0))
+    assert told(source) == ["line 32 skipped: a footer ('Sum,435'), no sample"]
+
+
+def test_a_footer_without_a_header_and_with_a_separator_behind_each_row(log):
+    source = Csv().columns(log("".join(f"{i};{i},5;\n" for i in range(12)) + "Summe;72,0;\n"))
+    np.testing.assert_array_equal(source.columns["1"].values, np.arange(12) + 0.5)
+    assert told(source) == ["line 13 skipped: a footer ('Summe;72,0;'), no sample"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([*rows(9), "ERR,1", "ERR,2"], "line 11, column 't': 'ERR' is not a number"),
+        ([*rows(4), "x,1", *rows(4), "Sum,7"], "line 6, column 't': 'x' is not a number"),
+        ([*rows(4), "Sum,7", *rows(4)], "line 6, column 't': 'Sum' is not a number"),
+        ([*rows(9), "NA,1"], "line 11, column 't': 'NA' is not a number"),
+        ([*rows(9), "OVL,1"], "line 11, column 't': 'OVL' is not a number"),
+        ([*rows(9), "1O.5,1"], "line 11, column 't': '1O.5' is not a number"),
+        ([*rows(9), *(f"state {i},1" for i in "abcdefghijklmnop")], "line 11, column 't': 'state a' is not a number"),
+    ],
+    ids=["repeated", "among the rows too", "among the rows", "not available", "overflow", "a slip", "many"],
+)
+def test_words_that_are_no_footer_are_still_an_error_with_a_machine_file(log, machine, lines, message):
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "a", unit = "rad/s" }\n'
+    with pytest.raises(RecordingError) as fault:
+        read_recording(log(written(lines)), machine(channels))
+    assert message in fault.value.message
+    source = Csv().columns(log(written(lines)))
+    assert told(source) == [] and len(source.columns["a"].values) == len(lines)
+    assert any("line" in str(found) for found in source.findings)  # the words are told
+
+
+def test_a_row_that_a_loss_of_power_ends_is_no_footer(log):
+    source = Csv().columns(log(written([*rows(9), "Sum,7"]) + bytes(300)))
+    assert told(source) == []
+    assert any("NUL" in str(found) for found in source.findings)
+
+
+def test_the_header_at_the_end_is_the_header_again(log):
+    source = Csv().columns(log(written([*rows(9), "t,a"])))
+    check(source, 9)
+    assert [str(found) for found in source.findings] == ["line 11 skipped: the header again"]
+
+
+def test_a_column_of_words_in_front_has_no_footer(log):
+    source = Csv().columns(log(written(["up,1", "down,2", "up,3", "Sum,6"])))
+    np.testing.assert_array_equal(source.columns["a"].values, [1.0, 2.0, 3.0, 6.0])
+    assert told(source) == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    count=st.integers(13, 40),  # more rows than words: else the column is one of words
+    labels=st.lists(st.text("abcdefgijkmpqrtuvwxyz", min_size=2, max_size=9), min_size=1, max_size=12, unique=True),
+    blank=st.integers(0, 3),
+    last=st.booleans(),
+    end=st.sampled_from(sorted(ENDS.values())),
+)
+def test_any_footer_is_cut_off_and_nothing_else(tmp_path_factory, count, labels, blank, last, end):
+    path = tmp_path_factory.mktemp("footer") / "log.csv"
+    footer = [f"{label.title()} of all,{i}" for i, label in enumerate(labels)]
+    path.write_bytes(written(rows(count) + [""] * blank + footer, end, last))
+    source = Csv().columns(path)
+    check(source, count)
+    assert len(told(source)) == 1

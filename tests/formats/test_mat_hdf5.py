@@ -1,0 +1,209 @@
+"""MATLAB 7.3 files, which are HDF5 inside, give what a file of version 7 gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io.matlab
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mat import Mat
+from cdtool.formats.reading import choose_format, read_recording, survey
+from cdtool.machine_file import read_machine_file
+from tests.formats.bombs import with_mat_header
+
+h5py = pytest.importorskip("h5py")
+
+CLASSES = {"f8": "double", "f4": "single", "i2": "int16", "u4": "uint32", "i8": "int64", "b1": "logical", "u1": "uint8"}
+_COMPLEX = np.dtype([("real", "f8"), ("imag", "f8")])
+
+
+def save_v73(path: Path, variables: dict[str, object], **options) -> Path:
+    """As MATLAB writes them: dimensions in reverse, the class as an attribute, texts as numbers, cells by reference."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in variables.items():
+            _put(file, name, value, options)
+    return with_mat_header(path)
+
+
+def _put(file, name: str, value: object, options: dict) -> None:
+    if isinstance(value, dict):
+        group = file.create_group(name)
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for key, part in value.items():
+            _put(group, key, part, options)
+    elif isinstance(value, list):
+        kept = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
+        cells = file.create_dataset(name, data=np.array([[kept.ref]], dtype=h5py.ref_dtype))
+        cells.attrs["MATLAB_class"] = np.bytes_("cell")
+    elif isinstance(value, str):
+        codes = np.array([[ord(letter)] for letter in value], dtype=np.uint16)
+        file.create_dataset(name, data=codes).attrs["MATLAB_class"] = np.bytes_("char")
+    else:
+        array = np.atleast_2d(np.asarray(value))
+        if not array.size:
+            dataset = file.create_dataset(name, data=np.array(array.shape, dtype=np.uint64))
+            dataset.attrs["MATLAB_empty"] = np.uint8(1)
+        elif array.dtype.kind == "c":
+            both = np.empty(array.T.shape, _COMPLEX)
+            both["real"], both["imag"] = array.T.real, array.T.imag
+            dataset = file.create_dataset(name, data=both, **options)
+        else:
+            stored = array.T.astype(np.uint8) if array.dtype == bool else array.T
+            dataset = file.create_dataset(name, data=stored, **({} if array.size == 1 else options))
+        kind = "logical" if array.dtype == bool else CLASSES.get(array.dtype.str[1:], "double")
+        dataset.attrs["MATLAB_class"] = np.bytes_(kind)
+
+
+def same(found, expected) -> None:
+    assert found.names == expected.names and list(found.columns) == list(expected.columns)
+    for name, column in expected.columns.items():
+        assert found.columns[name].values.dtype == np.float64
+        assert found.columns[name].values.tobytes() == column.values.tobytes()
+    assert found.details == expected.details
+    assert list(map(str, found.findings)) == list(map(str, expected.findings))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shapes=st.lists(st.tuples(st.integers(1, 6), st.integers(1, 6)), min_size=1, max_size=4),
+    kinds=st.lists(st.sampled_from(sorted(CLASSES)), min_size=4, max_size=4),
+    packed=st.booleans(),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_any_matrix_gives_the_columns_that_version_7_gives(tmp_path_factory, shapes, kinds, packed, seed):
+    folder = tmp_path_factory.mktemp("mat")
+    random = np.random.default_rng(seed)
+    variables = {"time": np.arange(9.0)}
+    for i, (shape, kind) in enumerate(zip(shapes, kinds, strict=False)):
+        variables[f"v{i}"] = (50.0 * random.random(shape)).astype(kind)
+    ordered = dict(sorted(variables.items()))  # as HDF5 lists them
+    savemat(folder / "old.mat", ordered)
+    new = save_v73(folder / "new.mat", ordered, **({"compression": "gzip"} if packed else {}))
+    same(Mat().columns(new), Mat().columns(folder / "old.mat"))
+
+
+def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
+    path = save_v73(
+        tmp_path / "a.mat",
+        {"t": np.arange(3.0), "s": {"a": 1.0}, "c": [1], "w": "words", "z": np.ones(3) * 1j, "e": np.empty((0, 3))}
+        | {"cube": np.zeros((2, 3, 4))},
+    )
+    with h5py.File(path, "a") as file:
+        file.create_group("p").attrs["MATLAB_sparse"] = np.uint64(3)
+        file["l"] = h5py.SoftLink("/t")
+        file["x"] = h5py.ExternalLink("other.h5", "/t")
+        file.create_dataset("o", data=np.zeros((1, 6), np.uint32)).attrs.update(
+            {"MATLAB_class": np.bytes_("datetime"), "MATLAB_object_decode": np.int32(3)}
+        )
+        file["f"] = np.zeros((1, 3))
+        file["f"].attrs["MATLAB_class"] = np.bytes_("function_handle")
+    source = Mat().columns(path)
+    assert list(source.columns) == ["t"]
+    assert sorted(map(str, source.findings)) == [
+        *(f"variable '{name}' is a {kind}: left out" for name, kind in (("c", "cell"), ("cube", "2 x 3 x 4 array"))),
+        "variable 'e' is a 0 x 3 array: left out",
+        "variable 'f' is a function: left out",
+        "variable 'l' is a link: left out",
+        "variable 'o' is a datetime: left out",
+        "variable 'p' is a sparse: left out",
+        "variable 's' is a struct: left out",
+        "variable 'w' is a char: left out",
+        "variable 'x' is a link: left out",
+        "variable 'z' is complex: left out",
+    ]
+
+
+def test_a_recording_is_read_by_the_names_of_version_7(tmp_path):
+    time = np.arange(50) * 0.01
+    q = np.column_stack((time, 2.0 * time))
+    path = save_v73(tmp_path / "run.mat", {"t": time, "q": q, "tau": 0.5 * q}, compression="gzip", shuffle=True)
+    (tmp_path / "machine.toml").write_text(
+        '[machine]\ntype = "rotary_axis"\ncoordinates = "load"\njoints = ["a", "b"]\n[channels]\n'
+        'time = { column = "t", unit = "s" }\nposition = { columns = ["q[0]", "q[1]"], unit = "rad" }\n'
+        'torque = { columns = ["tau[0]", "tau[1]"], unit = "N m" }\n'
+    )
+    assert choose_format(path).name == "mat"
+    recording = read_recording(path, read_machine_file(tmp_path / "machine.toml"))
+    np.testing.assert_array_equal(recording["position"].values, q)
+    np.testing.assert_array_equal(recording["torque"].values, 0.5 * q)
+
+
+def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0), "z": np.ones(3) * 1j})
+    (tmp_path / "machine.toml").write_text(
+        '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
+        'time = { column = "t", unit = "s" }\nspeed = { column = "z", unit = "m/s" }\n'
+    )
+    with pytest.raises(RecordingError, match="column 'z' is complex"):
+        read_recording(path, read_machine_file(tmp_path / "machine.toml"))
+
+
+def test_a_file_without_a_vector_says_so(tmp_path):
+    with pytest.raises(RecordingError, match="holds no vector or matrix of numbers"):
+        Mat().columns(save_v73(tmp_path / "a.mat", {"s": {"a": 1.0}}))
+
+
+def test_a_file_that_matlab_wrote_is_read():
+    path = Path(scipy.io.matlab.__file__).parent / "tests" / "data" / "testhdf5_7.4_GLNX86.mat"
+    if not path.exists():
+        pytest.skip("this SciPy came without its test data")
+    source = survey(path)
+    assert source.format == "mat"
+    np.testing.assert_allclose(source.columns["testdouble"].values, np.arange(9) * np.pi / 4, rtol=0.0, atol=1e-12)
+
+
+def test_without_h5py_the_error_says_what_to_install_or_how_to_save(tmp_path, monkeypatch):
+    def absent(module: str) -> None:
+        raise ImportError(module)
+
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0)})
+    monkeypatch.setattr("cdtool.formats.container_checks.import_module", absent)
+    with pytest.raises(RecordingError) as fault:
+        Mat().columns(path)
+    assert fault.value.message == f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed"
+    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it with: save(name, ..., '-v7')"
+
+
+def test_a_dataset_in_other_files_is_not_followed(tmp_path):
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0)})
+    (tmp_path / "raw").write_bytes(np.arange(3.0).tobytes())
+    with h5py.File(path, "a") as file:
+        file.create_dataset("r", (1, 3), "f8", external=[("raw", 0, 24)])
+        layout = h5py.VirtualLayout((1, 3), "f8")
+        layout[:] = h5py.VirtualSource(".", "t", (1, 3))
+        file.create_virtual_dataset("v", layout)
+    source = Mat().columns(path)
+    assert list(source.columns) == ["t"]
+    assert [str(found).partition(" is a ")[2] for found in source.findings] == [
+        "array kept in other files: left out"
+    ] * 2
+
+
+@pytest.mark.parametrize("kept", [400, 520, 700, 1500, -1])
+def test_a_cut_file_is_one_clear_error(tmp_path, kept):
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(500.0), "q": np.arange(500.0)})
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(RecordingError, match=r"a\.mat: (damaged or not a MATLAB 7\.3 file|is not a )") as fault:
+        survey(path)
+    assert "\n" not in str(fault.value)
+
+
+def test_damaged_bytes_are_one_line_or_the_values_that_are_there(tmp_path):
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(50.0), "q": np.ones((50, 3))}, compression="gzip")
+    whole, random = path.read_bytes(), np.random.default_rng(8)
+    for _ in range(150):
+        wrong = bytearray(whole)
+        wrong[int(random.integers(512, len(whole)))] ^= 1 << int(random.integers(8))
+        path.write_bytes(wrong)
+        try:
+            source = Mat().columns(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
+        else:
+            assert all(len(column.values) for column in source.columns.values())

@@ -1,0 +1,154 @@
+"""Files that are read piece by piece: the same numbers as at once, in the order of the times, in bounded memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.errors import RecordingError
+from cdtool.formats import slices
+from cdtool.formats.csv import text
+from cdtool.formats.pieces import Piece, Pieces, Run, as_pieces, joined, read_pieces
+from cdtool.formats.reading import choose_format
+from cdtool.formats.source import Column, Source
+from cdtool.formats.time_order import Lateness, by_time
+from cdtool.workflows.converting import convert
+from cdtool.workflows.log_figures import LogFigures
+from tests.formats.containers import two_clocks
+
+LIBRARIES = {".parquet": "pyarrow", ".feather": "pyarrow", ".h5": "h5py", ".mf4": "asammdf", ".tdms": "nptdms"}
+
+
+def pieces_of(path: Path) -> list[Piece]:
+    return list(Run(read_pieces(choose_format(path), path)))
+
+
+def same(one: Source, other: Source) -> bool:
+    """All that a source tells, the numbers to the bit."""
+    columns = [(one.columns[name], other.columns[name]) for name in one.columns]
+    told = [[s.findings, dict(s.details), s.names, s.origin, s.first_row, list(s.columns)] for s in (one, other)]
+    return told[0] == told[1] and all(
+        a.values.tobytes() == b.values.tobytes()
+        and (a.time is None) == (b.time is None)
+        and (a.time is None or b.time is None or a.time.tobytes() == b.time.tobytes())
+        and a.unit == b.unit
+        for a, b in columns
+    )
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
+def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path, monkeypatch):
+    pytest.importorskip(LIBRARIES[suffix])
+    path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])
+    found = choose_format(path)
+    at_once = found.columns(path)
+    assert len({piece.clock for piece in pieces_of(path)}) == len(pieces_of(path))
+    monkeypatch.setattr(slices, "VALUES_A_PIECE", 100)
+    pieces = pieces_of(path)
+    assert len(pieces) > 20
+    # Clocks that run side by side come side by side.
+    starts = np.array([float(piece.time[0]) for piece in pieces if piece.time is not None and piece.rows])
+    assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends that much before the drive
+    assert same(at_once, joined(read_pieces(found, path), sort=False))
+
+
+@pytest.mark.parametrize("end", ["\n", "", "\n# the end\n"])
+def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monkeypatch):
+    lines = [f"2025-03-01,23:59:{k // 100:02d}.{k % 100:02d},{k},{k / 7!r}" for k in range(5000)]
+    lines[1200] = "# a comment"
+    lines[2300] = ""
+    lines[3400] = lines[3400].replace(",", " , ")
+    lines[4500] = "day,clock,a,b"
+    path = tmp_path / "a.csv"
+    path.write_text("day,clock,a,b\n" + "\n".join(lines[:6000]) + end)
+    found = choose_format(path)
+    at_once = found.columns(path)
+    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
+    assert len(pieces_of(path)) > 20
+    assert same(at_once, joined(read_pieces(found, path), sort=False))
+
+
+def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
+    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
+    seconds = np.arange(0, 200_000, 20) + 80_000
+    path = tmp_path / "a.csv"
+    path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
+    source = joined(read_pieces(choose_format(path), path), sort=False)
+    assert np.array_equal(source.columns["clock"].values, seconds)
+    assert any("passes midnight 3 times" in finding.message for finding in source.findings)
+
+
+@pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cells")])
+def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
+    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
+    lines = [f"{k},{k}" for k in range(4000)]
+    lines.insert(row, "end of the measurement")
+    path = tmp_path / "a.csv"
+    path.write_text("t,v\n" + "\n".join(lines) + "\n")
+    if fault is None:
+        assert sum(piece.rows for piece in pieces_of(path)) == 4000
+    else:
+        with pytest.raises(RecordingError, match=fault):
+            pieces_of(path)
+
+
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=60), st.integers(1, 7), st.integers(0, 2**32))
+def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(times, length, seed):
+    late = np.sort(times) / 8.0
+    order = np.argsort(np.arange(len(late)) + np.random.default_rng(seed).uniform(0, 9, len(late)))
+    pieces = [
+        Piece(clock, time, {clock: time + shift}, len(time))
+        for start in range(0, len(late), length)
+        for clock, shift in (("a", 0.5), ("b", 0.25))
+        for time in [np.sort(late[order[start : start + length]])]
+    ]
+    lateness = Lateness()
+    for piece in pieces:
+        lateness.add(piece.time)
+    columns = {name: [Column(name, np.empty(0))] for name in "ab"}
+    ready = list(by_time(pieces, columns, lateness.late, sort=True, most=8))
+    for name, shift in (("a", 0.5), ("b", 0.25)):
+        found = np.concatenate([part[name].values[name] for part in ready if name in part])
+        assert np.array_equal(found, late + shift)
+    # Both have the same times: they come together.
+    assert all(set(part) == {"a", "b"} for part in ready)
+    ends = [part["a"].time for part in ready]
+    assert all(one[-1] < other[0] for one, other in pairwise(ends))
+
+
+def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
+    def read(count: int) -> Pieces:
+        def pieces() -> Iterator[Piece]:
+            for k in range(count):
+                time = (np.arange(20_000) + 20_000 * k) * 1e-3
+                yield Piece("/a", time, {"/a data": np.sin(time)}, len(time))
+
+        yield from pieces()
+        return Source(Path("a"), "mcap", {"/a data": Column("/a data", np.empty(0), np.empty(0))})
+
+    peaks = {}
+    for count in (20, 200):
+        tracemalloc.start()
+        figures = LogFigures(lambda _, n=count: read(n), in_order=True)
+        peaks[count] = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert figures.rows("/a data") == 20_000 * count
+        assert figures.clocks["/a"].rate == pytest.approx(1000.0)
+    assert peaks[200] < 1.2 * peaks[20]
+
+
+def test_columns_in_memory_are_one_piece_a_clock():
+    time = np.arange(3.0)
+    columns = [Column("a", time, time), Column("b", time, time), Column("c", np.arange(4.0))]
+    source = Source(Path("a"), "mat", {column.name: column for column in columns})
+    run = Run(as_pieces(source))
+    assert [sorted(piece.values) for piece in run] == [["a", "b"], ["c"]]
+    assert same(source, joined(as_pieces(source), sort=False))
+    assert all(len(column.values) == 0 for column in run.source.columns.values())

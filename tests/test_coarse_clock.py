@@ -1,0 +1,127 @@
+"""Samples under stamps that are coarser than they are: where the line through the stamps puts them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.clock import clean_time, gap_findings
+from cdtool.recording import Series
+
+
+def floored(true, step):
+    return np.floor(true / step + 1e-9) * step
+
+
+def gaps(clean):
+    return [str(item) for item in gap_findings(Series(clean.time, np.zeros(len(clean.time)), "s"), "time")]
+
+
+def losses(clean):
+    return [item.message for item in clean.findings if item.severity == "loss"]
+
+
+@pytest.mark.parametrize(
+    ("samples", "step"), [(10000, 0.01), (10000, 0.016), (3000, 0.1), (2000, 1.0)], ids=["10ms", "16ms", "100ms", "1s"]
+)
+def test_every_sample_is_kept_and_lies_where_it_was_taken(samples, step):
+    true = np.arange(samples) * 1e-3
+    clean = clean_time(floored(true, step))
+    assert "coarse clock" in str(clean.findings[0]) and not losses(clean)
+    assert clean.keep.all()
+    np.testing.assert_allclose(clean.time, true, atol=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(2e-4, 3.9e-3), st.floats(0.0, 10.0), st.integers(40, 1500))
+def test_a_regular_sample_lies_within_two_periods_of_the_truth_and_a_stamp_step_of_its_stamp(period, start, samples):
+    true = start + np.arange(samples) * period
+    stamps = floored(true, 5e-3)
+    if len(np.unique(stamps)) < 4 or np.mean(np.diff(stamps) == 0.0) < 0.21:
+        return
+    clean = clean_time(stamps)
+    assert clean.keep.all()
+    assert np.abs(clean.time - true).max() < 2.2 * period
+    assert np.abs(clean.time - stamps).max() < 5e-3 + period
+
+
+def test_a_pause_moves_what_comes_after_it_and_is_told_as_one_gap():
+    i = np.arange(4000)
+    true = i * 1e-3 + np.where(i > 2000, 2.0, 0.0)
+    clean = clean_time(floored(true, 0.01))
+    assert clean.keep.all() and not losses(clean)
+    assert np.abs(clean.time - true).max() < 1e-3
+    assert np.median(np.diff(clean.time[2100:])) == pytest.approx(1e-3, rel=1e-3)
+    assert gaps(clean) == ["time: 1 gaps after 2.000 s (2001 ms)"]
+
+
+@pytest.mark.parametrize("pause", [0.04, 0.3, 60.0])
+def test_pauses_of_any_length_beyond_a_few_stamp_steps_leave_the_period_as_it_is(pause):
+    i = np.arange(6000)
+    true = 0.0037 + i * 1.3e-3 + pause * (i // 1500)
+    clean = clean_time(floored(true, 0.01))
+    assert np.abs(clean.time - true).max() < 2e-3
+    assert "3 gaps" in gaps(clean)[0]
+
+
+def test_no_time_depends_on_stamps_beyond_the_next_changes():
+    """The log's start hangs on two changes of the stamp, the samples after a pause on one; nothing on a later one."""
+    i = np.arange(3000)
+    true = i * 1.3e-3 + np.where(i > 1700, 2.0, 0.0)
+    stamps = floored(true, 0.01)
+    whole = clean_time(stamps).time
+    changes = np.flatnonzero(np.diff(stamps) > 0.0) + 1
+    after_pause = changes[changes > 1701][0]
+    for end in (changes[1] + 1, 700, 1650, after_pause + 1, 2900):
+        np.testing.assert_array_equal(clean_time(stamps[:end]).time, whole[:end])
+
+
+def test_a_rounded_clock_is_half_a_step_late_and_as_even():
+    true = 0.0037 + np.arange(4000) * 1.3e-3
+    clean = clean_time(np.round(true * 100.0) / 100.0)
+    late = clean.time - true
+    assert np.all((late > 0.003) & (late < 0.006))
+    assert np.std(np.diff(clean.time[1000:])) < 0.05e-3
+
+
+def test_a_clock_that_drifts_against_the_samples_is_followed():
+    i = np.arange(300_000)
+    true = np.cumsum(1e-3 * (1.0 + 1e-3 * np.sin(i / 2e4)))
+    clean = clean_time(floored(true, 0.01))
+    assert clean.keep.all()
+    assert np.abs(clean.time - true).max() < 2e-3
+
+
+@pytest.mark.parametrize(("before", "after"), [(2e-3, 1e-3), (1e-3, 2e-3)], ids=["faster", "slower"])
+def test_after_a_change_of_the_sample_rate_the_line_has_the_new_slope(before, after):
+    true = np.concatenate((np.arange(2000) * before, 2000 * before + np.arange(4000) * after))
+    clean = clean_time(floored(true, 0.01))
+    assert clean.keep.all()
+    assert np.abs(clean.time - true).max() < 0.02
+    assert np.abs(clean.time - true)[2500:].max() < 0.01
+    assert np.median(np.diff(clean.time[2500:])) == pytest.approx(after, rel=0.02)
+
+
+def test_samples_of_a_clock_that_has_stopped_are_dropped_and_told_as_a_loss():
+    stamps = np.minimum(floored(np.arange(4000) * 1e-3, 0.01), 2.0)
+    clean = clean_time(stamps, first_row=2, row_name="line")
+    assert clean.keep.sum() == 2020
+    assert "1980 time stamps stand still" in losses(clean)[0]
+    assert "(line 2022, 2023, 2024, ...): dropped, 50 % of the rows: the clock was stuck" in losses(clean)[0]
+    assert clean.time[-1] < 2.02
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.integers(0, 40), min_size=2, max_size=200).filter(lambda steps: any(steps[1:])))
+def test_whatever_the_steps_times_increase_near_their_stamps_and_what_is_dropped_is_counted(steps):
+    stamps = np.cumsum(np.maximum(np.array(steps, float) - 30.0, 0.0))
+    if stamps[0] == stamps[-1]:
+        return
+    clean = clean_time(stamps)
+    assert np.all(np.diff(clean.time) > 0.0)
+    told = sum(int(item.message.split()[0]) for item in clean.findings if "dropped" in item.message)
+    assert told == len(stamps) - clean.keep.sum()
+    widest = np.diff(np.unique(stamps)).max()
+    assert np.abs(clean.time - stamps[clean.keep]).max() <= 2.0 * widest + 1e-9
