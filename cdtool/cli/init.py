@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -30,9 +31,19 @@ def init(
         print_json(asdict(drafted))
     else:
         typer.echo(drafted.text)
-        typer.echo(f"{plain(drafted.path)} written: a draft of guesses. Check each line marked CHECK, then")
-        typer.echo(f"  cdtool info {plain(log)} --machine {plain(drafted.path)}")
+        first = "Check each line marked CHECK" if drafted.channels else "Write its channels"
+        typer.echo(f"{plain(drafted.path)} written: a draft of guesses. {first}, then")
+        typer.echo(f"  cdtool info {_quoted(log)} --machine {_quoted(drafted.path)}")
+    if not drafted.channels:
+        typer.echo(
+            "warning: no name or course tells of a torque, speed or position: the columns are comments", err=True
+        )
     for name in drafted.left_out:
         typer.echo(f"warning: {name}: the log contradicts the guess: it stands in the file as a comment", err=True)
     if any(finding.severity == "loss" for finding in drafted.findings):
         raise typer.Exit(ExitStatus.INCOMPLETE)
+
+
+def _quoted(path: object) -> str:
+    """A path as a shell takes it."""
+    return shlex.quote(plain(path))

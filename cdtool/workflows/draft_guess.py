@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.recording import MEASURED
 from cdtool.workflows import draft_motion as motion
-from cdtool.workflows.draft_streams import Channels, Found, Stream, joined
-from cdtool.workflows.draft_words import is_reference, is_something_else, word_for
+from cdtool.workflows.draft_names import label
+from cdtool.workflows.draft_others import guess_ground_truth, guess_references
+from cdtool.workflows.draft_search import BY_COURSE, best, named_for, unnamed_for
+from cdtool.workflows.draft_streams import Channels, Stream, joined
+from cdtool.workflows.draft_words import is_something_else, word_for
 
-# Correlations from which on the numbers are evidence: of a derivative; of a set value with what follows it,
-# and where a topic's or column's name tells of set values too.
-_FITS, _FOLLOWS, _FOLLOWS_BY_NAME = 0.9, 0.97, 0.4
+# The correlation from which on one column is another's derivative.
+_FITS = 0.9
 # Share of a column's variance that inertia and friction must explain for it to be the drive's.
 _DRIVES = 0.6
 _MOST_UNNAMED = 48
@@ -32,8 +33,8 @@ def guess_channels(streams: list[Stream], topics: bool) -> Channels:
         _motion_by_name(channels)
     _drive(channels)
     _acceleration(channels)
-    _references(channels)
-    _ground_truth(channels)
+    guess_references(channels)
+    guess_ground_truth(channels)
     return channels
 
 
@@ -43,7 +44,7 @@ def _joint_count(streams: Iterable[Stream]) -> int:
         for stream in streams
         if stream.moves and not is_something_else(stream.name)
         for quantity in ("position", "speed", "torque")
-        if word_for(quantity, _own_name(stream))[0]
+        if word_for(quantity, label(stream))[0]
     )
     several = [(count, width) for width, count in votes.items() if width > 1]
     return max(several)[1] if several else 1
@@ -51,14 +52,6 @@ def _joint_count(streams: Iterable[Stream]) -> int:
 
 def _elements(stream: Stream) -> list[Stream]:
     return [stream.element(i) for i in range(stream.width)] if stream.field.endswith("[:]") else [stream]
-
-
-def _own_name(stream: Stream) -> str:
-    """A field's name; a topic's name says something only where the field's does not (`data`)."""
-    if not stream.topic:
-        return stream.name
-    plain = stream.field.split("[")[0] == "data"
-    return f"{stream.topic} {stream.field}" if plain else stream.field
 
 
 def _unnamed(streams: list[Stream]) -> bool:
@@ -75,17 +68,19 @@ def _by_place(channels: Channels) -> None:
     channels.joints = joints
     parts = [streams[first + i * joints : first + (i + 1) * joints] for i in range(3)]
     fit = f"r = {correlation:.3f}"
-    channels.take(
-        "position", joined(parts[0], _places(parts[0])), f"its derivative fits the {joints} columns behind it, {fit}"
-    )
-    channels.take(
-        "speed", joined(parts[1], _places(parts[1])), f"its integral fits the {joints} columns before it, {fit}"
-    )
+    many = "column" if joints == 1 else f"{joints} columns"
+    text = f"its derivative fits the {many} behind it, {fit}"
+    channels.take("position", joined(parts[0], _places(parts[0])), text)
+    text = f"its integral fits the {many} before it, {fit}"
+    channels.take("speed", joined(parts[1], _places(parts[1])), text)
     if len(parts[2]) == joints:
         drive = joined(parts[2], _places(parts[2]))
         share = motion.drive_fit(drive, channels.found["speed"].stream)
         text = f"its place behind the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
-        channels.take("torque", drive, text)
+        if motion.rests_and_peaks(drive):
+            channels.take("force", drive, "it rests at one level and has short, high peaks", BY_COURSE)
+        else:
+            channels.take("torque", drive, text, BY_COURSE)
         channels.free = []  # further columns without names would be pure guesswork
 
 
@@ -94,7 +89,7 @@ def _places(streams: list[Stream]) -> str:
 
 
 def _motion_by_name(channels: Channels) -> None:
-    named = {q: _named(channels, q) for q in ("position", "speed")}
+    named = {q: named_for(channels, q) for q in ("position", "speed")}
     pairs = [
         (p[0] + s[0] + ((fit := motion.integral_fit(p[2], s[2])).correlation > _FITS) * 3.0, -i - k, p, s, fit)
         for i, p in enumerate(named["position"])
@@ -119,29 +114,29 @@ def _partner(channels: Channels, stream: Stream, other: str) -> None:
         pair = (stream, candidate) if other == "speed" else (candidate, stream)
         return motion.integral_fit(*pair).correlation
 
-    best = _best(channels.of_joints(), fit)
-    if best is not None and best[0] > _FITS:
+    found = best(unnamed_for(channels, other), fit)
+    if found is not None and found[0] > _FITS:
         relation = "integral" if other == "speed" else "derivative"
-        channels.take(other, best[1], f"its {relation} fits '{stream.name}', r = {best[0]:.3f}")
+        channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", BY_COURSE)
 
 
 def _drive(channels: Channels) -> None:
     if "torque" in channels.found:
         return
-    named = _named(channels, "torque")
+    named = named_for(channels, "torque")
     speed = channels.found.get("speed")
     if named:
         channels.take("torque", named[0][2], f"name ({named[0][1]})")
     elif moving := speed or channels.found.get("position"):
         rate = moving.stream if speed else _derived(moving.stream)
-        best = _best(channels.of_joints(), lambda stream: motion.drive_fit(stream, rate))
-        if best is not None and best[0] > _DRIVES:
-            text = f"it moves as a drive's effort does: inertia and friction explain {100 * best[0]:.0f} % of it"
-            channels.take("torque", best[1], text)
+        found = best(unnamed_for(channels, "torque"), lambda stream: motion.drive_fit(stream, rate))
+        if found is not None and found[0] > _DRIVES:
+            text = f"it moves as a drive's effort does: inertia and friction explain {100 * found[0]:.0f} % of it"
+            channels.take("torque", found[1], text, BY_COURSE)
 
 
 def _acceleration(channels: Channels) -> None:
-    named = [item for item in _named(channels, "acceleration") if item[2].moves]
+    named = [item for item in named_for(channels, "acceleration") if item[2].moves]
     if not named:
         return
     speed = channels.found.get("speed")
@@ -149,77 +144,10 @@ def _acceleration(channels: Channels) -> None:
     if speed is None:
         channels.take("acceleration", top[0][2], f"name ({top[0][1]})")
         return
-    best = max(top, key=lambda item: abs(motion.derivative_fit(item[2], speed.stream).correlation))
-    correlation = motion.derivative_fit(best[2], speed.stream).correlation
+    chosen = max(top, key=lambda item: abs(motion.derivative_fit(item[2], speed.stream).correlation))
+    correlation = motion.derivative_fit(chosen[2], speed.stream).correlation
     fits = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
-    channels.take("acceleration", best[2], f"name ({best[1]}){fits}")
-
-
-def _references(channels: Channels) -> None:
-    for quantity in ("position", "speed", "torque"):
-        name = f"reference_{quantity}"
-        named = [item for item in _named(channels, quantity, reference=True) if item[2].moves]
-        measured = channels.found.get(quantity)
-        if named:
-            if measured is not None:
-                alike = {id(item[2]): motion.likeness(measured.stream, item[2]) for item in named}
-                named.sort(key=lambda item: -(item[0] + 3.0 * alike[id(item[2])]))
-            channels.take(name, named[0][2], f"name ({named[0][1]}, of a set value)")
-        elif measured is not None and measured.stream.moves:
-            _follower(channels, name, quantity, measured.stream)
-
-
-def _follower(channels: Channels, name: str, quantity: str, measured: Stream) -> None:
-    best = _best(channels.of_joints(), lambda stream: motion.likeness(measured, stream))
-    if best is None:
-        return
-    correlation, other = best
-    if correlation < (_FOLLOWS_BY_NAME if is_reference(other.name) else _FOLLOWS):
-        return
-    text = f"follows '{measured.name}' with r = {best[0]:.3f} and is smoother"
-    if motion.roughness(other) < motion.roughness(measured):
-        channels.take(name, other, text)
-    elif correlation > _FOLLOWS and quantity != "torque" and not is_reference(measured.name):
-        why = channels.found[quantity].why
-        channels.take(quantity, other, f"rougher than '{measured.name}', which it follows with r = {best[0]:.3f}")
-        channels.found[name] = Found(measured, f"{why}; smoother than '{other.name}'")
-
-
-def _ground_truth(channels: Channels) -> None:
-    singles = [stream for stream in channels.free if stream.width == 1 and stream.moves]
-    named = [(*word_for("force", stream.name), stream) for stream in singles if not is_something_else(stream.name)]
-    named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
-    if named:
-        best = max(named, key=lambda item: (item[0], float(np.ptp(np.nan_to_num(item[2].values)))))
-        channels.take("force", best[2], f"name ({best[1]})")
-    elif channels.found:
-        for stream in singles:
-            if not is_something_else(stream.name) and motion.rests_and_peaks(stream):
-                channels.take("force", stream, "it rests at one level and has short, high peaks")
-                break
-    for quantity in ("label", "trigger"):
-        for stream in channels.free:
-            seen = stream.values[np.isfinite(stream.values)]
-            if stream.width == 1 and word_for(quantity, stream.name)[0] and np.isin(seen, (0.0, 1.0)).all():
-                channels.take(quantity, stream, f"name ({word_for(quantity, stream.name)[1]}), 0 and 1 only")
-                break
-
-
-def _named(channels: Channels, quantity: str, reference: bool = False) -> list[tuple[float, str, Stream]]:
-    """(strength, word, stream) of the free streams whose name speaks for a quantity most, the strongest first."""
-    found = []
-    for stream in channels.of_joints():
-        name = _own_name(stream)
-        if is_reference(stream.name) != reference or is_something_else(stream.name):
-            continue
-        strength, word = word_for(quantity, name)
-        if strength and strength >= max(word_for(other, name)[0] for other in MEASURED):
-            found.append((strength, word, stream))
-    return sorted(found, key=lambda item: -item[0])
-
-
-def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[float, Stream] | None:
-    return max(((score(stream), stream) for stream in streams), key=lambda item: item[0], default=None)
+    channels.take("acceleration", chosen[2], f"name ({chosen[1]}){fits}")
 
 
 def _derived(position: Stream) -> Stream:

@@ -51,10 +51,11 @@ class Stream:
 
 @dataclass(frozen=True)
 class Found:
-    """A stream taken for a channel, and why."""
+    """A stream taken for a channel, why, and what is to be checked (empty: its name tells it)."""
 
     stream: Stream
     why: str
+    check: str = ""
 
 
 @dataclass
@@ -65,9 +66,9 @@ class Channels:
     free: list[Stream]
     found: dict[str, Found] = dataclasses.field(default_factory=dict)
 
-    def take(self, channel: str, stream: Stream, why: str) -> None:
+    def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
         """Note a guess; streams that share a column with it are taken with it."""
-        self.found[channel] = Found(stream, why)
+        self.found[channel] = Found(stream, why, check)
         used = set(stream.columns)
         self.free = [
             other

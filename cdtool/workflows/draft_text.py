@@ -7,20 +7,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 
-from cdtool.recording import UNITLESS
-from cdtool.workflows.draft_streams import Channels
-from cdtool.workflows.draft_units import Logged, Side, logged_unit
+import numpy as np
 
-_WIDEST = 118
+from cdtool.recording import UNITLESS
+from cdtool.workflows.draft_side import Side
+from cdtool.workflows.draft_streams import Channels, Stream
+from cdtool.workflows.draft_units import Evidence, Logged
+
+_WIDEST = 100
+_MOST_LISTED = 60
 
 
 @dataclass(frozen=True)
 class Clock:
-    """How the draft takes the time: a column with its unit, a rate as a placeholder, or a message's stamp."""
+    """How the draft takes the time: a column with its unit or the rate [Hz] of its counts, or a rate alone."""
 
     column: str | int | None = None
     unit: str = "s"
     why: str = ""
+    check: str = ""
+    rate: float | None = None
 
 
 @dataclass(frozen=True)
@@ -35,54 +41,85 @@ class Draft:
     clock: Clock
     channels: Channels
     topics: bool
+    evidence: Evidence
 
     @property
     def units(self) -> dict[str, Logged]:
         """Unit and scale of each channel that has one."""
-        found = (name for name in self.channels.found if name not in UNITLESS)
-        return {name: logged_unit(name, self.channels, self.side, self.topics) for name in found}
+        return {name: self.evidence.logged(name) for name in self.channels.found if name not in UNITLESS}
 
 
 def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False) -> str:
     """The machine file; the channels in `left_out` stand there as comments. `turned`: the accelerometer's sign."""
+    side = draft.side
     lines = [
         f"# Draft by cdtool init from {_plain(draft.log)}: guesses, not measurements.",
-        '# "guessed" says why; "CHECK" marks what cdtool cannot know. Delete the mark when you have checked the line.',
+        '# "guessed" says why; "CHECK" marks what cdtool cannot know: delete the mark once it is checked.',
         "",
         "[machine]",
-        *_commented(f"type = {_text(draft.side.type)}", f"guessed: {draft.side.why}"),
+        *_commented(f"type = {_text(side.type)}", _marked(f"guessed: {side.why}", side.check)),
         f"name = {_text(draft.name)}",
         *_commented(f"joints = {_list([_text(joint) for joint in draft.joints])}", draft.joints_why),
-        *_commented(f"coordinates = {_text(draft.side.coordinates)}", _coordinates_why(draft.side)),
-        *_placeholders(draft.side, len(draft.joints)),
+        *_commented(f"coordinates = {_text(side.coordinates)}", _coordinates_why(side)),
+        *_placeholders(side, len(draft.joints)),
         "",
         "[channels.mcap]" if draft.topics else "[channels]",
         *([] if draft.topics else _time(draft.clock)),
     ]
     units = draft.units
-    for name, found in draft.channels.found.items():
-        sign = -1.0 if turned and name == "acceleration" else 1.0
-        line, why = f"{name} = {_channel(draft, name, units.get(name), sign)}", f"guessed: {found.why}"
-        logged = units.get(name)
-        if logged is not None and logged.why:
-            why += f"; unit: {logged.why}"
-        if sign < 0.0:
-            why += "; its sign is the other one of the speed's derivative: turned"
-        check = logged.check if logged is not None else ""
-        if name == "force":
-            check = f"{check}; ground truth only: is it the load cell of the test?".removeprefix("; ")
-        made = _commented(line, f"{why}. CHECK: {check}" if check else why)
+    for name in draft.channels.found:
+        made = _mapped(draft, name, units.get(name), -1.0 if turned and name == "acceleration" else 1.0)
         lines += [f"# {text}" if text and name in left_out else text for text in made]
-    absent = [name for name in ("torque", "speed", "position") if name not in draft.channels.found]
-    if absent:
+    if not draft.channels.found:
+        lines += _columns(draft)
+    elif absent := [name for name in ("torque", "speed", "position") if name not in draft.channels.found]:
         lines.append(f"# CHECK: found no {', no '.join(absent)}: see cdtool info for what the log has")
     return "\n".join(lines) + "\n"
 
 
+def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list[str]:
+    """One channel's line, and the comment that says why and what is to be checked."""
+    found = draft.channels.found[name]
+    why, checks = f"guessed: {found.why}", [found.check]
+    if logged is not None:
+        why += f"; unit: {logged.why}" if logged.why else ""
+        checks.append(logged.check)
+    if sign < 0.0:
+        why += "; its sign is the other one of the speed's derivative: turned"
+    if name == "force":
+        checks.append("ground truth only: is it the load cell of the test?")
+    line = f"{name} = {_channel(draft, name, logged, sign)}"
+    return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
+
+
+def _columns(draft: Draft) -> list[str]:
+    """The columns or fields of a log that tells of no channel, as comments."""
+    streams = [stream for stream in draft.channels.free if stream.width == 1 or stream.topic]
+    made = _wrapped(
+        "CHECK: no name and no course tells of a torque, speed or position. Write the channels here, with the unit "
+        'that the log holds, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V. '
+        "The log has, with the smallest and the largest value:"
+    )
+    for stream in streams[:_MOST_LISTED]:
+        if not np.isfinite(stream.values).any():
+            continue
+        low, high = float(np.nanmin(stream.values)), float(np.nanmax(stream.values))
+        made.append(f"#   {_plain(_place(draft, stream))}: {low:.4g} to {high:.4g}")
+    if len(streams) > _MOST_LISTED:
+        made.append(f"#   and {len(streams) - _MOST_LISTED} more: see cdtool info")
+    return made
+
+
+def _place(draft: Draft, stream: Stream) -> str:
+    if draft.topics:
+        return f"topic = {_text(stream.topic)}, field = {_text(stream.field)}"
+    return f"column = {_column(stream.columns[0])}"
+
+
 def _coordinates_why(side: Side) -> str:
     if side.coordinates == "motor":
-        return "guessed: the log holds the motor's torque, speed and angle"
-    return 'guessed: the log holds the load\'s own force, speed and position ("motor" if a gear is between)'
+        return "guessed: the log holds the motor's torque or speed" + ("" if side.gear else ". CHECK: or the load's")
+    return 'guessed: the log holds the load\'s own force, speed and position. CHECK: "motor" if a gear is between'
 
 
 def _placeholders(side: Side, joints: int) -> list[str]:
@@ -97,10 +134,13 @@ def _placeholders(side: Side, joints: int) -> list[str]:
     made = _commented(f"{key} = {each('0.0')}", f"CHECK: {unit}, not in the log; {refused}")
     if side.coordinates == "motor":
         made += _commented(f"motor_inertia = {each('0.0')}", "CHECK: kg m2, not in the log; 0 is a placeholder")
-        text = (
-            f"CHECK: {ratio}, load travel per motor angle; 1 is a placeholder: figures of the load are wrong until then"
-        )
-        made += _commented(f"transmission_ratio = {each('1.0')}", text)
+        text = f"CHECK: {ratio}, load travel per motor angle; "
+        if side.gear is not None:
+            why = f"guessed: {side.gear.why}, {side.gear.position} over {side.gear.speed}"
+            made += _commented(f"transmission_ratio = {side.gear.ratio:.4g}", f"{why}. {text}right if both units are")
+        else:
+            text += "1 is a placeholder: figures of the load are wrong until then"
+            made += _commented(f"transmission_ratio = {each('1.0')}", text)
     return made
 
 
@@ -108,20 +148,21 @@ def _time(clock: Clock) -> list[str]:
     if clock.column is None:
         return _commented("time = { rate_hz = 1000.0 }", f"CHECK: a placeholder: {clock.why}")
     column = clock.column if isinstance(clock.column, int) else _text(clock.column)
-    return _commented(f"time = {{ column = {column}, unit = {_text(clock.unit)} }}", f"guessed: {clock.why}")
+    scale = f"unit = {_text(clock.unit)}" if clock.rate is None else f"rate_hz = {clock.rate:.5g}"
+    return _commented(f"time = {{ column = {column}, {scale} }}", _marked(f"guessed: {clock.why}", clock.check))
 
 
 def _channel(draft: Draft, name: str, logged: Logged | None, sign: float) -> str:
     stream = draft.channels.found[name].stream
     if draft.topics:
-        parts = [f"topic = {_text(stream.topic)}", f"field = {_text(stream.field)}"]
+        parts = [_place(draft, stream)]
     elif len(stream.columns) == 1:
         parts = [f"column = {_column(stream.columns[0])}"]
     else:
         parts = [f"columns = {_list([_column(column) for column in stream.columns])}"]
     if logged is None:
         return f"{{ {', '.join(parts)} }}"
-    if not draft.topics:
+    if logged.unit:
         parts.append(f"unit = {_text(logged.unit)}")
     if logged.scale is not None or sign < 0.0:
         scale = [sign * value for value in logged.scale or (1.0,)]
@@ -143,7 +184,15 @@ def _commented(line: str, why: str) -> list[str]:
     joined = f"{line}  # {why}"
     if len(joined) <= _WIDEST:
         return [joined]
-    return [*(f"# {part}" for part in wrap(why, _WIDEST - 2, break_long_words=False)), line]
+    return [*_wrapped(why), line]
+
+
+def _wrapped(text: str) -> list[str]:
+    return [f"# {part}" for part in wrap(text, _WIDEST - 4, break_long_words=False, break_on_hyphens=False)]
+
+
+def _marked(why: str, check: str) -> str:
+    return f"{why}. CHECK: {check}" if check else why
 
 
 def _list(items: Sequence[str]) -> str:

@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.formats.element_names import element_names
 from cdtool.formats.reading import choose_format, has_topics, log_parts
-from cdtool.formats.source import Source
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import CHANNELS, Finding
-from cdtool.units import find_unit
-from cdtool.workflows.clock_guess import GuessedClock, guess_clock
+from cdtool.workflows.draft_clock import TableClock, seconds, table_clock
 from cdtool.workflows.draft_guess import guess_channels
+from cdtool.workflows.draft_names import unit_in_name
+from cdtool.workflows.draft_ratio import Ratio, ratio_of
+from cdtool.workflows.draft_side import side_of
 from cdtool.workflows.draft_streams import Channels, streams_of
 from cdtool.workflows.draft_text import Clock, Draft, draft_text
-from cdtool.workflows.draft_units import side_of
+from cdtool.workflows.draft_units import Evidence, fits_as_well, is_si
 from cdtool.workflows.information import info
 from cdtool.workflows.written_file import written_file
 
@@ -43,8 +42,8 @@ class Drafted:
 def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
     """Write a draft of a machine file for a log; `cdtool info` runs with it. Raises CdtoolError.
 
-    A channel whose guess the log contradicts is left in the file as a comment. An existing file is not overwritten
-    without `force`.
+    A channel whose guess the log contradicts is left in the file as a comment; where nothing tells of a channel, all
+    columns are. An existing file is not overwritten without `force`.
     """
     target = Path(output)
     if target.exists() and not force:
@@ -59,6 +58,8 @@ def _settled(log: Path, draft: Draft) -> Drafted:
     """The draft with which `cdtool info` reads the log: what the log contradicts is taken back, one after another."""
     left_out: list[str] = []
     turned = False
+    if not draft.channels.found:
+        return Drafted("", draft_text(draft), (), (), ())
     with TemporaryDirectory() as folder:
         trial = Path(folder) / "draft.toml"
         while True:
@@ -83,19 +84,24 @@ def _drafted(log: Path) -> Draft:
     found = choose_format(path)
     source = found.columns(path)
     topics = has_topics(found)
-    clock = None if topics else guess_clock(source)
-    own = any(column.time is not None for column in source.columns.values())
-    streams = streams_of(source, clock.time if clock else None, clock.column if clock else None, topics)
+    clock, times = (None if topics else table_clock(source)) or (None, None)
+    streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
+    if not streams:
+        raise RecordingError(f"{log}: holds no column of numbers beside a clock", "see cdtool info for what it holds")
     channels = guess_channels(streams, topics)
-    if not channels.found:
-        raise RecordingError(
-            f"{log}: no column's name or course tells of a torque, speed or position",
-            "see cdtool info for what it holds, and write [channels] by hand",
-        )
-    side = side_of(channels, topics)
+    own = any(column.time is not None for column in source.columns.values()) and not topics
+    clock = None if own else clock
+    types = {topic: text.split(",")[0] for topic, text in source.details.items()} if topics else {}
+    motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
+    messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
+    ratio = ratio_of(channels, clock, messages_si)
+    unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
+    side = side_of(channels, ratio, clock, messages_si)
     joints, why = _joints(path, channels, topics)
-    time = Clock("time", "s", "the file's own clock") if own and not topics else _clock(source, clock)
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics)
+    doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
+    time = Clock("time", "s", "the file's own clock") if own else _clock(clock, ratio, doubt)
+    evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence)
 
 
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
@@ -109,31 +115,42 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
 
 
-def _clock(source: Source, clock: GuessedClock | None) -> Clock:
+def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
+    """What is odd about a clock's unit that its name alone tells: only another one fits the ratio."""
+    if clock is None or not clock.told.endswith("name") or ratio is None or ratio.fitting:
+        return ""
+    other = ratio_of(channels, replace(clock, told=""), messages_si=False)
+    if other is None or not other.fitting or other.tick:
+        return ""
+    first = other.fitting[0]
+    return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
+
+
+def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
     if clock is None:
         return Clock(why="no column looks like a clock: give the rate, or the column and its unit")
-    column = source.columns[clock.column]
-    unit, why = _time_unit(column.values, clock), "its name or its steps"
     name: str | int = int(clock.column) if clock.column.isdigit() else clock.column
-    told = find_unit(column.unit) if column.unit else None
-    if told is not None and told.si == "s":
-        return Clock(name, str(column.unit), "the header, which names the unit")
-    return Clock(name, unit, f"{why}; unit: steps of {np.median(np.diff(column.values)):.4g} {unit}")
-
-
-def _time_unit(values: np.ndarray, clock: GuessedClock) -> str:
-    """The unit with which the guess made seconds of the column."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) < 2 or values[known[-1]] == values[known[0]]:
-        return "s"
-    factor = (clock.time[-1] - clock.time[0]) / (values[known[-1]] - values[known[0]])
-    return min(("s", "ms", "us", "ns", "min"), key=lambda unit: abs(np.log(abs(factor) / _seconds(unit))))
-
-
-def _seconds(unit: str) -> float:
-    known = find_unit(unit)
-    assert known is not None
-    return known.factor
+    if clock.told:
+        return Clock(name, clock.unit, clock.told, check)
+    why = "its name or its steps"
+    if (named := unit_in_name("time", clock.column)) and not clock.counts:
+        why += f", though its name ends with {named}"
+    if ratio is not None and ratio.fitting:
+        first = ratio.fitting[0]
+        pair = f"{first.position} and {first.speed}"
+        if ratio.tick:
+            text = f"counts, not a time: the rate is right if position and speed are in {pair}"
+            return Clock(name, why=f"{why}; rate: with {pair}", check=text, rate=1.0 / ratio.tick)
+        also = (
+            f"; {fits_as_well(ratio, clock_told=False)} as well" if ratio.fitting[1:] else "; no other fits the ratio"
+        )
+        why += f"; unit: steps of {clock.step:.4g} {first.clock}, with {pair}"
+        return Clock(name, first.clock, why, f"the unit is not told{also}")
+    if clock.counts:
+        text = "counts, not a time: 1000 steps a second are a placeholder; give their rate"
+        return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
+    rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
+    return Clock(name, clock.unit, why, f"the unit is not told: steps of {clock.step:.4g} are {rates}")
 
 
 def _blamed(fault: CdtoolError, mapped: tuple[str, ...]) -> str | None:

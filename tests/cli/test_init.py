@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shlex
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -52,7 +54,7 @@ def test_what_a_log_cannot_tell_is_marked_and_cannot_pass_for_a_value(tmp_path):
     text = init(LOGS / "gate/stiff/03.csv", path).text.splitlines()
     for key in ("load_mass = 0.0", "motor_inertia = 0.0", "transmission_ratio = 1.0"):
         at = next(i for i, line in enumerate(text) if line.startswith(key))
-        assert "CHECK" in text[at] or "CHECK" in text[at - 1]
+        assert "CHECK" in text[at] or (text[at - 1].startswith("#") and "CHECK" in "".join(text[at - 2 : at]))
     mapped = [i for i, line in enumerate(text) if " = {" in line and not line.startswith("#")]
     assert all("guessed" in text[i] or text[i - 1].startswith("#") for i in mapped)
     done = cdtool("detect", LOGS / "gate/stiff/03.csv", "-m", path, "-d", "gm", "--limit", 400)
@@ -141,12 +143,42 @@ def test_nothing_is_overwritten_unless_it_is_asked_for(tmp_path):
     assert path.read_text() != "mine"
 
 
-def test_a_log_that_tells_of_no_machine_is_one_line(tmp_path):
-    log = tmp_path / "weather.csv"
-    log.write_text("t,rain\n" + "".join(f"{k},{k % 3}\n" for k in range(30)))
-    with pytest.raises(RecordingError, match="no column's name or course tells"):
+def test_a_log_that_tells_of_no_channel_gets_a_file_with_its_clock_and_its_columns_as_comments(tmp_path):
+    log, path = tmp_path / "scope.csv", tmp_path / "machine.toml"
+    log.write_text("TIME,CH1,CH2\n" + "".join(f"{k * 1e-3:.3f},{k % 3},{k % 7}\n" for k in range(300)))
+    done = cdtool("init", log, "-o", path)
+    assert done.status == 0 and "no name or course tells" in done.err
+    values = tomllib.loads(path.read_text())
+    assert list(values["channels"]) == ["time"] and values["channels"]["time"]["column"] == "TIME"
+    assert values["machine"]["load_mass"] == 0.0
+    assert '#   column = "CH1": 0 to 2' in path.read_text() and '#   column = "CH2": 0 to 6' in path.read_text()
+    filled = path.read_text() + 'speed = { column = "CH1", unit = "m/s" }\n'
+    path.write_text(filled)
+    assert info(log, machine=path).channels
+
+
+def test_a_log_of_a_clock_alone_is_one_line(tmp_path):
+    log = tmp_path / "clock.csv"
+    log.write_text("t\n" + "".join(f"{k}\n" for k in range(30)))
+    with pytest.raises(RecordingError, match="no column of numbers beside a clock"):
         init(log, tmp_path / "machine.toml")
     assert not (tmp_path / "machine.toml").exists()
+
+
+@pytest.mark.parametrize("log", ["gate/stiff/03.csv", "gate/stiff/01.mcap", "arm/trial_1/stiff/01.csv"])
+def test_no_comment_is_wider_than_a_terminal(tmp_path, log):
+    text = init(LOGS / log, tmp_path / "machine.toml").text
+    assert max(len(line) for line in text.splitlines() if line.startswith("#")) <= 100
+
+
+def test_the_next_command_can_be_pasted_into_a_shell(tmp_path):
+    folder = tmp_path / "Läufe 1"
+    folder.mkdir()
+    log, path = folder / "a 'b'.csv", folder / "neu $x.toml"
+    shutil.copy(LOGS / "gate/stiff/03.csv", log)
+    done = cdtool("init", log, "-o", path)
+    line = next(line for line in done.out.splitlines() if line.startswith("  cdtool info"))
+    assert shlex.split(line) == ["cdtool", "info", str(log), "--machine", str(path)]
 
 
 def registered(name: str) -> bool:
