@@ -183,10 +183,15 @@ def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(in
     assert finding["reason"].startswith("left out: ") and "odd" in done.err
 
 
-def test_a_detector_that_cannot_learn_ends_the_benchmark_with_one_line(install, tmp_path):
+def test_a_detector_that_cannot_learn_stops_no_other_and_alone_ends_with_one_line(install, tmp_path):
     install(DETECTOR.replace("torque = recording", "1 / 0; torque = recording"))
-    done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "gm,odd")
-    assert done.status == 2 and done.err.count("\n") == 1 and "detector odd fails: ZeroDivisionError" in done.err
+    why = "detector odd fails: ZeroDivisionError"
+    done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "gm,odd", "--json")
+    outcomes = {(item["detector"], item["outcome"]) for item in json.loads(done.out)["contacts"]}
+    assert done.status == 3 and outcomes == {("momentum", "detected"), ("odd", "not_assessable")}
+    assert done.err.count(why) == 1 and "left out: odd: not assessable: " in done.err
+    alone = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "odd")
+    assert alone.status == 2 and alone.err.count("\n") == 1 and why in alone.err and "take odd out" in alone.err
 
 
 THRESHOLD = """

@@ -50,7 +50,7 @@ COMMANDS = {
     "docs/containers.md": 4,
 }
 EXAMPLES = {
-    "docs/python.md": 10,
+    "docs/python.md": 13,
     "docs/own-detector.md": 2,
     "docs/comparing.md": 1,
     "docs/impact.md": 6,

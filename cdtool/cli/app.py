@@ -56,6 +56,10 @@ app.add_typer(study, name="study")
 app.command("list")(list_known)
 
 
+# As a shell counts it: 128 and the number of the signal that Ctrl-C sends.
+_INTERRUPTED = 130
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         from cdtool.version import __version__
@@ -72,7 +76,8 @@ def _options(
 ) -> None:
     """How fast, how surely and at which force does a machine notice that it has hit something?
 
-    Exit status: 0 done, 1 a limit is broken, 2 wrong usage or nothing usable, 3 done but some data was left out.
+    Exit status: 0 done, 1 a limit is broken, 2 wrong usage or nothing usable, 3 done but some data was left out,
+    130 interrupted.
     """
 
 
@@ -97,6 +102,8 @@ def main() -> None:
         sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
         sys.exit(ExitStatus.OK)
     except SystemExit as end:
+        if end.code == _INTERRUPTED:
+            typer.echo("interrupted", err=True)
         # click ends with 1 where the reader has gone; here 1 means a broken limit.
         if isinstance(end.__context__, OSError) and end.__context__.errno == errno.EPIPE:
             sys.exit(ExitStatus.OK)
@@ -108,7 +115,8 @@ def main() -> None:
         print_error(CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space"))
         sys.exit(ExitStatus.UNUSABLE)
     except KeyboardInterrupt:
-        sys.exit(130)
+        typer.echo("interrupted", err=True)
+        sys.exit(_INTERRUPTED)
     except Exception:
         # Python would end with 1, which means a broken limit to a pipeline.
         traceback.print_exc()

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _WIDTH = 100
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 _SHOWN = 10
+# How each file of a comparison begins.
+_MARKS = {".md": b"**cdtool compare: ", ".json": b'{\n "verdict": "'}
 
 
 def compare(
@@ -42,9 +44,13 @@ def compare(
     """
     from cdtool.report.build_report import check_outputs, to_json, write_outputs
     from cdtool.workflows.comparing import compare as run
+    from cdtool.workflows.written_file import refuse_inputs, refuse_other_kind
 
     targets = output or []
     check_outputs(targets)
+    refuse_inputs(targets, (old, new))
+    for target in targets:
+        refuse_other_kind(target, _MARKS[target.suffix.lower()], "comparison of cdtool")
     found = run(old, new, significance=level)
     write_outputs(found, targets)
     if as_json:

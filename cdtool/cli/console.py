@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.runs import Progress
 
 _SHOWN = 10
+_NARROWEST, _WIDEST = 60, 100
 
 
 def print_error(fault: CdtoolError) -> None:
@@ -34,21 +37,47 @@ def print_json(value: Any) -> None:
     typer.echo(strict_json(value))
 
 
-def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = ()) -> None:
-    """On stderr what was left out and why, then warnings; long lists are cut and counted."""
-    for items, word in ((skipped, "left out"), (findings, "warning")):
+def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
+    """On stderr what was left out and why, what is damaged, then warnings and notes; long lists are cut and counted."""
+    left_out, damaged = _apart(skipped)
+    for items, word in ((left_out, "left out"), (damaged, "damaged"), (findings, "warning"), (notes, "note")):
         for item in items[:_SHOWN]:
-            typer.echo(f"{word}: {plain(item.recording)}: {plain(_without_name(item))}", err=True)
+            reason = _without_name(item).removeprefix("damaged, ")
+            typer.echo(f"{word}: {plain(item.recording)}: {plain(reason)}", err=True)
         if len(items) > _SHOWN:
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 
 
 def leave(skipped: Sequence[Skipped]) -> None:
-    """End with status 3 where something was left out."""
-    if skipped:
-        count = len(skipped)
-        typer.echo(f"done, but {count} {'item was' if count == 1 else 'items were'} left out", err=True)
-        raise typer.Exit(ExitStatus.INCOMPLETE)
+    """End with status 3 where something was left out, or a log that was used is damaged."""
+    if not skipped:
+        return
+    left_out, damaged = _apart(skipped)
+    logs = len({item.recording for item in damaged})
+    parts = [f"{len(left_out)} {'item was' if len(left_out) == 1 else 'items were'} left out"] if left_out else []
+    parts += [f"{logs} {'log is' if logs == 1 else 'logs are'} damaged"] if damaged else []
+    typer.echo(f"done, but {' and '.join(parts)}", err=True)
+    raise typer.Exit(ExitStatus.INCOMPLETE)
+
+
+def say(text: str, indent: str = "") -> None:
+    """A sentence on stdout, in lines that fit the terminal; names are not cut."""
+    lines = fill(
+        plain(text),
+        columns_to_fill(),
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    typer.echo(lines)
+
+
+def columns_to_fill() -> int:
+    """The terminal's width, from 60 to 100; 100 where there is none, so that a file is the same everywhere."""
+    if not sys.stdout.isatty():
+        return _WIDEST
+    return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
 
 
 def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], title: str = "") -> None:
@@ -93,6 +122,14 @@ def progress(what: str) -> Iterator[Progress | None]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _apart(skipped: Sequence[Skipped]) -> tuple[list[Skipped], list[Skipped]]:
+    """What was left out, and what was used although it is damaged."""
+    from cdtool.workflows.runs import DAMAGED
+
+    damaged = [item for item in skipped if item.reason.startswith(DAMAGED)]
+    return [item for item in skipped if item not in damaged], damaged
 
 
 def _without_name(item: Skipped) -> str:

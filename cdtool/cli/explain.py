@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import shutil
-import sys
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.cli.console import leave, number, plain, print_json, print_skipped, table
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, say, table
 from cdtool.cli.options import (
     DebounceOption,
     DetectorOption,
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
     from cdtool.evaluation.explanation.margin import Moment
     from cdtool.workflows.explaining import Explained
 
-_NARROWEST, _WIDEST = 60, 100
 # Events that are printed and drawn; --json has all.
 _SHOWN = 20
 
@@ -103,7 +99,7 @@ def _show(explained: Explained) -> None:
     quiet = [detection for detection, events in pairs if not events]
     for detection in quiet[:_SHOWN]:
         why = detection.verdict.reason or "no alarm, and no contact without one"
-        _print(f"{detection.operation.name}, {detection.detector}: {why}")
+        say(f"{detection.operation.name}, {detection.detector}: {why}")
     if len(quiet) > _SHOWN:
         typer.echo(f"and {len(quiet) - _SHOWN} operations more without an event")
 
@@ -114,9 +110,9 @@ def _show_event(item: Explanation) -> None:
     from cdtool.evaluation.explanation.words import words
 
     headline, *sentences = words(item)
-    _print(f"{item.operation}, {item.detector}: {headline}")
+    say(f"{item.operation}, {item.detector}: {headline}")
     for sentence in sentences:
-        _print(sentence, indent="  ")
+        say(sentence, indent="  ")
     # One column stays empty, and so is left out, where there is no onset or no alarm to count from.
     alarm = item.alarm.time if isinstance(item, AlarmExplanation) else None
     rows = [
@@ -135,17 +131,6 @@ def _show_event(item: Explanation) -> None:
         heads = ("from onset\nms", "to alarm\nms", f"signal\n{item.unit}", "limit\n", "margin\n", "of limit\n%")
         table([*((head, "right") for head in heads), ("", "left")], rows)
     typer.echo()
-
-
-def _print(text: str, indent: str = "") -> None:
-    typer.echo(fill(plain(text), columns_to_fill(), initial_indent=indent, subsequent_indent=f"{indent}  "))
-
-
-def columns_to_fill() -> int:
-    """The terminal's width, from 60 to 100; 100 where there is none, so that a file is the same everywhere."""
-    if not sys.stdout.isatty():
-        return _WIDEST
-    return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
 
 
 def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:

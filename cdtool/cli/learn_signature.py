@@ -16,6 +16,7 @@ from cdtool.cli.options import (
     JsonOption,
     LatchOption,
     MachineOption,
+    OnsetAboveOption,
     OperationsOption,
     RearmOption,
     listed,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 def learn_signature(
     logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings, 10 or more a class.", metavar="LOG...")],
     machine: MachineOption,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Signature file to write (JSON).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Signature file to write (.json).")],
     detector: Annotated[
         str, typer.Option("--detector", "-d", help="Detector: feekf, gm, igm, pi, pt; see cdtool list detectors.")
     ],
@@ -65,6 +66,7 @@ def learn_signature(
     rearm: RearmOption = None,
     hysteresis: HysteresisOption = None,
     latch: LatchOption = None,
+    onset_above: OnsetAboveOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Learn from fewer than 10 runs; the limits are less sure.")
     ] = False,
@@ -75,13 +77,17 @@ def learn_signature(
 
     Example: cdtool learn-signature free/*.csv --machine machine.toml --detector feekf -o gate.feekf.json
     """
+    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
     from cdtool.plain_text import counted
-    from cdtool.signature_store import write_signature
+    from cdtool.signature_store import MARK, check_name, write_signature
     from cdtool.thresholds.signature import ENOUGH_RUNS
     from cdtool.workflows.learning import learn_signature as learn
     from cdtool.workflows.threshold_settings import rule_of
+    from cdtool.workflows.written_file import refuse_other_kind
 
+    check_name(output)
+    refuse_other_kind(output, MARK, "signature")
     machine_file = read_machine_file(machine)
     own: dict[str, Any] = {"rule": rule, "alignment": align, "force": force}
     own |= {"safety_factor": safety_factor} if safety_factor is not None else {}
@@ -96,6 +102,7 @@ def learn_signature(
             operations=operations,
             activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
             false_alarm_budget=false_alarm_budget,
+            onset=OnsetRule(above=onset_above),
             jobs=jobs,
             progress=advance,
         )

@@ -17,6 +17,7 @@ def recover(
     unverified: Annotated[
         bool, typer.Option("--unverified", help="Also keep messages that no checksum covers, marked as such.")
     ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write what is left of a damaged MCAP file as a clean one, and say what was lost.
 
@@ -26,7 +27,7 @@ def recover(
     """
     from cdtool.workflows.recovering import recover as write_what_is_left
 
-    done = write_what_is_left(log, output, unverified)
+    done = write_what_is_left(log, output, unverified, force=force)
     for finding in done.findings:
         typer.echo(f"{finding.severity}: {plain(finding)}")
     typer.echo(f"written: {plain(done.output)}: {done.messages} messages")

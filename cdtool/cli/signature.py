@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
-from cdtool.cli.options import JobsOption, JsonOption, MachineOption, figure_name
+from cdtool.cli.options import JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import ExitStatus, UsageError
 
@@ -77,6 +77,7 @@ def check(
         Path | None,
         typer.Option("--plot", help="PNG, SVG or PDF of the drift; a folder for several classes."),
     ] = None,
+    onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -87,13 +88,21 @@ def check(
 
     Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
     """
+    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.workflows.upkeep import check_signature
 
     if plot is not None and not plot.is_dir():
         figure_name(plot)
     with progress("reading runs") as advance:
         checked = check_signature(
-            file, logs, machine, operations=operations, target=target, jobs=jobs, progress=advance
+            file,
+            logs,
+            machine,
+            operations=operations,
+            target=target,
+            onset=OnsetRule(above=onset_above),
+            jobs=jobs,
+            progress=advance,
         )
     names = _plot_names(plot, checked)
     print_skipped(checked.skipped, checked.findings)
@@ -128,6 +137,7 @@ def update(
     reserve: Annotated[
         float | None, typer.Option("--reserve", help="Spreads that a limit may move from where it was first learned.")
     ] = None,
+    onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -135,6 +145,7 @@ def update(
 
     Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
     """
+    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.thresholds.guarded_update import CAP, RESERVE
     from cdtool.workflows.upkeep import update_with_runs
 
@@ -147,6 +158,7 @@ def update(
             forget=forget,
             cap=CAP if cap is None else cap,
             reserve=RESERVE if reserve is None else reserve,
+            onset=OnsetRule(above=onset_above),
             jobs=jobs,
             progress=advance,
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.cli.console import leave, number, plain, table
+from cdtool.cli.console import leave, number, plain, say, table
 from cdtool.errors import ExitStatus
 
 if TYPE_CHECKING:
@@ -37,13 +37,15 @@ def show_table(evaluated: Evaluated) -> None:
     columns += [(name, "right") for name in names]
     table(columns, [_row(item) for item in evaluated.summaries])
     provenance = evaluated.results.provenance
-    typer.echo("latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable;")
-    typer.echo(f"median and P95 count missed contacts; ops: operations scored; onset: {plain(provenance.get('onset'))}")
+    say(
+        "latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable; "
+        f"median and P95 count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
+    )
     if provenance.get("watched_joints"):
-        typer.echo(f"joints watched, of all: {plain(provenance['watched_joints'])}")
+        say(f"joints watched, of all: {provenance['watched_joints']}")
     for item in evaluated.results.calibration:
-        typer.echo(
-            f"{plain(item.detector)}: safety factor {item.safety_factor:.3g} for a budget of {plain(item.budget)}: "
+        say(
+            f"{item.detector}: safety factor {item.safety_factor:.3g} for a budget of {item.budget}: "
             f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) that it was set on"
         )
     _show_bounds(evaluated)

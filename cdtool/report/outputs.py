@@ -17,6 +17,7 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.report.files import write_text, write_whole
 from cdtool.report.plots.figures import SUFFIXES
+from cdtool.workflows.written_file import refuse_other_kind
 
 _LONGEST_NAME = 40
 
@@ -74,10 +75,24 @@ _WRITERS: dict[str, Callable[[Report, Path], None]] = {
     ".csv": _write_csv,
     **dict.fromkeys(SUFFIXES, _write_latencies),
 }
+# What the first lines of each hold; figures have no such mark, and no input is one.
+_MARKS: dict[str, tuple[bytes, str]] = {
+    ".json": (b'"tool": "cdtool"', "results of cdtool benchmark"),
+    ".html": (b"<title>Collision detection", "HTML report of cdtool"),
+    ".md": (b"# Collision detection: ", "Markdown report of cdtool"),
+    ".xml": (b'<testsuites name="cdtool"', "JUnit report of cdtool"),
+    ".csv": (b"recording,group,", "table of cdtool"),
+}
+_IN_FOLDER = ("results.json", "contacts.csv", "forces.csv", "junit.xml", "report.html", "report.md")
 
 
 def check_outputs(targets: Sequence[Path]) -> None:
-    """Raise UsageError where a target cannot be written: unknown suffix, no such folder, no permission."""
+    """Raise UsageError where a target cannot be written: unknown suffix, no such folder, no permission.
+
+    A report may be written anew, and nothing but a report is ever replaced: no recording, no file of another program.
+    """
+    for path in (path for target in targets for path in _texts(target)):
+        refuse_other_kind(path, *_MARKS[path.suffix.lower()])
     for target in targets:
         if target == Path():
             raise UsageError("--output names no file or folder", "give a name, such as report or results.json")
@@ -131,13 +146,22 @@ def _write_folder(report: Report, folder: Path) -> Path:
         folder.mkdir(exist_ok=True)
     except OSError as fault:
         raise CdtoolError(f"{plain(folder)} cannot be made: {fault.strerror}", "choose another --output") from fault
-    for name in ("results.json", "contacts.csv", "junit.xml", "report.html"):
+    for name in (item for item in _IN_FOLDER if item not in ("forces.csv", "report.md")):
         _WRITERS[Path(name).suffix](report, folder / name)
     if report.evaluated.results.forces:
         write_text(folder / "forces.csv", forces_csv(report.evaluated.results))
     images = write_figures(report, folder)
     write_text(folder / "report.md", to_markdown(report.evaluated, images))
     return folder / "report.html"
+
+
+def _texts(target: Path) -> list[Path]:
+    """The files with a mark that a target stands for."""
+    return [
+        path
+        for path in ([target / name for name in _IN_FOLDER] if target.is_dir() else [target])
+        if path.suffix.lower() in _MARKS
+    ]
 
 
 def _is_folder(target: Path) -> bool:

@@ -66,9 +66,10 @@ def benchmark(
     logs, the others are named in `results.findings`. `false_alarm_budget`, as 1/1000op or 0.1/h, sets each detector's
     safety factor on the runs learned from, instead of the file's.
 
-    A log that cannot be read or scored is left out and named in `results.skipped`. Raises ConfigurationError for a
-    wrong file, SignatureError where nothing can be learned, RecordingError where nothing could be scored, UsageError
-    where the runs learned from are too few for the budget.
+    A log that cannot be read or scored is left out and named in `results.skipped`; so is a detector that lacks a
+    channel, and none of its contacts is assessable. Raises ConfigurationError for a wrong file, SignatureError where
+    nothing can be learned, RecordingError where nothing could be scored, UsageError where the runs learned from are too
+    few for the budget.
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
     limits = len(setup.limits)
@@ -79,7 +80,8 @@ def benchmark(
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
     begin = perf_counter()
-    learn = load_runs(setup.learn, machine_file, setup.operations, jobs=jobs, base=setup.path.parent)
+    base = setup.path.parent
+    learn = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=base)
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[Skipped] = []
     if list(detectors) == ["all"]:
@@ -91,12 +93,13 @@ def benchmark(
         left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    detect = detect_with(setup, used, learned.thresholds)
+    detect = detect_with(setup, used, learned.thresholds, learned.lacking)
     factors = _factors(setup, learned.thresholds)
     gathered = Gathering(
         setup, setup.detectors, factors, {op.recording.digest: op.recording.name for op in learn.operations}
     )
     gathered.skipped += [*learn.skipped, *learned.skipped]
+    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.lacking.items()]
     gathered.findings += [*learn.findings, *left_out, *learned.blind]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
 

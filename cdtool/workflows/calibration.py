@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.fitting import Fit, Pair, fitting, signals_of
+from cdtool.workflows.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of
 
 # Runs are judged by what the other nine tenths teach.
 FOLDS = 10
@@ -22,12 +22,16 @@ FOLDS = 10
 
 @dataclass(frozen=True)
 class LearnedThresholds:
-    """Each detector's thresholds, runs left out, detectors that could judge nothing, and how factors were set."""
+    """Each detector's thresholds, runs left out, detectors that could judge nothing, and how factors were set.
+
+    `lacking`: the detectors that could not be used on any run, with the reason; they have no threshold.
+    """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
     skipped: list[Skipped]
     blind: list[Skipped]
     calibration: list[CalibrationResult]
+    lacking: dict[str, str]
 
 
 def learn_thresholds(
@@ -35,9 +39,10 @@ def learn_thresholds(
 ) -> LearnedThresholds:
     """Learn each detector's threshold from impact-free runs; with a budget its safety factor is set on them too.
 
-    Raises SignatureError where nothing can be learned, UsageError where the runs are too few for the budget.
+    A detector that lacks a channel stops the others not. Raises SignatureError where nothing can be learned, UsageError
+    where the runs are too few for the budget.
     """
-    learned = LearnedThresholds({}, [], [], [])
+    learned = LearnedThresholds({}, [], [], [], {})
     fit = fitting(setup.rule)
     for detector in detectors:
         try:
@@ -47,6 +52,10 @@ def learn_thresholds(
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
             learned.blind.append(Skipped(detector.name, f"not assessable: {fault.message}"))
+            continue
+        except NoUsableRunError as fault:
+            learned.thresholds[detector.name] = ()
+            learned.lacking[detector.name] = fault.reason
             continue
         learned.skipped.extend([*left_out, *fitted.skipped])
         thresholds = fitted.thresholds
@@ -59,7 +68,16 @@ def learn_thresholds(
                 )
             )
         learned.thresholds[detector.name] = thresholds
+    if learned.lacking and len(learned.lacking) == len(detectors):
+        raise _none_usable(learned.lacking, known=bool(operations))
     return learned
+
+
+def _none_usable(lacking: Mapping[str, str], known: bool) -> SignatureError:
+    name, reason = next(iter(lacking.items()))
+    fault = NoUsableRunError(name if len(lacking) == 1 else f"any of {', '.join(lacking)}", reason)
+    others = f"take {', '.join(lacking)} out of `detectors`, or map what they need"
+    return SignatureError(fault.message, others if known else fault.hint)
 
 
 def in_fixed_order(pairs: Sequence[Pair]) -> list[Pair]:

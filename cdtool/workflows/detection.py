@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from cdtool.activation import Activation, ActivationSettings
+from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
@@ -14,11 +17,11 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.plain_text import digits
-from cdtool.recording import Contact, Recording
+from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.runs import check_joints, load_operations
+from cdtool.workflows.runs import absent_truth, check_joints, load_operations
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,20 @@ def detect(
         for item in detections
     )
     return Detected(recording, detections, contacts, matchings, described, raised_by, recording.digest in learned)
+
+
+def why_no_contact(found: Detected, alarm: Alarm) -> str:
+    """Why an alarm that belongs to no contact has no latency: no ground truth, none any more, or it is a false one."""
+    channel = next((name for name in GROUND_TRUTH if name in found.recording), None)
+    if channel is None:
+        absent = absent_truth(found.recording)
+        return str(absent[0]).partition(":")[0] + " is not in this log" if absent else "no ground truth is mapped"
+    series = found.recording[channel]
+    present = series.time[np.isfinite(series.values[:, 0])]
+    if channel != "event" and (not len(present) or alarm.time > present[-1]):
+        ends = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
+        return f"{'load cell' if channel == 'force' else channel} {ends}"
+    return "no contact"
 
 
 def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:

@@ -20,6 +20,15 @@ from cdtool.thresholds.signature import Signature
 Pair = tuple[Operation, Signal]
 
 
+class NoUsableRunError(SignatureError):
+    """A detector can be used on none of the runs: mostly they lack a channel that it needs; `reason` is the first."""
+
+    def __init__(self, detector: str, reason: str) -> None:
+        first = f"; first reason: {reason}" if reason else ""
+        super().__init__(f"no run that {detector} can be used on{first}", "check with cdtool info")
+        self.reason = reason
+
+
 @dataclass(frozen=True)
 class Fitted:
     """Fitted thresholds with the operations that each was learned from, and the operations left out."""
@@ -53,11 +62,12 @@ def signals_of(
     watched: Sequence[str] = (),
     unread: Sequence[Skipped] = (),
 ) -> tuple[list[Pair], list[Skipped]]:
-    """A detector's signal of each operation, and what was left out; raises SignatureError where none is left.
+    """A detector's signal of each operation, and what was left out; raises NoUsableRunError where none is left.
 
     `unread`: what was left out before, for the reason in that error.
     """
     skipped: list[Skipped] = []
+    refused: list[CdtoolError] = []
     pairs: list[Pair] = []
     seen: dict[tuple[str, int], str] = {}
     for operation in operations:
@@ -69,11 +79,11 @@ def signals_of(
         try:
             pairs.append((operation, run_detector(operation, machine, detector, watched)))
         except CdtoolError as fault:
+            refused.append(fault)
             skipped.append(Skipped(operation.name, str(fault)))
     if not pairs:
-        reasons = [*unread, *skipped]
-        reason = f"; first reason: {reasons[0].reason}" if reasons else ""
-        raise SignatureError(f"no run that {detector.name} can be used on{reason}", "check with cdtool info")
+        reasons = [*(fault.message for fault in refused), *(item.reason for item in unread)]
+        raise NoUsableRunError(detector.name, reasons[0] if reasons else "")
     return pairs, skipped
 
 

@@ -16,10 +16,11 @@ from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching
 from cdtool.pipeline import Detection
-from cdtool.recording import FloatArray
+from cdtool.recording import Finding, FloatArray
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.counting import Exposure, SweepRows
 from cdtool.workflows.force_rows import point_rows
+from cdtool.workflows.impact_free import unchecked
 from cdtool.workflows.judged import Judged
 from cdtool.workflows.scoring import Scored
 
@@ -45,6 +46,7 @@ class Gathering:
         self._sweep = SweepRows(factors, HOLDOUT)
         self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
         self._scored: dict[str, str] = {}
+        self._unchecked: list[tuple[str, Finding]] = []
         self._logs = 0
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
 
@@ -53,6 +55,7 @@ class Gathering:
         self._logs += 1
         self.skipped += scored.skipped
         self.findings += scored.findings
+        self._unchecked += scored.unchecked
         if scored.recording is None:
             return
         self._refuse_learned(scored.recording)
@@ -96,7 +99,7 @@ class Gathering:
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
             skipped=tuple(self.skipped),
-            findings=tuple(self.findings),
+            findings=(*self.findings, *unchecked(self._unchecked)),
         )
 
     def _refuse_learned(self, recording: RecordingResult) -> None:

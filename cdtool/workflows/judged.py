@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.detection import Alarm
+from cdtool.detection import Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.force.course import ForceCourse, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
-from cdtool.recording import Contact, Recording
+from cdtool.recording import MEASURED, Contact, Recording
 from cdtool.strict_json import finite
 
 
@@ -29,6 +29,17 @@ class Judged:
     detections: tuple[Detection, ...]
     matchings: tuple[Matching, ...]
     sweeps: tuple[Swept | None, ...] = ()
+
+
+def not_assessable(operation: Operation, detector: str, unit: str, reason: str, watched: Sequence[str]) -> Detection:
+    """A detector that cannot be used on an operation: no sample of it could be judged, for that reason."""
+    recording = operation.recording
+    time = next((recording[name].time for name in MEASURED if name in recording), np.empty(0))
+    nothing = np.full((len(time), len(recording.joints)), np.nan)
+    status = np.full(nothing.shape, Status.GAP, dtype=np.uint8)
+    signal = Signal(time, nothing, status, unit, joints=recording.joints).watching(watched)
+    limits = np.full(signal.values.shape, np.nan)
+    return Detection(operation, detector, signal, Band(limits, limits), Verdict("not assessable", reason=reason))
 
 
 def contact_rows(

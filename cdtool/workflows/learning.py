@@ -11,14 +11,11 @@ from cdtool.activation import Activation, ActivationSettings
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
-from cdtool.signature_store import (
-    FactorOrigin,
-    LearnedRun,
-    SignatureFile,
-)
+from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.fitting import fitting, for_machine, signals_of
@@ -46,6 +43,7 @@ def learn_signature(
     operations: str = "whole",
     activation: ActivationSettings | None = None,
     false_alarm_budget: str | None = None,
+    onset: OnsetRule | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Learned:
@@ -53,9 +51,10 @@ def learn_signature(
 
     `rule` is any threshold's with its settings (safety factor, sides, alignment, force ...); `joints` are those to
     watch, all where none is named; `activation` are settings other than the default's. `false_alarm_budget`, as
-    1/300op or 0.1/h, sets the safety factor on these runs by cross-validation. Raises SignatureError where runs
-    are too few, UsageError where they are too few for the budget, CdtoolError where nothing can be read. Write the
-    result with `cdtool.signature_store.write_signature`.
+    1/300op or 0.1/h, sets the safety factor on these runs by cross-validation. A run in which the load cell shows a
+    contact by the `onset` rule is left out. Raises SignatureError where runs are too few, UsageError where they are too
+    few for the budget, CdtoolError where nothing can be read. Write the result with
+    `cdtool.signature_store.write_signature`.
     """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     raised_by = Activation().changed(activation or {})  # refuses wrong settings before anything is read
@@ -64,7 +63,7 @@ def learn_signature(
     wanted = for_machine(Signature() if rule is None else rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     instance = machine_file.detector(detector)
-    runs = load_runs([Path(log) for log in logs], machine_file, operations, jobs=jobs, progress=progress)
+    runs = load_runs([Path(log) for log in logs], machine_file, operations, onset=onset, jobs=jobs, progress=progress)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)
     fitted = fit(pairs)

@@ -42,17 +42,18 @@ class Recovered:
         return not self.left_out and all(finding.severity != "loss" for finding in self.findings)
 
 
-def recover(source: Path, output: Path, unverified: bool = False) -> Recovered:
+def recover(source: Path, output: Path, unverified: bool = False, *, force: bool = False) -> Recovered:
     """Write what is left of an MCAP file as a clean one; raises RecordingError where nothing is, UsageError.
 
     Messages are copied byte for byte. Those that no CRC covers (it is lost, or the writer made none) are left out, or,
     with `unverified`, kept in chunks without a CRC: nothing damaged is ever stamped as good. The metadata record
-    `cdtool.recovered` tells the source's SHA-256, what was lost and what is unverified.
+    `cdtool.recovered` tells the source's SHA-256, what was lost and what is unverified. `force` overwrites another file
+    that is there; never the source.
     """
     from cdtool.formats.mcap import Mcap
     from cdtool.formats.mcap.container.log import Log
 
-    _check_names(source, output)
+    _check_names(source, output, force)
     if not Mcap().sniff(source) and source.suffix.lower() != ".mcap":
         raise RecordingError(f"{source}: is not an MCAP file", "other formats have no checksums to recover by")
     surveyed = Log(source, strict=False)
@@ -79,8 +80,8 @@ def _write(source: Path, file: IO[bytes], result: Recovered, all_covered: bool) 
     from cdtool.formats.mcap.container.log import Log
     from cdtool.formats.mcap.container.records import Metadata
 
-    clean = CleanFile(file)
     log = Log(source, strict=False)
+    clean = CleanFile(file, log.profile)
     for piece in log.pieces():
         covered = [item for item in piece if all_covered or item.covered]
         if covered:
@@ -118,7 +119,7 @@ def _copy_extras(log: Log, clean: CleanFile) -> None:
                 clean.add_metadata(Metadata.read(file.read(at + PREFIX, length - PREFIX)))
 
 
-def _check_names(source: Path, output: Path) -> None:
+def _check_names(source: Path, output: Path, force: bool) -> None:
     if not source.is_file():
         raise RecordingError(f"{source}: no such file", "check the path")
     if not os.access(source, os.R_OK):
@@ -129,6 +130,8 @@ def _check_names(source: Path, output: Path) -> None:
         raise UsageError(f"{output}: no folder {output.parent}", "make it first")
     if output.exists() and output.samefile(source):
         raise UsageError(f"{output}: is the file to recover from", "write to another one")
+    if output.exists() and not force:
+        raise UsageError(f"{output}: is there already", "choose another name, or overwrite it with --force")
 
 
 @contextmanager

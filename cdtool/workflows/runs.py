@@ -11,12 +11,16 @@ from typing import Any, TypeVar
 
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
-from cdtool.recording import Recording
+from cdtool.recording import GROUND_TRUTH, Finding, Recording
+from cdtool.workflows.impact_free import contacts_shown, unchecked, without_contacts
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
+# How the reason begins of a log that is used although part of it is lost.
+DAMAGED = "damaged, used as far as it goes: "
 # Called after each piece of work with what is done and how much there is.
 Progress = Callable[[int, int], None]
 
@@ -88,14 +92,20 @@ def load_runs(
     machine_file: MachineFile,
     how: str,
     *,
+    onset: OnsetRule | None = None,
     jobs: int = 1,
     base: Path | None = None,
     progress: Progress | None = None,
 ) -> Runs:
-    """The operations of many logs; a log that cannot be read is left out and named, the others go on."""
+    """The operations of many impact-free logs; a log that cannot be read is left out and named, the others go on.
+
+    So is an operation in which the load cell shows a contact by the `onset` rule.
+    """
+    rule = onset or OnsetRule()
     operations: list[Operation] = []
     skipped: list[Skipped] = []
     findings: list[Skipped] = []
+    without: list[tuple[str, Finding]] = []
 
     def load(path: Path) -> tuple[Recording, list[Operation]] | CdtoolError:
         try:
@@ -108,10 +118,13 @@ def load_runs(
             skipped.append(unread(path, base, loaded))
             continue
         recording, parts = loaded
-        operations.extend(parts)
+        free, touched = without_contacts(parts, contacts_shown(recording, rule))
+        operations.extend(free)
+        skipped.extend(touched)
         findings.extend(told(recording))
         skipped.extend(lost(recording))
-    return Runs(tuple(operations), tuple(skipped), tuple(findings))
+        without.extend((recording.name, item) for item in absent_truth(recording))
+    return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)))
 
 
 def unread(path: Path, base: Path | None, fault: CdtoolError) -> Skipped:
@@ -140,7 +153,18 @@ def told(recording: Recording) -> list[Skipped]:
 
 def lost(recording: Recording) -> list[Skipped]:
     """What could not be read of a recording that is used nevertheless: to be told like what was left out."""
-    return [Skipped(recording.name, str(item)) for item in recording.findings if item.severity == "loss"]
+    return [Skipped(recording.name, f"{DAMAGED}{item}") for item in recording.findings if item.severity == "loss"]
+
+
+def absent_truth(recording: Recording) -> list[Finding]:
+    """The notes about ground truth that the machine file maps and the log does not hold."""
+    from cdtool.formats.reading import ABSENT
+
+    return [
+        item
+        for item in recording.findings
+        if item.channel in GROUND_TRUTH and item.channel not in recording and ABSENT in item.message
+    ]
 
 
 def _glob(path: Path) -> Iterator[Path]:

@@ -9,22 +9,23 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.detection import Alarm
-from cdtool.errors import CdtoolError, RecordingError
+from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse, force_course
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
 from cdtool.evaluation.truth.matching import match
-from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operation
-from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.recording import Contact, Finding, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.detection import contacts_of
 from cdtool.workflows.force_rows import force_rows
-from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
-from cdtool.workflows.runs import load_operations, lost, told, unread
+from cdtool.workflows.impact_free import without_contacts
+from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows, not_assessable
+from cdtool.workflows.runs import absent_truth, load_operations, lost, told, unread
+from cdtool.workflows.true_contacts import true_contacts, unwanted_contacts
 
 
 @dataclass
@@ -39,6 +40,8 @@ class Scored:
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
     findings: list[Skipped] = field(default_factory=list)
+    # Names of logs taken as free of impacts, with what would tell and is not in them.
+    unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
     reading: float = 0.0
     detecting: float = 0.0
@@ -49,13 +52,23 @@ Detect = Callable[[Operation, Scored], list[Detection]]
 
 
 def detect_with(
-    setup: BenchmarkFile, detectors: Sequence[Any], thresholds: Mapping[str, tuple[FittedThreshold, ...]]
+    setup: BenchmarkFile,
+    detectors: Sequence[Any],
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    lacking: Mapping[str, str],
 ) -> Detect:
-    """Detectors with their thresholds; one that fails on an operation is left out there and named."""
+    """Detectors with their thresholds; one that fails on an operation is left out there and named.
+
+    Those that are `lacking` what they need, for the reason given, can judge nothing.
+    """
 
     def detect(operation: Operation, scored: Scored) -> list[Detection]:
         found = []
         for detector in detectors:
+            if detector.name in lacking:
+                unit, why = detector.unit(setup.machine_file.machine), lacking[detector.name]
+                found.append(not_assessable(operation, detector.name, unit, why, setup.watched))
+                continue
             known = thresholds[detector.name]
             try:
                 found.append(
@@ -81,7 +94,7 @@ def score_log(
     begin = perf_counter()
     try:
         recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
-        contacts = _true_contacts(recording, group, setup, path)
+        contacts = true_contacts(recording, setup, path) if group != HOLDOUT else []
     except CdtoolError as fault:
         scored.skipped.append(unread(path, setup.path.parent, fault))
         scored.reading = perf_counter() - begin
@@ -90,6 +103,12 @@ def score_log(
     scored.source = recording.source
     scored.findings = told(recording)
     scored.skipped += lost(recording)
+    if group == HOLDOUT:
+        operations, touched = without_contacts(operations, unwanted_contacts(recording, setup))
+        scored.skipped += touched
+        scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
+        if not operations:
+            return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     inside = _by_operation(operations, contacts)
     for contact in contacts:
@@ -134,27 +153,6 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
         for detection in detections:
             pooled.setdefault(detection.detector, []).extend(detection.verdict.crossings)
     return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
-
-
-def _true_contacts(recording: Recording, group: str, setup: BenchmarkFile, path: Path) -> list[Contact]:
-    if group == HOLDOUT:
-        return []
-    labels = setup.labels
-    name = labels.name_of(recording.name) if labels else None
-    if labels and name is not None:
-        labels.check(recording.name, recording.start, recording.end)
-        if not labels.contacts[name]:
-            raise RecordingError(
-                f"{path}: no contact found ({labels.lines[name][0]} names none)",
-                "write its start_s and end_s there, or move the log to [holdout]",
-            )
-        return list(labels.contacts[name])
-    contacts = find_contacts(recording, setup.onset)
-    if not contacts:
-        raise RecordingError(
-            f"{path}: no contact found ({setup.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
-        )
-    return contacts
 
 
 def _recording_result(

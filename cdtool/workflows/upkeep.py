@@ -10,6 +10,7 @@ from typing import Any
 
 from cdtool.errors import CdtoolError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.evaluation.upkeep.advice import advice
 from cdtool.evaluation.upkeep.audit import DriftAudit
 from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
@@ -18,7 +19,8 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.plain_text import counted
-from cdtool.signature_store import SignatureFile, read_signature, update_signature, with_run
+from cdtool.signature_file import SignatureFile, with_run
+from cdtool.signature_store import read_signature, update_signature
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
@@ -92,6 +94,7 @@ def check_signature(
     *,
     operations: str | None = None,
     target: float = TARGET,
+    onset: OnsetRule | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Checked:
@@ -99,9 +102,9 @@ def check_signature(
 
     Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is the
     chance of a false alarm in an operation that they have to show. In the second, taken in the order given, drift is
-    looked for. Which log is which is told by its bytes. `operations`: how logs are cut; as for learning where None.
-    Raises SignatureError where the file does not belong or holds no signature, or logs are cut otherwise; CdtoolError
-    where nothing can be read.
+    looked for. Which log is which is told by its bytes. `operations`: how logs are cut; as for learning where None. A
+    run in which the load cell shows a contact by the `onset` rule is left out. Raises SignatureError where the file
+    does not belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
     """
     if not LEAST_TARGET <= target < 1.0:
         raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
@@ -111,7 +114,7 @@ def check_signature(
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
     cut = _cut(file, operations)
-    runs = load_runs([Path(log) for log in logs], machine_file, cut, jobs=jobs, progress=progress)
+    runs = load_runs([Path(log) for log in logs], machine_file, cut, onset=onset, jobs=jobs, progress=progress)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
     known = {(run.sha256, run.operation) for run in file.runs}
@@ -171,14 +174,16 @@ def update_with_runs(
     forget: float | None = None,
     cap: float = CAP,
     reserve: float = RESERVE,
+    onset: OnsetRule | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Updated:
     """Add impact-free runs to a signature file, by Welford or by forgetting (`forget`: effective number of runs).
 
     A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
-    was first learned. Refused are such a run, one with an alarm, one that is in the signature already, one that ends
-    early, and one that cannot be assessed. Raises SignatureError where the file does not belong.
+    was first learned. Refused are such a run, one with an alarm, one in which the load cell shows a contact by the
+    `onset` rule, one that is in the signature already, one that ends early, and one that cannot be assessed. Raises
+    SignatureError where the file does not belong.
     """
     if forget is not None and not forget > 1.0:
         raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
@@ -189,7 +194,7 @@ def update_with_runs(
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
     cut = _cut(stored, operations)
-    runs = load_runs([Path(log) for log in logs], machine_file, cut, jobs=jobs, progress=progress)
+    runs = load_runs([Path(log) for log in logs], machine_file, cut, onset=onset, jobs=jobs, progress=progress)
     added: list[str] = []
     refused = list(runs.skipped)
 

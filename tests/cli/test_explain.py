@@ -201,7 +201,7 @@ def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypa
 
 @pytest.mark.parametrize(("columns", "width"), [(40, 60), (72, 72), (200, 100)])
 def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatch, columns, width):
-    from cdtool.cli import explain as module
+    from cdtool.cli import console as module
 
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", str(columns))
@@ -209,7 +209,7 @@ def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatc
 
 
 def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
-    from cdtool.cli import explain as module
+    from cdtool.cli import console as module
 
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
     monkeypatch.setenv("COLUMNS", "70")

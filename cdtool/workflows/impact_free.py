@@ -1,0 +1,76 @@
+"""Are impact-free logs free of impacts? What the load cell, a label or an event in them says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.onset import OnsetRule, baseline, find_contacts
+from cdtool.operations import Operation
+from cdtool.plain_text import counted, digits
+from cdtool.recording import Contact, Finding, Recording
+
+# A load cell that reads in steps coarser than its noise flickers by one of them: that is no contact.
+_STEPS = 3.0
+
+
+def contacts_shown(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]:
+    """The contacts of a log that should have none, by the onset rule of every command; none without ground truth.
+
+    Where the rule takes its level from the noise and the load cell reads in steps coarser than that, the level is three
+    steps at least. A load cell that feels the machine's own motion shows contacts that are none: a level by hand helps.
+    """
+    try:
+        return tuple(find_contacts(recording, _above_the_steps(recording, rule)))
+    except RecordingError:
+        return ()
+
+
+def without_contacts(
+    operations: Sequence[Operation], contacts: Sequence[Contact]
+) -> tuple[list[Operation], list[Skipped]]:
+    """The operations that no contact lies in, and the others, left out with the reason."""
+    free: list[Operation] = []
+    left_out: list[Skipped] = []
+    for operation in operations:
+        part = operation.recording
+        inside = [contact for contact in contacts if contact.start <= part.end and contact.end >= part.start]
+        if inside:
+            left_out.append(Skipped(operation.name, _described(inside[0])))
+        else:
+            free.append(operation)
+    return free, left_out
+
+
+def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[Skipped]:
+    """One line on the logs, by name, in which nothing says whether they are free of impacts."""
+    if not notes:
+        return []
+    logs = list(dict.fromkeys(name for name, _ in notes))
+    which = logs[0] if len(logs) == 1 else f"{counted(len(logs), 'log')}, the first {logs[0]}"
+    return [Skipped(which, f"{notes[0][1]}: taken as free of impacts")]
+
+
+def _above_the_steps(recording: Recording, rule: OnsetRule) -> OnsetRule:
+    if rule.above is not None or "force" not in recording:
+        return rule
+    force = recording["force"].values[:, 0]
+    force = force[np.isfinite(force)]
+    if not len(force):
+        return rule
+    steps = np.abs(np.diff(force))
+    steps = steps[steps > 1e-6 * np.abs(force).max()]  # what rounding leaves of no step is none
+    return (
+        replace(rule, above=max(rule.sigmas * baseline(force)[1], _STEPS * float(steps.min()))) if len(steps) else rule
+    )
+
+
+def _described(contact: Contact) -> str:
+    force = f" of {digits(round(contact.peak_force))} N" if np.isfinite(contact.peak_force) else ""
+    shown = f"the {contact.found_by} shows a contact{force} at {contact.start:.3f} s"
+    hint = " (no contact? raise the onset level: --onset-above or [onset] above_n)" if force else ""
+    return f"{shown}: not an impact-free run{hint}"

@@ -1,0 +1,68 @@
+"""The true contacts of a benchmark's logs: of an impact log at least one, of the hold-out none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.onset import find_contacts
+from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.workflows.benchmark_file import BenchmarkFile
+from cdtool.workflows.impact_free import contacts_shown
+from cdtool.workflows.runs import DAMAGED, absent_truth, lost
+
+# A load cell that ends earlier than this [s] before its log has not seen all of it.
+_TAIL = 0.1
+
+
+def unwanted_contacts(recording: Recording, setup: BenchmarkFile) -> tuple[Contact, ...]:
+    """The contacts of a log of the hold-out, which should have none; a label file that names it is believed."""
+    labels = setup.labels
+    name = labels.name_of(recording.name) if labels else None
+    return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, setup.onset)
+
+
+def true_contacts(recording: Recording, setup: BenchmarkFile, path: Path) -> list[Contact]:
+    """The contacts of an impact log: those of a label file that names it, else the load cell's, a label's or events'.
+
+    Raises RecordingError where there is none, or nothing that tells.
+    """
+    labels = setup.labels
+    name = labels.name_of(recording.name) if labels else None
+    if labels and name is not None:
+        labels.check(recording.name, recording.start, recording.end)
+        if not labels.contacts[name]:
+            raise RecordingError(
+                f"{path}: no contact found ({labels.lines[name][0]} names none)",
+                "write its start_s and end_s there, or move the log to [holdout]",
+            )
+        return list(labels.contacts[name])
+    for item in absent_truth(recording):
+        if not any(channel in recording for channel in GROUND_TRUTH):
+            raise RecordingError(f"{path}: no ground truth: {item}", "an impact log needs it, or a label file")
+    contacts = find_contacts(recording, setup.onset)
+    if not contacts and (missing := _missing(recording)):
+        raise RecordingError(
+            f"{path}: no contact found ({setup.onset.described}), and {missing}", "copy the log anew, or leave it out"
+        )
+    if not contacts:
+        raise RecordingError(
+            f"{path}: no contact found ({setup.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
+        )
+    return contacts
+
+
+def _missing(recording: Recording) -> str:
+    """What a log lacks that may have held the contact; nothing where it is whole."""
+    if damage := lost(recording):
+        return f"part of the log is lost: {damage[0].reason.removeprefix(DAMAGED)}"
+    if "force" not in recording:
+        return ""
+    cell = recording["force"]
+    present = cell.time[np.isfinite(cell.values[:, 0])]
+    if len(present) and present[-1] > recording.end - _TAIL:
+        return ""
+    last = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
+    return f"the load cell {last}, the log at {recording.end:.3f} s"

@@ -1,0 +1,61 @@
+"""What every command shares in a terminal: lines that fit it, and an end by Ctrl-C that is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+from cdtool.cli import console
+from tests.command import cdtool
+
+
+@pytest.mark.parametrize("place", ["cdtool.workflows.detection.detect", "cdtool.cli.app.app"])
+def test_ctrl_c_ends_with_130_and_one_line(gate_folder, place):
+    log = gate_folder / "stiff" / "01.csv"
+    with mock.patch(place, side_effect=KeyboardInterrupt):
+        done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    assert (done.status, done.out, done.err) == (130, "", "interrupted\n")
+
+
+def test_sentences_keep_to_100_columns_in_a_pipe_and_places_have_a_unit(gate_folder, feekf_signature):
+    logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv"]
+    done = cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    sentences = done.out[done.out.index("not judged") :]
+    assert all(len(line) <= 100 or " " not in line.strip() for line in sentences.splitlines())
+    told = " ".join(sentences.split())
+    assert " m) no limit known here" in told and "e-" not in told
+
+
+def test_names_are_not_cut_where_lines_end(capsys):
+    name = "stiff-03-of-the-second-campaign/" + 90 * "x"
+    console.say(f"not judged in {name}: 12 %")
+    assert name in capsys.readouterr().out
+
+
+def test_the_figures_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_folder: Path, tmp_path: Path):
+    (tmp_path / "benchmark.toml").write_text(
+        f'machine = "{gate_folder / "machine.toml"}"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
+        f'[learn]\nlogs = ["{gate_folder}/free/0[123].csv"]\n[impacts.stiff]\nlogs = ["{gate_folder}/stiff/01.csv"]\n',
+        encoding="utf-8",
+    )
+    done = cdtool("benchmark", tmp_path / "benchmark.toml")
+    assert done.status == 0, done.err
+    assert max(map(len, done.out.splitlines())) <= 100
+    assert "followed back to half of it" in " ".join(done.out.split())
+
+
+@pytest.mark.parametrize(
+    ("head", "step"),
+    [
+        (b"\x1f\x8b\x08", "unpack it first"),
+        (b"(\xb5/\xfd", "unpack it first"),
+        (b"PK\x03\x04", "save the sheet as CSV"),
+    ],
+    ids=["gzip", "zstd", "ZIP or Excel"],
+)
+def test_a_packed_log_or_a_workbook_is_told_how_to_become_one(gate_folder, tmp_path, head, step):
+    (tmp_path / "log.csv").write_bytes(head + bytes(range(256)) * 4)
+    done = cdtool("detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    assert done.status == 2 and step in done.err

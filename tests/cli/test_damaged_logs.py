@@ -1,0 +1,88 @@
+"""A log of which a part is lost was not left out: it is used as far as it goes, and said to be damaged."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.command import cdtool
+
+
+@pytest.fixture
+def cut(gate_folder: Path, tmp_path: Path):
+    """cut(seconds): the first seconds of an impact log, its last line cut off."""
+    lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
+
+    def make(seconds: float, name: str = "cut.csv") -> Path:
+        kept = [line for line in lines[1:] if float(line.split(",")[0]) <= 1e3 * seconds]
+        text = "\n".join([lines[0], *kept])
+        (tmp_path / name).write_text(text[: text.rindex(",")], encoding="utf-8")
+        return tmp_path / name
+
+    return make
+
+
+def test_detect_says_that_a_cut_log_is_damaged_and_used(cut, gate_folder):
+    done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    assert done.status == 3 and " alarm " in done.out
+    assert "damaged: " in done.err and "cut.csv: used as far as it goes: " in done.err
+    assert "left out" not in done.err and done.err.endswith("done, but 1 log is damaged\n")
+
+
+def test_what_was_left_out_and_what_is_damaged_are_counted_apart(cut, gate_folder, tmp_path):
+    (tmp_path / "empty.csv").touch()
+    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    done = cdtool("detect", tmp_path / "empty.csv", cut(1e9), cut(1e9, "too.csv"), *machine)
+    assert done.status == 3 and done.err.endswith("done, but 1 item was left out and 2 logs are damaged\n")
+
+
+def test_an_alarm_after_the_load_cell_s_last_sample_is_told_why_it_has_no_latency(gate_folder, tmp_path):
+    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    whole = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine)
+    (row,) = [line for line in whole.out.splitlines() if " alarm " in line]
+    ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log counts ms
+    lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
+    place = lines[0].split(",").index("load_cell")
+    cells = [line.split(",") for line in lines[1:]]
+    for row_cells in cells:
+        row_cells[place] = row_cells[place] if float(row_cells[0]) <= ends else ""
+    (tmp_path / "short.csv").write_text("\n".join([lines[0], *map(",".join, cells)]) + "\n", encoding="utf-8")
+    done = cdtool("detect", tmp_path / "short.csv", *machine)
+    (row,) = [line.rstrip() for line in done.out.splitlines() if " alarm " in line]
+    last = max(1e-3 * float(item[0]) for item in cells if item[place])
+    assert row.endswith(f"-  load cell ends at {last:.3f} s")
+    setup = benchmark_of(tmp_path, gate_folder, "short.csv")
+    (line,) = [line for line in cdtool("benchmark", setup).err.splitlines() if "short.csv" in line]
+    assert f"the load cell ends at {last:.3f} s, the log at " in line and "holdout" not in line
+
+
+def test_a_false_alarm_is_told_to_belong_to_no_contact(gate_folder):
+    done = cdtool(
+        "detect", gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 20
+    )
+    rows = [line.rstrip() for line in done.out.splitlines() if " alarm " in line]
+    assert rows and all(row.endswith("-  no contact") for row in rows)
+
+
+def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cut, gate_folder, tmp_path):
+    cut(3.0)
+    done = cdtool("benchmark", benchmark_of(tmp_path, gate_folder, "cut.csv"))
+    assert done.status == 3
+    (line,) = [line for line in done.err.splitlines() if "cut.csv" in line]
+    assert line.startswith("left out: cut.csv: no contact found") and "part of the log is lost" in line
+    assert "copy the log anew" in line and "holdout" not in line
+
+
+def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:
+    """A benchmark of that log beside a whole one, on 3 impact-free logs."""
+    for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/02.csv", "machine.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copyfile(gate_folder / name, tmp_path / name)
+    (tmp_path / "benchmark.toml").write_text(
+        'machine = "machine.toml"\ndetectors = ["gm"]\n[signature]\nforce = true\n[learn]\nlogs = ["free/*.csv"]\n'
+        f'[impacts.stiff]\nlogs = ["{log}", "stiff/*.csv"]\n',
+        encoding="utf-8",
+    )
+    return tmp_path / "benchmark.toml"

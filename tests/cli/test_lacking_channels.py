@@ -1,0 +1,73 @@
+"""A detector that lacks a channel is not assessable and stops no other; where all lack one it is an error."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.command import cdtool
+
+
+@pytest.fixture
+def folder(gate_folder: Path, tmp_path: Path) -> Path:
+    """3 logs to learn from, a hold-out, an impact; the machine file maps no accelerometer."""
+    for name in ("free/01.csv", "free/02.csv", "free/03.csv", "holdout/01.csv", "stiff/01.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copyfile(gate_folder / name, tmp_path / name)
+    lines = (gate_folder / "machine.toml").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith("acceleration")]
+    (tmp_path / "machine.toml").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    return tmp_path
+
+
+def benchmark(folder: Path, detectors: str, *more: object, limits: str = ""):
+    (folder / "benchmark.toml").write_text(
+        f'machine = "machine.toml"\ndetectors = {detectors}\n[signature]\nforce = true\n'
+        f'[learn]\nlogs = ["free/*.csv"]\n'
+        f'[holdout]\nlogs = ["holdout/*.csv"]\n[impacts.stiff]\nlogs = ["stiff/*.csv"]\n{limits}',
+        encoding="utf-8",
+    )
+    return cdtool("benchmark", folder / "benchmark.toml", *more)
+
+
+def test_the_others_go_on_and_its_contacts_are_not_assessable_with_the_reason(folder):
+    done = benchmark(folder, '["gm", "pi"]', "-o", folder / "r.json", "-o", folder / "r.md", "-o", folder / "r.html")
+    assert done.status == 3
+    why = "pure_inertia needs the channel 'acceleration'"
+    assert f"left out: pure_inertia: not assessable: free/01.csv: {why}" in done.err
+    results = json.loads((folder / "r.json").read_text(encoding="utf-8"))
+    rows = {item["detector"]: item for item in results["contacts"]}
+    assert rows["momentum"]["outcome"] == "detected"
+    assert rows["pure_inertia"]["outcome"] == "not_assessable" and why in rows["pure_inertia"]["reason"]
+    watched = {
+        (item["group"], item["detector"]): (item["hours"], item["not_assessable"]) for item in results["exposure"]
+    }
+    assert watched["holdout", "pure_inertia"] == (0.0, 1) and watched["holdout", "momentum"][0] > 0.0
+    assert re.search(r"stiff +pure_inertia +- +- +- +- +0 +- +1 +- +1", done.out)
+    assert "1 not assessable" in (folder / "r.md").read_text(encoding="utf-8")
+
+
+def test_a_limit_on_it_is_not_kept(folder):
+    limit = '[limits]\n"pi.stiff.missed" = { max = 0 }\n"gm.stiff.missed" = { max = 0 }\n'
+    done = benchmark(folder, '["gm", "pi"]', limits=limit)
+    assert (
+        done.status == 1 and "limit not assessable: pure_inertia.stiff.missed" in done.out and "1 of 2 kept" in done.out
+    )
+
+
+def test_where_all_lack_one_the_error_says_which_to_take_out(folder):
+    done = benchmark(folder, '["pi", "igm"]')
+    assert done.status == 2 and done.err.count("\n") == 1
+    assert "needs the channel 'acceleration'" in done.err
+    assert "take pure_inertia, inertial_momentum out of `detectors`" in done.err
+
+
+def test_where_no_log_could_be_read_the_detectors_are_not_to_blame(folder):
+    for path in (folder / "free").iterdir():
+        path.write_text("", encoding="utf-8")
+    done = benchmark(folder, '["gm", "pi"]')
+    assert done.status == 2 and "is empty" in done.err and "take" not in done.err

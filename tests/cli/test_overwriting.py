@@ -1,0 +1,124 @@
+"""What `-o` may replace: a file of the kind that the command writes, told by what it holds; nothing else, ever."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.command import cdtool
+
+TEXT = "x"
+
+
+@pytest.fixture
+def folder(gate_folder: Path, tmp_path: Path) -> Path:
+    """A folder of its own: 3 logs to learn from, an impact, the machine file, a benchmark file."""
+    for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/01.csv", "machine.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copyfile(gate_folder / name, tmp_path / name)
+    (tmp_path / "benchmark.toml").write_text(
+        'machine = "machine.toml"\ndetectors = ["gm"]\n[signature]\nforce = true\n[learn]\nlogs = ["free/*.csv"]\n'
+        '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n',
+        encoding="utf-8",
+    )
+    return tmp_path
+
+
+def learn(folder: Path, output: Path):
+    logs = sorted((folder / "free").glob("*.csv"))
+    return cdtool("learn-signature", *logs, "-m", folder / "machine.toml", "-d", "gm", "--force", "-o", output)
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.mark.parametrize("name", ["free/01.csv", "machine.toml", "benchmark.toml", "free/../machine.toml", "new.csv"])
+def test_a_signature_goes_into_a_name_in_json_only(folder, name):
+    before = bytes_of(folder)
+    done = learn(folder, folder / name)
+    assert done.status == 2 and "let it end in .json" in done.err
+    assert bytes_of(folder) == before
+
+
+@pytest.mark.parametrize("way", ["symlink_to", "hardlink_to"])
+def test_a_link_in_json_to_a_recording_is_no_way_round(folder, way):
+    link = folder / "link.json"
+    getattr(link, way)(folder / "free" / "01.csv")
+    before = bytes_of(folder)
+    done = learn(folder, link)
+    assert done.status == 2 and "link.json: is there already and holds no signature" in done.err
+    assert bytes_of(folder) == before
+
+
+def test_a_signature_replaces_a_signature(folder):
+    output = folder / "gate.json"
+    assert learn(folder, output).status == 0
+    output.write_text(output.read_text(encoding="utf-8").replace("whole", "motion"), encoding="utf-8")
+    assert learn(folder, output).status == 0
+    assert '"operations": "whole"' in output.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("stiff/01.csv", "table of cdtool"),
+        ("notes.csv", "table of cdtool"),
+        ("settings.json", "results of cdtool benchmark"),
+        ("README.md", "Markdown report"),
+        ("page.html", "HTML report"),
+        ("build.xml", "JUnit report"),
+    ],
+)
+def test_a_report_never_replaces_what_is_no_report(folder, name, kind):
+    path = folder / name
+    if not path.exists():
+        path.write_text(TEXT, encoding="utf-8")
+    before = bytes_of(folder)
+    done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "fine.json", "-o", path)
+    assert done.status == 2 and f"holds no {kind}" in done.err and done.err.count("\n") == 1
+    assert bytes_of(folder) == before
+
+
+def test_a_folder_that_holds_a_recording_under_a_report_s_name_is_refused(folder):
+    shutil.copyfile(folder / "free" / "01.csv", folder / "stiff" / "contacts.csv")
+    before = bytes_of(folder)
+    done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "stiff")
+    assert done.status == 2 and "contacts.csv: is there already" in done.err
+    assert bytes_of(folder) == before
+
+
+def test_reports_are_written_anew_as_often_as_one_likes(folder):
+    targets = [
+        word
+        for name in ("r.json", "r.html", "r.md", "r.xml", "r.csv", "r.svg", "all")
+        for word in ("-o", folder / name)
+    ]
+    (folder / "r.csv").touch()  # an empty file holds nothing that could be lost
+    first = cdtool("benchmark", folder / "benchmark.toml", *targets)
+    assert first.status == 0, first.err
+    written = bytes_of(folder)
+    again = cdtool("benchmark", folder / "benchmark.toml", *targets)
+    assert again.status == 0, again.err
+    assert bytes_of(folder) == written
+    made_again = cdtool("report", folder / "all" / "results.json", "-o", folder / "all", "-o", folder / "r.json")
+    assert made_again.status == 0, made_again.err
+
+
+def test_a_comparison_never_replaces_the_results_that_it_compares(folder):
+    for name in ("old.json", "new.json"):
+        assert cdtool("benchmark", folder / "benchmark.toml", "-o", folder / name).status == 0
+    (folder / "link.json").symlink_to(folder / "new.json")
+    shutil.copyfile(folder / "new.json", folder / "third.json")
+    before = bytes_of(folder)
+    for name, why in (("old.json", "read by this"), ("link.json", "read by this"), ("third.json", "no comparison")):
+        done = cdtool("compare", folder / "old.json", folder / "new.json", "-o", folder / name)
+        assert done.status == 2 and why in done.err
+    assert bytes_of(folder) == before
+    for _ in range(2):
+        done = cdtool(
+            "compare", folder / "old.json", folder / "new.json", "-o", folder / "c.json", "-o", folder / "c.md"
+        )
+        assert done.status == 0, done.err
