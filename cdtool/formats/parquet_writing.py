@@ -17,8 +17,8 @@ from cdtool.formats.parquet import OWN_CLOCKS
 from cdtool.formats.source import Column
 from cdtool.recording import FloatArray
 
-# What is written at once: so many numbers, 32 MiB of them, but no fewer rows.
-_VALUES, _FEWEST_ROWS = 2**22, 2**14
+# What is written at once: so many numbers, 8 MiB of them, but no fewer rows.
+_VALUES, _FEWEST_ROWS = 2**20, 2**14
 
 
 def write_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:

@@ -45,13 +45,14 @@ class Course:
             statistic.status[:, joint],
         )
 
-    def at(self, kept: np.ndarray) -> Course:
-        """The samples at these indices or of this mask."""
+    def at(self, kept: np.ndarray | slice) -> Course:
+        """The samples at these indices, of this mask or this slice (which copies nothing)."""
         return Course(self.time[kept], self.value[kept], self.lower[kept], self.upper[kept], self.status[kept])
 
     def within(self, span: Span) -> Course:
         """The samples from span[0] to span[1] [s]."""
-        return self.at((self.time >= span[0]) & (self.time <= span[1]))
+        first, last = np.searchsorted(self.time, span[0]), np.searchsorted(self.time, span[1], side="right")
+        return self.at(slice(int(first), int(last)))
 
     def decimated(self, view: Span | None) -> Course:
         """What draws alike: of the whole coarsely, of the view finely."""

@@ -69,22 +69,21 @@ def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: L
 
 def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: float) -> None:
     """Set the vertical range: all limits and judged values within `span`, excursions up to `headroom` bands beyond."""
-    values, normal, limits = [], [], []
+    inside: list[float] = []
+    bounds: list[float] = []
     for course in courses:
         part = course.within(span)
         judged = part.value[part.status == 0]
-        values.append(judged if len(judged) else part.value)
+        inside += _ends(judged if len(judged) else part.value)
         if not len(judged):
-            normal.append(part.value)
-        normal.append(part.value[(part.value >= part.lower) & (part.value <= part.upper) & (part.status == 0)])
-        limits += [part.lower, part.upper]
-    inside, bounds = _finite(values), _finite([*normal, *limits])
-    if not len(inside) and not len(bounds):
+            bounds += _ends(part.value)
+        bounds += _ends(part.value[(part.value >= part.lower) & (part.value <= part.upper) & (part.status == 0)])
+        bounds += _ends(part.lower) + _ends(part.upper)
+    if not inside and not bounds:
         return
-    everything = np.concatenate((inside, bounds))
-    low, high = float(everything.min()), float(everything.max())
-    if len(bounds):
-        near, far = float(bounds.min()), float(bounds.max())
+    low, high = min(inside + bounds), max(inside + bounds)
+    if bounds:
+        near, far = min(bounds), max(bounds)
         room = headroom * max(far - near, 1e-12)
         low, high = max(low, near - room), min(high, far + room)
     margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
@@ -187,6 +186,7 @@ def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span,
         legend.add(reason)
 
 
-def _finite(parts: Sequence[FloatArray]) -> FloatArray:
-    joined = np.concatenate(parts) if parts else np.empty(0)
-    return joined[np.isfinite(joined)]
+def _ends(values: FloatArray) -> list[float]:
+    """The least and the greatest finite value; empty where there is none."""
+    finite = values[np.isfinite(values)]
+    return [float(finite.min()), float(finite.max())] if len(finite) else []
