@@ -31,12 +31,12 @@ _BARE = "from bare_app import app\n\napp()\n"
 _COMPILE_ALL = """
 import importlib, pkgutil
 from time import perf_counter
-import cdtool, cdtool.kernels
+import cdtool, cdtool.kernel_warm_up
 for item in pkgutil.walk_packages(cdtool.__path__, "cdtool."):
     importlib.import_module(item.name)
 import numba
 begin = perf_counter()
-count = cdtool.kernels.compile_loaded()
+count = cdtool.kernel_warm_up.compile_loaded()
 print(count, perf_counter() - begin)
 """
 

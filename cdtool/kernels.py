@@ -6,10 +6,12 @@ installation and a read-only home), the kernel is compiled anew in each process,
 
 from __future__ import annotations
 
+import gc
 import threading
 import types
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +26,19 @@ _told = False
 class Kernel:
     """A function that numba compiles when it is first called; `signature` fixes its one specialisation.
 
-    A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one.
+    A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. What
+    kernels call is compiled for them without an entry from Python, which alone takes as long as a small kernel; called
+    from Python all the same it is compiled once more, unless `entry` says from the start that it has one.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: str) -> None:
+    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False) -> None:
         self.function = function
         self.signature = signature
+        self.entry = entry
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
+        self._linked: Callable[..., Any] | None = None
         _all.append(self)
 
     @property
@@ -41,69 +47,117 @@ class Kernel:
         if self._compiled is None:
             with _lock:
                 if self._compiled is None:
-                    self._compiled = _compile(self.function, self.signature)
+                    self._compiled = _compile(named(self), self.signature, {})
         return self._compiled
+
+    @property
+    def linked(self) -> Callable[..., Any]:
+        """What other kernels call: as `compiled`, only kernels can call it."""
+        if self.entry or self.is_instruction:
+            return self.compiled
+        with _lock:
+            if self._linked is None:
+                self._linked = _compile(named(self, "_linked"), self.signature, {"no_cpython_wrapper": True})
+        return self._linked
+
+    @property
+    def is_instruction(self) -> bool:
+        """Whether it stands for an instruction of the processor: it has no signature, and nothing of it is compiled."""
+        return not self.signature
+
+    @property
+    def called(self) -> dict[str, Kernel]:
+        """The kernels that it calls, by their names in its module."""
+        names = self.function.__globals__
+        return {name: names[name] for name in self.function.__code__.co_names if isinstance(names.get(name), Kernel)}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
         return (self._compiled or self.compiled)(*arguments)
 
 
-def kernel(signature: str) -> Callable[[Callable[..., Any]], Kernel]:
-    """Mark a function as a kernel with the given numba signature."""
-    return lambda function: Kernel(function, signature)
+def kernel(signature: str, *, entry: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
+    """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it."""
+    return lambda function: Kernel(function, signature, entry)
 
 
-def compile_loaded() -> int:
-    """Compile every kernel of the modules imported so far (before workers start); returns how many there are."""
-    for item in _all:
-        _ = item.compiled
-    return len(_all)
+def entries() -> list[Kernel]:
+    """The kernels of the modules imported so far that Python calls: all but those that only kernels call."""
+    inner = {item for caller in _all for item in caller.called.values() if not item.entry}
+    return [item for item in _all if item not in inner]
 
 
-def _linked(function: Callable[..., Any]) -> Callable[..., Any]:
-    called = _called(function)
-    if not called:
-        return function
-    names = function.__globals__ | {name: item.compiled for name, item in called.items()}
-    linked = types.FunctionType(function.__code__, names, function.__name__)
-    linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__ + _stamp(function)
-    return linked
+def loaded() -> list[Kernel]:
+    """All kernels of the modules imported so far."""
+    return list(_all)
 
 
-def _called(function: Callable[..., Any]) -> dict[str, Kernel]:
-    names = function.__globals__
-    return {name: names[name] for name in function.__code__.co_names if isinstance(names.get(name), Kernel)}
+class _Names(dict[str, Any]):
+    """The names that a kernel knows; those of kernels stand for compiled functions.
+
+    They are compiled when the compiler asks for them: never where the caller is in the cache, with all that it calls.
+    """
+
+    def __init__(self, names: dict[str, Any], called: dict[str, Kernel]) -> None:
+        super().__init__((name, value) for name, value in names.items() if name not in called)
+        # An instruction has to be there when its caller begins to be compiled.
+        self.update((name, item.compiled) for name, item in called.items() if item.is_instruction)
+        self._called = called
+
+    def __missing__(self, name: str) -> Callable[..., Any]:
+        return self._called[name].linked
 
 
-def _files(function: Callable[..., Any]) -> set[str]:
-    return {function.__code__.co_filename}.union(*(_files(item.function) for item in _called(function).values()))
+def named(item: Kernel, suffix: str = "") -> Callable[..., Any]:
+    """The function that numba compiles: it knows the compiled kernels, and bears the name of its cache file."""
+    function, called = item.function, item.called
+    made = types.FunctionType(function.__code__, _Names(function.__globals__, called), function.__name__)
+    made.__module__, made.__qualname__ = function.__module__, function.__qualname__ + suffix + _stamp(item)
+    return made
 
 
-def _stamp(function: Callable[..., Any]) -> str:
+def _files(item: Kernel) -> set[str]:
+    return {item.function.__code__.co_filename}.union(*map(_files, item.called.values()))
+
+
+def _stamp(item: Kernel) -> str:
     import hashlib
 
     # numba compiles a cached function anew when its own file has changed; the files of what it calls go into its name.
-    others = sorted(_files(function) - {function.__code__.co_filename})
+    others = sorted(_files(item) - {item.function.__code__.co_filename})
     if not others:
         return ""
     return "_" + hashlib.sha256(b"".join(Path(file).read_bytes() for file in others)).hexdigest()[:12]
 
 
-def _compile(function: Callable[..., Any], signature: str) -> Callable[..., Any]:
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Without garbage collection: looking again and again at all that the compiler made takes an eighth of its time."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def _compile(function: Callable[..., Any], signature: str, options: dict[str, Any]) -> Callable[..., Any]:
     from numba import njit
 
     global _told
-    function = _linked(function)
-    try:
-        return njit(signature, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
-    except (RuntimeError, OSError) as fault:
-        if not _told:
-            _told = True
-            warnings.warn(
-                f"no folder for compiled kernels can be written ({fault}); compiling in every process instead. "
-                "Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
-                RuntimeWarning,
-                stacklevel=4,
-            )
-        return njit(signature, nogil=True, error_model="numpy", fastmath={"contract"})(function)
+    options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, **options}
+    with _no_collection():
+        try:
+            return njit(signature, cache=True, **options)(function)
+        except (RuntimeError, OSError) as fault:
+            if not _told:
+                _told = True
+                warnings.warn(
+                    f"no folder for compiled kernels can be written ({fault}); compiling in every process instead. "
+                    "Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
+                    RuntimeWarning,
+                    stacklevel=4,
+                )
+            return njit(signature, **options)(function)

@@ -7,11 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from cdtool import kernels
-from cdtool.kernels import kernel
+import cdtool.activation
+import cdtool.machines.tree_inverse_kernel
+import cdtool.machines.tree_kernel
+import cdtool.thresholds.first_order
+from cdtool import kernel_warm_up, kernels
+from cdtool.kernel_warm_up import compile_loaded, shares
+from cdtool.kernels import Kernel, kernel
 
 
 @kernel("float64(float64)")
@@ -72,7 +76,79 @@ def test_importing_modules_with_kernels_does_not_load_numba():
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0
 
 
+def test_what_kernels_call_can_be_called_from_python_too():
+    assert (_twice_and_one(3.0), _double(3.0)) == (7.0, 6.0)
+
+
 def test_compiling_all_loaded_kernels_leaves_none_to_compile_later():
-    assert kernels.compile_loaded() >= 2
-    assert all(item._compiled is not None for item in kernels._all)
-    assert np.isfinite(_double(1.0))
+    assert compile_loaded() == len(kernels.loaded()) >= 2
+    assert _twice_and_one in kernels.entries()
+    assert _double not in kernels.entries()
+    assert all(item._compiled is not None for item in kernels.entries())
+
+
+def _ours() -> list[Kernel]:
+    modules = ("cdtool.activation", "cdtool.machines.tree_kernel", "cdtool.machines.tree_inverse_kernel")
+    return [
+        item for item in kernels.entries() if item.function.__module__ in (*modules, "cdtool.thresholds.first_order")
+    ]
+
+
+def _callees(items: list[Kernel]) -> set[Kernel]:
+    return {part for item in items for part in kernel_warm_up._parts(item) - {item}}
+
+
+def test_no_kernel_is_compiled_by_two_processes(monkeypatch):
+    monkeypatch.setattr(kernel_warm_up, "_WORTH_A_PROCESS", 500)
+    made = shares(_ours(), 3)
+    assert len(made) == 3
+    assert sorted(id(item) for share in made for item in share) == sorted(map(id, _ours()))
+    assert sum(len(_callees(share)) for share in made) == len(_callees(_ours())) > 10
+
+
+def test_kernels_of_plug_ins_stay_with_the_process_that_has_them(monkeypatch):
+    monkeypatch.setattr(kernel_warm_up, "_WORTH_A_PROCESS", 500)
+    own, *others = shares([*_ours(), _twice_and_one], 3)
+    assert others
+    assert _twice_and_one in own
+
+
+def test_one_core_and_little_to_compile_make_one_share():
+    assert len(shares(_ours(), 1)) == 1
+    assert len(shares([cdtool.thresholds.first_order._recursion], 8)) == 1
+
+
+_WARM_UP = """
+import sys
+import cdtool.activation, cdtool.thresholds.first_order
+from cdtool import kernel_warm_up
+kernel_warm_up.usable_cores, kernel_warm_up._WORTH_A_PROCESS, kernel_warm_up._START = lambda: 2, 100, 0
+{change}
+missing = kernel_warm_up._not_cached(kernel_warm_up.entries())
+own, others = kernel_warm_up.shares(missing, 2)
+print(len(own), len(others), kernel_warm_up.compile_loaded())
+print(*(len(item.compiled.stats.cache_hits) for item in own + others))
+kernel_warm_up.subprocess.Popen = None  # all is in the cache: no process is started
+print(kernel_warm_up.compile_loaded() - len(kernel_warm_up.loaded()), len(kernel_warm_up._not_cached(own + others)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "taken"),
+    [
+        ("", 1),
+        ("kernel_warm_up._CHILD = 'print(1); raise SystemExit(1)'", 0),
+        ("sys.executable = 'no such program'", 0),
+    ],
+    ids=["another process", "one that dies", "none that starts"],
+)
+def test_what_another_process_compiled_is_taken_from_the_cache_and_the_rest_compiled_here(change, taken, tmp_path):
+    run = [sys.executable, "-c", _WARM_UP.format(change=change)]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    project = Path(__file__).parents[1]
+    done = subprocess.run(run, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines() == ["1 1 2", f"0 {taken}", "0 0"], done.stderr
+
+
+def test_where_no_cache_can_be_written_no_process_is_started(no_cache_folder):
+    assert kernel_warm_up._not_cached(_ours()) == []

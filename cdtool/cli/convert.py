@@ -9,12 +9,13 @@ from typing import Annotated
 import typer
 
 from cdtool.cli.console import plain, print_json
+from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
 from cdtool.errors import ExitStatus
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="The recording to read.", metavar="IN")],
+    source: Annotated[Path, typer.Argument(help="The recording to read, or its folder of parts.", metavar="IN")],
     output: Annotated[
         Path,
         typer.Argument(help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.", metavar="OUT"),
@@ -32,7 +33,8 @@ def convert(
     """
     from cdtool.workflows.converting import convert as write
 
-    done = write(source, output, machine=machine, force=force)
+    with late_progress("converting") as advance:
+        done = write(source, output, machine=machine, force=force, progress=advance)
     if as_json:
         print_json(asdict(done))
     else:

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from cdtool.cli.console import plain, print_json
+from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
 from cdtool.errors import ExitStatus
 
@@ -26,7 +27,8 @@ def init(
     """
     from cdtool.workflows.drafting import init as draft
 
-    drafted = draft(log, output, force=force)
+    with late_progress("looking at the log"):
+        drafted = draft(log, output, force=force)
     if as_json:
         print_json(asdict(drafted))
     else:

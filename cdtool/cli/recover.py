@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cdtool.cli.console import plain
+from cdtool.cli.late_progress import late_progress
 from cdtool.errors import ExitStatus
 
 
@@ -27,7 +28,8 @@ def recover(
     """
     from cdtool.workflows.recovering import recover as write_what_is_left
 
-    done = write_what_is_left(log, output, unverified, force=force)
+    with late_progress("recovering") as advance:
+        done = write_what_is_left(log, output, unverified, force=force, progress=advance)
     for finding in done.findings:
         typer.echo(f"{finding.severity}: {plain(finding)}")
     typer.echo(f"written: {plain(done.output)}: {done.messages} messages")

@@ -6,6 +6,8 @@ stamps strictly increase, coarse.py those of a clock that is coarser than the sa
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cdtool.clock.coarse import recent_medians
@@ -86,13 +88,13 @@ def _differentiate(time: FloatArray, position: FloatArray, cutoff: float, out: F
     second_stage = 0.0
     started = False
     for k in range(len(time)):
-        if not np.isfinite(position[k]):
+        if not math.isfinite(position[k]):
             continue
         if last >= 0:
             step = time[k] - time[last]
             rate = (position[k] - position[last]) / step
             if started:
-                weight = 1.0 - np.exp(-cutoff * step)
+                weight = 1.0 - math.exp(-cutoff * step)
                 first_stage += weight * (rate - first_stage)
                 second_stage += weight * (first_stage - second_stage)
             else:

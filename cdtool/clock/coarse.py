@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cdtool.kernels import READ_ONLY, kernel
@@ -54,7 +56,7 @@ def recent_medians(steps: FloatArray, before: float) -> FloatArray:
 @kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY})")
 def _first_period(stamps: FloatArray, counts: FloatArray, step: FloatArray) -> float:
     """The sample period of the first stamps: the log may begin within one, which then has too few samples."""
-    period = np.inf
+    period = math.inf
     for i in range(min(2, len(stamps) - 1)):
         if stamps[i + 1] - stamps[i] <= _PAUSE * step[0]:
             period = min(period, (stamps[i + 1] - stamps[i]) / counts[i])
@@ -81,7 +83,7 @@ def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, time: Floa
     period = _first_period(stamps, counts, step)
     value = _anchor(stamps, counts, step, 0, period)
     a, b, c = 1.0, 0.0, 12.0 / (step[0] / period) ** 2
-    last = -np.inf
+    last = -math.inf
     k = 0
     for i in range(len(stamps)):
         if i > 0:

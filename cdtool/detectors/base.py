@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
@@ -222,7 +223,7 @@ def _observe(
                 tail = 1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))
                 weight = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * tail)))
             else:
-                weight = 1.0 - np.exp(-x)
+                weight = 1.0 - math.exp(-x)
             value += weight * ((impulse - (momentum[k] - last_momentum)) / elapsed - value)
         last_momentum = momentum[k]
         impulse = 0.0

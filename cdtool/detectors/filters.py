@@ -64,8 +64,9 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     for any sampling. NaN where fewer than 5 samples are known or a sample is missing.
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
+    equations = np.empty((4, 5))
     for j in range(values.shape[1]):
-        _polynomial_rates(time, np.ascontiguousarray(values[:, j]), samples, first[:, j], second[:, j])
+        _polynomial_rates(time, np.ascontiguousarray(values[:, j]), samples, equations, first[:, j], second[:, j])
     return first, second
 
 
@@ -80,20 +81,20 @@ def _low_pass(
     rate: FloatArray,
 ) -> None:
     """x1' = x2, x2' = w^2 (u - x1) - sqrt(2) w x2, trapezoid; w prewarped: (2 / T) tan(w T / 2)."""
-    root = np.sqrt(2.0)
+    root = math.sqrt(2.0)
     y = 0.0
     slope = 0.0
     last = -1
     for k in range(len(time)):
         if not missing[k]:
-            step = time[k] - time[last] if last >= 0 else np.inf
+            step = time[k] - time[last] if last >= 0 else math.inf
             if step > longest_gap:
                 y = values[k]
                 slope = 0.0
             else:
                 half = 0.5 * step
                 # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
-                w = np.tan(min(cutoff * half, 1.4)) / half
+                w = math.tan(min(cutoff * half, 1.4)) / half
                 square = w * w
                 drive = half * square * (values[k] + values[last])
                 right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
@@ -105,24 +106,33 @@ def _low_pass(
         rate[k] = slope
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, float64[:], float64[:])")
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, float64[:, ::1], float64[:], float64[:])")
 def _polynomial_rates(
-    time: FloatArray, values: FloatArray, samples: int, first: FloatArray, second: FloatArray
+    time: FloatArray, values: FloatArray, samples: int, matrix: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
-    """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting."""
+    """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.
+
+    `matrix` (4, 5) is overwritten.
+    """
     for k in range(len(time)):
-        start = max(0, k - samples + 1)
+        start = k - samples + 1 if k >= samples else 0
         span = time[k] - time[start]
         if k - start < 4 or not span > 0.0:
             continue
-        matrix = np.zeros((4, 5))
+        for row in range(4):
+            for column in range(5):
+                matrix[row, column] = 0.0
         for i in range(start, k + 1):
             x = (time[i] - time[k]) / span
-            powers = (1.0, x, x * x, x * x * x)
+            change = values[i] - values[k]
+            of_row = 1.0
             for row in range(4):
+                of_column = 1.0
                 for column in range(4):
-                    matrix[row, column] += powers[row] * powers[column]
-                matrix[row, 4] += powers[row] * (values[i] - values[k])
+                    matrix[row, column] += of_row * of_column
+                    of_column *= x
+                matrix[row, 4] += of_row * change
+                of_row *= x
         for pivot in range(4):
             for row in range(pivot + 1, 4):
                 factor = matrix[row, pivot] / matrix[pivot, pivot]

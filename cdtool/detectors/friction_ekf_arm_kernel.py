@@ -10,7 +10,7 @@ p14, p22, p23, p24, p33, p34, p44); each of the three measurements (a, v, q) is 
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from cdtool.detection import StatusArray
 from cdtool.detectors.friction_ekf_kernel import progress_of_settling
@@ -134,20 +134,20 @@ def run_arm_filter(
     p: Covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     d, a, v, q = viscous, 0.0, 0.0, 0.0
     now = last_speed_time = 0.0
-    last_acceleration_time = last_applicable = -np.inf
+    last_acceleration_time = last_applicable = -math.inf
     applicable = False
     settled = 0.0
     forward = True
     against = 0
     held = 0
-    bandwidth_scale = np.sqrt(q_d / (r_a + q_a)) / inertia
+    bandwidth_scale = math.sqrt(q_d / (r_a + q_a)) / inertia
     for k in range(len(time)):
-        seen = np.isfinite(speed[k]) and np.isfinite(position[k])
+        seen = math.isfinite(speed[k]) and math.isfinite(position[k])
         if started and time[k] - last_speed_time > 1.0:
             started = False  # a long gap: nothing of the old state is worth keeping
         if not started:
             while next_sample < samples and acceleration_time[next_sample] <= time[k]:
-                if np.isfinite(acceleration[next_sample]):
+                if math.isfinite(acceleration[next_sample]):
                     a = acceleration[next_sample]
                     last_acceleration_time = acceleration_time[next_sample]
                 next_sample += 1
@@ -159,7 +159,7 @@ def run_arm_filter(
             d, v, q = viscous, speed[k], position[k]
             p = (initial_variance, 0.0, 0.0, 0.0, r_a, 0.0, 0.0, r_v, 0.0, r_q)
             settled = 0.0
-            last_applicable = -np.inf
+            last_applicable = -math.inf
             forward = v > 0.0
             against = 0
             applicable = abs(v) >= minimum_speed
@@ -174,10 +174,10 @@ def run_arm_filter(
             until = acceleration_time[next_sample] if own_sample else time[k]
             step = until - now
             if step > 0.0:
-                sine, cosine = np.sin(q - other_position[held]), np.cos(q - other_position[held])
-                across, along = other_acceleration[held], other_speed[held] ** 2
-                known = force[held] - gravity * np.cos(q) - coupling * (cosine * across + sine * along)
-                by_angle = gravity * np.sin(q) - coupling * (cosine * along - sine * across)
+                sine, cosine = math.sin(q - other_position[held]), math.cos(q - other_position[held])
+                across, along = other_acceleration[held], other_speed[held] * other_speed[held]
+                known = force[held] - gravity * math.cos(q) - coupling * (cosine * across + sine * along)
+                by_angle = gravity * math.sin(q) - coupling * (cosine * along - sine * across)
                 drift = q_d * step if applicable else 0.0
                 p = predict_covariance(p, -v / inertia, -d / inertia, by_angle / inertia, step, drift, q_a, q_v, q_q)
                 d, a, v, q = d, (known - d * v) / inertia, v + step * a, q + step * v
@@ -185,7 +185,7 @@ def run_arm_filter(
             if not own_sample:
                 break
             sample = acceleration[next_sample]
-            if np.isfinite(sample) and step >= 0.0:
+            if math.isfinite(sample) and step >= 0.0:
                 column = (p[1], p[4], p[5], p[6])
                 (d, a, v, q), p = correct((d, a, v, q), p, column, p[4] + r_a, sample - a, applicable)
                 last_acceleration_time = until
@@ -196,7 +196,7 @@ def run_arm_filter(
             (d, a, v, q), p = correct((d, a, v, q), p, column, p[7] + r_v, speed[k] - v, applicable)
             column = (p[3], p[6], p[8], p[9])
             (d, a, v, q), p = correct((d, a, v, q), p, column, p[9] + r_q, position[k] - q, applicable)
-            gained = bandwidth_scale * abs(speed[k]) * np.sqrt(time[k] - last_speed_time)
+            gained = bandwidth_scale * abs(speed[k]) * math.sqrt(time[k] - last_speed_time)
             settled, against, forward, last_applicable = progress_of_settling(
                 applicable, speed[k] > 0.0, time[k], gained, glitch, settled, against, forward, last_applicable
             )

@@ -8,7 +8,7 @@ forced to zero where the friction cannot be observed.
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from cdtool.detection import StatusArray
 from cdtool.kernels import kernel
@@ -143,24 +143,24 @@ def run_filter(
     v = 0.0
     now = 0.0
     last_speed_time = 0.0
-    last_acceleration_time = -np.inf
+    last_acceleration_time = -math.inf
     held_force = 0.0
     applicable = False
     settled = 0.0
-    last_applicable = -np.inf
+    last_applicable = -math.inf
     forward = True
     against = 0
     # A constant inertia is looked up once; of one that changes with the pose the last one holds, like the force.
     varies = len(inertia) > 1
     inverse_inertia = 1.0 / inertia[0] if len(inertia) else 0.0
-    bandwidth_scale = np.sqrt(q_d / (r_a + q_a))
+    bandwidth_scale = math.sqrt(q_d / (r_a + q_a))
     for k in range(len(time)):
-        seen = np.isfinite(speed[k])
+        seen = math.isfinite(speed[k])
         if started and time[k] - last_speed_time > 1.0:
             started = False  # a long gap: nothing of the old state is worth keeping
         if not started:
             while next_sample < samples and acceleration_time[next_sample] <= time[k]:
-                if np.isfinite(acceleration[next_sample]):
+                if math.isfinite(acceleration[next_sample]):
                     a = acceleration[next_sample]
                     last_acceleration_time = acceleration_time[next_sample]
                 next_sample += 1
@@ -173,7 +173,7 @@ def run_filter(
             v = speed[k]
             p = (initial_variance, 0.0, 0.0, r_a, 0.0, r_v)
             settled = 0.0
-            last_applicable = -np.inf
+            last_applicable = -math.inf
             forward = v > 0.0
             against = 0
             applicable = abs(v) >= minimum_speed
@@ -200,7 +200,7 @@ def run_filter(
             if not own_sample:
                 break
             sample = acceleration[next_sample]
-            if np.isfinite(sample) and step >= 0.0:
+            if math.isfinite(sample) and step >= 0.0:
                 spread = 1.0 / (p[3] + r_a)
                 k1 = p[1] * spread if applicable else 0.0
                 k2 = p[3] * spread
@@ -223,7 +223,7 @@ def run_filter(
             a += k2 * surprise
             v += k3 * surprise
             p = update_third(p, k1, k2, k3, r_v)
-            gained = bandwidth_scale * inverse_inertia * abs(speed[k]) * np.sqrt(time[k] - last_speed_time)
+            gained = bandwidth_scale * inverse_inertia * abs(speed[k]) * math.sqrt(time[k] - last_speed_time)
             settled, against, forward, last_applicable = progress_of_settling(
                 applicable, speed[k] > 0.0, time[k], gained, glitch, settled, against, forward, last_applicable
             )

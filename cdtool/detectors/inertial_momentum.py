@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -123,7 +124,7 @@ def _fuse(
     begin = 0.0
     total = 0.0
     count = 0
-    trusted = np.inf
+    trusted = math.inf
     last = 0
     for k in range(len(time)):
         fused[k] = w

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -152,8 +153,8 @@ def _filter(
             pc = (1.0 - k_p) * (pc - k_c * pp) + momentum_noise * k_p * k_c
             pp = (1.0 - k_p) * (1.0 - k_p) * pp + momentum_noise * k_p * k_p
             span = time[k] - last
-            fast = np.sqrt(np.sqrt(drift / (momentum_noise * span)))
-            settled += min(fast, np.sqrt(drift / (torque_noise * span))) * span
+            fast = math.sqrt(math.sqrt(drift / (momentum_noise * span)))
+            settled += min(fast, math.sqrt(drift / (torque_noise * span))) * span
         last = time[k]
         estimate[k] = contact
         if missing[k]:

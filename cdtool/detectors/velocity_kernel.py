@@ -1,6 +1,8 @@
-"""The velocity observer's compiled recursion for coupled joints."""
+"""The velocity observer's recursion for coupled joints: the modes of every step at once, then a compiled loop."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -9,12 +11,14 @@ from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 _BOOLS = "Array(b1, 1, 'C', readonly=True)"
+_TABLE = "Array(float64, 2, 'C', readonly=True)"
+_MATRICES = "Array(float64, 3, 'C', readonly=True)"
+# Steps whose modes are sought at once: as many matrices stay in the processor's cache.
+_BLOCK = 1024
+# Rows of the work space: residual, impulse, what the residual tends to, the same by modes.
+_VALUE, _IMPULSE, _TARGET, _MODE, _WORK = range(5)
 
 
-@kernel(
-    f"void({READ_ONLY}, float64[:, ::1], Array(float64, 2, 'C', readonly=True), Array(float64, 3, 'C', readonly=True), "
-    f"{_BOOLS}, {_BOOLS}, {READ_ONLY}, float64[:, ::1], uint8[:, ::1])"
-)
 def observe_velocity(
     time: FloatArray,
     balance: FloatArray,
@@ -30,18 +34,39 @@ def observe_velocity(
 
     K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
     A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
-    of the slowest mode without a sample it starts anew.
+    of the slowest mode without a sample it starts anew. Fills `residual` and `status` (n, J).
     """
-    joints = balance.shape[1]
-    root = np.zeros(joints)
-    for j in range(joints):
-        root[j] = np.sqrt(gains[j])
-    value = np.zeros(joints)
-    impulse = np.zeros(joints)
-    target = np.zeros(joints)
-    modes = np.zeros(joints)
-    mean_inertia = np.zeros((joints, joints))
-    scaled = np.zeros((joints, joints))
+    root = np.sqrt(gains)
+    known = np.flatnonzero(~motion_missing)
+    periods, vectors = np.empty(balance.shape), np.empty(inertia.shape)
+    for begin in range(1, len(known), _BLOCK):
+        ends, starts = known[begin : begin + _BLOCK], known[begin - 1 : begin - 1 + _BLOCK][: len(known) - begin]
+        mean = 0.5 * (inertia[ends] + inertia[starts])
+        periods[ends], vectors[ends] = np.linalg.eigh(mean / (root[:, np.newaxis] * root))
+    work = np.zeros((_WORK, len(root)))
+    _observe(time, balance, speed, inertia, periods, vectors, missing, motion_missing, root, work, residual, status)
+
+
+@kernel(
+    f"void({READ_ONLY}, {_TABLE}, {_TABLE}, {_MATRICES}, {_TABLE}, {_MATRICES}, {_BOOLS}, {_BOOLS}, {READ_ONLY}, "
+    "float64[:, ::1], float64[:, ::1], uint8[:, ::1])"
+)
+def _observe(
+    time: FloatArray,
+    balance: FloatArray,
+    speed: FloatArray,
+    inertia: FloatArray,
+    periods: FloatArray,
+    vectors: FloatArray,
+    missing: BoolArray,
+    motion_missing: BoolArray,
+    root: FloatArray,
+    work: FloatArray,
+    residual: FloatArray,
+    status: StatusArray,
+) -> None:
+    """As `observe_velocity`; `periods` 1/w (n, J) and `vectors` V (n, J, J) of the step that ends at each sample."""
+    joints = len(root)
     started = False
     elapsed = 0.0
     settled = 0.0
@@ -50,50 +75,42 @@ def observe_velocity(
         if started:
             step = time[k] - time[k - 1]
             for j in range(joints):
-                impulse[j] += 0.5 * (balance[k, j] + balance[k - 1, j]) * step
+                work[_IMPULSE, j] += 0.5 * (balance[k, j] + balance[k - 1, j]) * step
             elapsed += step
         if motion_missing[k]:
             for j in range(joints):
-                residual[k, j] = value[j]
+                residual[k, j] = work[_VALUE, j]
                 status[k, j] = 3
             continue
         if started:
-            for i in range(joints):
-                for j in range(joints):
-                    mean_inertia[i, j] = 0.5 * (inertia[k, i, j] + inertia[last, i, j])
-                    scaled[i, j] = mean_inertia[i, j] / (root[i] * root[j])
-            periods, vectors = np.linalg.eigh(scaled)
-            slowest = periods[joints - 1]
+            slowest = periods[k, joints - 1]
             if elapsed > 3.0 * slowest:
                 for i in range(joints):
-                    value[i] = 0.0
+                    work[_VALUE, i] = 0.0
                 settled = 0.0
             else:
                 for i in range(joints):
-                    target[i] = impulse[i]
+                    target = work[_IMPULSE, i]
                     for j in range(joints):
-                        target[i] -= mean_inertia[i, j] * (speed[k, j] - speed[last, j])
-                    target[i] = (target[i] / elapsed - value[i]) / root[i]
+                        mean = 0.5 * (inertia[k, i, j] + inertia[last, i, j])
+                        target -= mean * (speed[k, j] - speed[last, j])
+                    work[_TARGET, i] = (target / elapsed - work[_VALUE, i]) / root[i]
                 for mode in range(joints):
-                    modes[mode] = 0.0
+                    part = 0.0
                     for i in range(joints):
-                        modes[mode] += vectors[i, mode] * target[i]
-                    modes[mode] *= -np.expm1(-elapsed / periods[mode])
+                        part += vectors[k, i, mode] * work[_TARGET, i]
+                    work[_MODE, mode] = part * -math.expm1(-elapsed / periods[k, mode])
                 for i in range(joints):
                     change = 0.0
                     for mode in range(joints):
-                        change += vectors[i, mode] * modes[mode]
-                    value[i] += root[i] * change
+                        change += vectors[k, i, mode] * work[_MODE, mode]
+                    work[_VALUE, i] += root[i] * change
                 settled += elapsed / slowest
         started = True
         elapsed = 0.0
         last = k
+        verdict = 3 if missing[k] else 1 if settled < 3.0 else 0
         for j in range(joints):
-            impulse[j] = 0.0
-            residual[k, j] = value[j]
-            if missing[k]:
-                status[k, j] = 3
-            elif settled < 3.0:
-                status[k, j] = 1
-            else:
-                status[k, j] = 0
+            work[_IMPULSE, j] = 0.0
+            residual[k, j] = work[_VALUE, j]
+            status[k, j] = verdict

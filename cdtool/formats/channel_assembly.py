@@ -7,6 +7,7 @@ once. Nothing is resampled.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.header_units import time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
+from cdtool.formats.written_origin import with_written_origin
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
 
 
@@ -28,9 +30,16 @@ def assemble(source: Source, channels: ChannelMap, machine: Any) -> Recording:
 
 
 def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
-    """The channels in SI as the machine logs them, not yet referred to the load side."""
-    work = _Assembly(source, channels)
-    series = {item.channel: work.series(item) for item in channels.sources}
+    """The channels in SI as the machine logs them, not yet referred to the load side.
+
+    The columns are taken out of the source one after another: none is longer in memory than it is needed.
+    """
+    work = _Assembly(with_written_origin(source), channels)
+    series = {}
+    for number, item in enumerate(channels.sources):
+        series[item.channel] = work.series(item)
+        work.drop(item, channels.sources[number + 1 :])
+    work.columns.clear()
     for item in channels.sources:
         if item.duty is not None:
             if "N m" not in machine.accepted_units("torque"):
@@ -45,7 +54,12 @@ def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
         joints=channels.joints,
         channels=series,
         origin=work.origin,
-        findings=(*source.findings, *work.findings, *_stuck(series), *_apart(series)),
+        findings=(
+            *source.findings,
+            *work.findings,
+            *stuck_findings({name: _constant(series[name]) for name in MEASURED if name in series}),
+            *apart_findings({name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}),
+        ),
         digest=file_digest(source.path),
     )
 
@@ -62,6 +76,8 @@ class _Assembly:
     def __init__(self, source: Source, channels: ChannelMap) -> None:
         self.source = source
         self.channels = channels
+        self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
+        self._names = source.names or tuple(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
         self.gaps: set[str] = set()  # what was said of the table's clock is not repeated for each channel
@@ -70,16 +86,24 @@ class _Assembly:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
 
+    def drop(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
+        """Forget the columns of a channel that no later one is made of."""
+        needed = {key for other in later for key in self._keys(other)}
+        for key in self._keys(item):
+            if key not in needed:
+                self.columns.pop(key, None)
+
     def series(self, item: ChannelSource) -> Series:
         """One channel: its values in SI at its own times."""
         if self.table is None:
-            column = self.source.columns[find_key(self.source.path, item.channel, item.described, self._names())]
+            column = self._column(item.channel, item.described)
             stamps = column.time if column.time is not None else np.empty(0)
             clock = self._clean(stamps, f"{item.channel} time", sampled=item.channel != "event")
             values = column.values
         else:
             clock = self.table
-            values = np.column_stack([self._column(item.channel, column).values for column in item.columns])
+            parts = [self._column(item.channel, column).values for column in item.columns]
+            values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         if not len(clock.time):
             raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
         series = Series(clock.time, self._scaled(item, self._kept(item, values, clock.keep)), item.unit)
@@ -89,13 +113,13 @@ class _Assembly:
     def _table_clock(self) -> CleanTime:
         time = self.channels.time
         if time.column is None:
-            rows = {len(column.values) for column in self.source.columns.values()}
+            rows = {len(column.values) for column in self.columns.values()}
             return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
         column = self._column("time", time.column)
         self.findings += time_unit_findings(time, column)
         start = epoch_start(column.values, time.factor)
         if start:
-            self.origin = start * time.factor
+            self.origin += start * time.factor
         clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
         if not len(clock.time):
             raise RecordingError(
@@ -119,11 +143,12 @@ class _Assembly:
         self.findings += [replace(found, channel=clock) for found in clean.findings]
         return clean
 
-    def _names(self) -> tuple[str, ...]:
-        return self.source.names or tuple(self.source.columns)
+    def _keys(self, item: ChannelSource) -> list[str]:
+        columns = item.columns if self.table is not None else (item.described,)
+        return [find_key(self.source.path, item.channel, column, self._names) for column in columns]
 
     def _column(self, channel: str, column: str | int) -> Column:
-        return self.source.columns[find_key(self.source.path, channel, column, self._names())]
+        return self.columns[find_key(self.source.path, channel, column, self._names)]
 
     def _kept(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
         table = values.reshape(len(values), -1)
@@ -133,30 +158,41 @@ class _Assembly:
                 f"its clock {len(keep)}",
                 "columns of one recording are equally long",
             )
-        if table.shape[1] != len(item.factor):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' ({item.described}) gives {table.shape[1]} values "
-                f"a sample for {len(item.factor)} joints",
-                "name one element a joint, in the order of machine.joints",
-            )
-        return np.array(table[keep], dtype=np.float64)
+        check_width(self.source.path, item, table.shape[1])
+        return table if keep.all() else table[keep]
 
     def _scaled(self, item: ChannelSource, values: FloatArray) -> FloatArray:
-        infinite = np.isinf(values)
-        if infinite.any():
-            values[infinite] = np.nan
-            self._found(item, f"{np.count_nonzero(infinite)} values are infinite: masked")
-        if item.valid_range is not None:
-            low, high = item.valid_range
-            saturated = (values <= low) | (values >= high)
-            if saturated.any():
-                values[saturated] = np.nan
-                self._found(item, f"{np.count_nonzero(saturated)} values are at the sensor's limit: masked")
-        scaled: FloatArray = values * np.array(item.factor)
+        scaled, infinite, saturated = in_si(item, values)
+        self.findings += masked_findings(item, infinite, saturated)
         return scaled
 
-    def _found(self, item: ChannelSource, text: str) -> None:
-        self.findings.append(Finding(text, item.channel))
+
+def check_width(path: Path, item: ChannelSource, width: int) -> None:
+    """Raise RecordingError where a channel's samples have not one value a joint."""
+    if width != len(item.factor):
+        raise RecordingError(
+            f"{path}: channel '{item.channel}' ({item.described}) gives {width} values "
+            f"a sample for {len(item.factor)} joints",
+            "name one element a joint, in the order of machine.joints",
+        )
+
+
+def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, int, int]:
+    """(n, J) values of a channel in its SI unit; how many of them are infinite, and at the sensor's limit: NaN now."""
+    infinite = np.isinf(values)
+    saturated = np.zeros_like(infinite)
+    if item.valid_range is not None:
+        low, high = item.valid_range
+        saturated = ((values <= low) | (values >= high)) & ~infinite
+    scaled: FloatArray = values * np.array(item.factor)
+    scaled[infinite | saturated] = np.nan
+    return scaled, int(np.count_nonzero(infinite)), int(np.count_nonzero(saturated))
+
+
+def masked_findings(item: ChannelSource, infinite: int, saturated: int) -> list[Finding]:
+    """What is told of the values that in_si masked."""
+    kinds = ((infinite, "infinite"), (saturated, "at the sensor's limit"))
+    return [Finding(f"{count} values are {what}: masked", item.channel) for count, what in kinds if count]
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
@@ -178,25 +214,23 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
     return Series(logged.time, torque, "N m")
 
 
-def _stuck(series: dict[str, Series]) -> list[Finding]:
-    """A measured channel that never changes while its joint moves."""
+def stuck_findings(constant: Mapping[str, Sequence[bool]]) -> list[Finding]:
+    """A measured channel that never changes while its joint moves; `constant`: joint by joint, a channel does not."""
     found = []
-    for name in MEASURED:
-        if name not in series:
-            continue
-        for joint in range(series[name].joint_count):
-            others = [series[other] for other in ("speed", "position") if other in series and other != name]
-            if _constant(series[name], joint) and any(not _constant(other, joint) for other in others):
+    for name in (item for item in MEASURED if item in constant):
+        others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
+        for joint, stands in enumerate(constant[name]):
+            if stands and not all(other[joint] for other in others):
                 found.append(Finding("the value never changes while the machine moves: stuck?", name))
     return found
 
 
-def _apart(series: dict[str, Series]) -> list[Finding]:
-    """Channels on clocks of their own that have no time in common: between them nothing can be compared.
+def apart_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Finding]:
+    """Channels on clocks of their own that have no time [s] in common: between them nothing can be compared.
 
     What is logged at events only may lie beside the rest, by no more than the log is long.
     """
-    spans = sorted((float(s.time[0]), float(s.time[-1]), name) for name, s in series.items())
+    spans = sorted((first, last, name) for name, (first, last) in first_and_last.items())
     longest = max((end - start for start, end, _ in spans), default=0.0)
     found = []
     latest, before = (spans[0][1], spans[0][2]) if spans else (0.0, "")
@@ -210,7 +244,7 @@ def _apart(series: dict[str, Series]) -> list[Finding]:
     return found
 
 
-def _constant(series: Series, joint: int) -> bool:
-    values = series.values[:, joint]
-    finite = values[np.isfinite(values)]
-    return len(finite) > 1 and bool(np.all(finite == finite[0]))
+def _constant(series: Series) -> list[bool]:
+    """Joint by joint: does it never change?"""
+    finite = (column[np.isfinite(column)] for column in series.values.T)
+    return [len(known) > 1 and bool(np.all(known == known[0])) for known in finite]

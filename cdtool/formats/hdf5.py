@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,20 +13,20 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.cf_attributes import Packing, times_since
 from cdtool.formats.container_checks import (
-    as_numbers,
     check_chunks,
     check_size,
     left_out,
     library,
     one_line_errors,
-    without_epoch,
 )
-from cdtool.formats.groups import Group, Parts, Written, stored
-from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
+from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
+from cdtool.formats.own_clocks import asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
 
@@ -39,7 +40,8 @@ _WIDEST = 64
 class Hdf5:
     """HDF5 files: a column is a dataset's path, `drive/torque`; a matrix `q` is `q[0]`, `q[1]` and so on.
 
-    A dataset `time`, `t` or `timestamp` with a unit of time is the clock of those beside it that are as long.
+    A dataset `time`, `t` or `timestamp` with a unit of time (`s`, `seconds since 2024-01-01`) is the clock of those
+    beside it that are as long. Numbers are unpacked as the CF conventions say.
     """
 
     name: ClassVar[str] = "hdf5"
@@ -79,6 +81,8 @@ class Hdf5:
             origin = tree.take_epoch(keys)
             columns = [tree.column(key) for key in keys]
             yield from side_by_side(columns)
+            findings += [found for key in keys for found in rounding_finding(key, tree.rounded[key])]
+            findings += tree.unnamed_clocks()
             origin += float(file.attrs.get("cdtool.origin_s", 0.0))
         headers = {column.name: header_of(column) for column in columns}
         told = {"datasets": str(len(tree.datasets))}
@@ -91,8 +95,11 @@ class _Tree:
     def __init__(self, path: Path, h5py: Any, file: Any, findings: list[Finding]) -> None:
         self.path, self.h5py, self.findings = path, h5py, findings
         self.datasets: dict[str, Any] = {}
+        self.packings: dict[str, Packing] = {}
         self.places: dict[str, tuple[str, int | None]] = {}
-        self._epoch = 0.0
+        self.rounded: Counter[str] = Counter()
+        self._clocks: dict[str, EpochClock | None] = {}
+        self._origin = Fraction(0)
         # Hard links only: a soft or external one may lead in circles, or out of the file.
         file.visititems(self._visit)
 
@@ -100,10 +107,15 @@ class _Tree:
         if not isinstance(item, self.h5py.Dataset):
             return
         why = _unusable(item)
+        try:
+            packing = Packing() if why else Packing.of(item.attrs)
+        except ValueError as fault:
+            why = f"packed, but {fault}"
         if why:
             self.findings.append(left_out(name, why))
             return
-        self.datasets[name] = item
+        self.datasets[name], self.packings[name] = item, packing
+        self.findings += packing.finding(name)
         if item.ndim == 1 or 1 in item.shape:
             self.places[name] = (name, None)
             return
@@ -123,42 +135,69 @@ class _Tree:
         dataset, rows = self.datasets[name], self.rows(key)
 
         def values(start: int, end: int) -> FloatArray:
-            return as_numbers(key, _rows_of(dataset, place, start, end), self.findings)
+            numbers = self.packings[name].unpacked(_rows_of(dataset, place, start, end))
+            self.rounded[key] += rounded_integers(numbers) if dataset.dtype.kind in "iu" else 0
+            return numbers
 
-        clock = self._clock(key)
-        if clock is None:
+        found = self._clock(key)
+        if found is None:
             return Sliced(key, rows, values, unit=_unit(dataset))
-        path, factor = clock
+        path, clock = found
 
         def time(start: int, end: int) -> FloatArray:
-            return self._times(path, factor, start, end) - self._epoch
+            return clock.times(start, end, self._origin)
 
         return Sliced(key, rows, values, path, time, _unit(dataset))
 
     def take_epoch(self, keys: Sequence[str]) -> float:
-        """Where the clocks of these columns count from an epoch: its start [s], which is then taken off; else 0."""
-        clocks = {clock for key in keys if (clock := self._clock(key)) is not None}
-        starts = [Column(clock[0], np.empty(0), self._times(*clock, 0, 1)) for clock in clocks]
-        self._epoch = without_epoch(starts)[1]
-        return self._epoch
+        """Let the times of these columns begin at 0 where they count from an epoch; seconds that are taken off."""
+        found = dict(clock for key in keys if (clock := self._clock(key)) is not None)
+        self._origin = common_origin(found.values())
+        return float(self._origin)
 
-    def _times(self, path: str, factor: float, start: int, end: int) -> FloatArray:
-        times = as_numbers(path, _rows_of(self.datasets[path], None, start, end), self.findings)
-        return times if factor == 1.0 else times * factor
+    def unnamed_clocks(self) -> list[Finding]:
+        """A warning where groups have datasets that are called as clocks are, of which no unit tells that they are."""
+        paths = [path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._made(path) is None]
+        if len({path.rpartition("/")[0] for path in paths}) < 2:
+            return []
+        text = f"{', '.join(paths[:3])} look like the clocks of their groups, but have no unit of time"
+        return [Finding(f"{text}: the attribute unit makes each the clock of its group")]
 
-    def _clock(self, key: str) -> tuple[str, float] | None:
-        """The dataset that is a column's clock, and its factor to seconds."""
+    def _clock(self, key: str) -> tuple[str, EpochClock] | None:
+        """The dataset that is a column's clock; a clock is its own."""
         name, count = self.places[key][0], self.rows(key)
         folder, _, own = name.rpartition("/")
-        for clock in _CLOCK_NAMES:
+        for clock in (own, *_CLOCK_NAMES) if own in _CLOCK_NAMES else _CLOCK_NAMES:
             path = f"{folder}/{clock}" if folder else clock
-            dataset = self.datasets.get(path)
-            if dataset is None or clock == own or dataset.size != count:
-                continue
-            unit = find_unit(_unit(dataset) or "?")
-            if unit is not None and unit.si == "s":
-                return path, unit.factor
+            made = self._made(path) if path in self.datasets and self.datasets[path].size == count else None
+            if made is not None:
+                return path, made
         return None
+
+    def _made(self, path: str) -> EpochClock | None:
+        """A dataset as a clock; None where it has no unit of time."""
+        if path not in self._clocks:
+            self._clocks[path] = self._as_clock(path)
+        return self._clocks[path]
+
+    def _as_clock(self, path: str) -> EpochClock | None:
+        dataset, packing = self.datasets[path], self.packings[path]
+        told = _unit(dataset) or "?"
+        try:
+            since = times_since(told, _text(dataset.attrs.get("calendar")))
+        except ValueError as fault:
+            self.findings.append(Finding(f"{fault}: it is no clock", path))
+            return None
+        unit = find_unit(told)
+        if since is None and (unit is None or unit.si != "s"):
+            return None
+        factor, base = since or (unit.factor if unit is not None else 1.0, Fraction(0))
+
+        def read(start: int, end: int) -> Any:
+            return _rows_of(dataset, None, start, end)
+
+        base += Fraction(packing.offset) * Fraction(repr(factor))
+        return EpochClock(read, factor * packing.scale, base, packing.missing)
 
 
 def _rows_of(dataset: Any, place: int | None, start: int, end: int) -> Any:
@@ -199,41 +238,3 @@ def _text(value: Any) -> str:
     if isinstance(value, bytes | np.bytes_):
         return bytes(value).decode("utf-8", "replace")
     return value if isinstance(value, str) else ""
-
-
-def _link(name: str) -> str:
-    """A name without the slash that would make a group of it."""
-    return name.replace("/", ".")
-
-
-def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write a dataset a column, units as attributes; several clocks are groups, each with its `time`."""
-    h5py = library("h5py", "hdf5", path)
-    names: Written = []
-    datasets: list[list[Any]] = []
-    with h5py.File(path, "w", track_order=True) as file:
-        for key, value in stored(provenance).items():
-            file.attrs[key] = value
-        for group in groups:
-            folder = file if len(groups) == 1 else file.create_group(group.name, track_order=True)
-            before = "" if len(groups) == 1 else f"{group.name}/"
-            columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if group.own_clock else []
-            datasets.append([_dataset(folder, column, group.rows) for column in (*columns, *chain(*group.flat))])
-            names.append([[before + _link(part.name) for part in parts] for parts in group.flat])
-        done = [0] * len(groups)
-        for ready in parts:
-            for number, part in enumerate(ready):
-                if part is not None:
-                    rows = slice(done[number], done[number] + len(part))
-                    values = [part.time, *part.flat] if groups[number].own_clock else part.flat
-                    for dataset, column in zip(datasets[number], values, strict=True):
-                        dataset[rows] = column
-                    done[number] = rows.stop
-    return names
-
-
-def _dataset(folder: Any, column: Column, rows: int) -> Any:
-    dataset = folder.create_dataset(_link(column.name), (rows,), np.float64)
-    if column.unit:
-        dataset.attrs["unit"] = column.unit
-    return dataset

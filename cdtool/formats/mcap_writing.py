@@ -101,7 +101,7 @@ def exact_pieces(pieces: Pieces, origin: float) -> Pieces:
     for piece in run:
         time = piece.values.get(f"{piece.clock} {EXACT_TIME}")
         values = {name: column for name, column in piece.values.items() if not name.endswith(f" {EXACT_TIME}")}
-        yield Piece(piece.clock, piece.time if time is None else time, values, piece.rows)
+        yield Piece(piece.clock, piece.time if time is None else time, values, piece.rows, origin)
     columns = {name: item for name, item in run.source.columns.items() if not name.endswith(f" {EXACT_TIME}")}
     return replace(run.source, columns=columns, origin=origin)
 

@@ -86,7 +86,7 @@ class _Table:
             self.schema, self._batches = self._file.schema, self._file.batches
         metadata = self.schema.metadata or {}
         self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
-        self.origin = float(metadata.get(b"cdtool.origin_s", b"0")) if self.own_clocks else 0.0
+        self.origin = float(metadata.get(b"cdtool.origin_s", b"0"))
         self._starts: dict[str, Any] = {}  # of columns of time stamps
 
     def is_number(self, key: str) -> bool:

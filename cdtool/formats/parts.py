@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.formats.channel_assembly import file_digest
 from cdtool.formats.source import Column, Source
 from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
 
@@ -21,10 +20,9 @@ _COMPRESSED = (".zstd", ".zst", ".lz4")
 _MESSAGES = re.compile(r"(?P<what>.*), (?P<count>[0-9]+) messages")
 
 
-def parts_digest(paths: Sequence[Path]) -> str:
-    """SHA-256 of a log: of its file's bytes, or of its parts' digests in hexadecimal digits."""
-    digests = [file_digest(path) for path in paths]
-    return digests[0] if len(digests) == 1 else _joined_digest(digests)
+def joined_digest(digests: Sequence[str]) -> str:
+    """SHA-256 of a log by those of its parts: of their hexadecimal digits one after the other; of one part its own."""
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
 def lost_parts(folder: Path, parts: Sequence[Path]) -> list[Finding]:
@@ -45,16 +43,29 @@ def lost_parts(folder: Path, parts: Sequence[Path]) -> list[Finding]:
     return found
 
 
-def joined_sources(folder: Path, parts: Sequence[Source]) -> Source:
+def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, RecordingError]) -> tuple[Finding, ...]:
+    """The losses of a folder: `parts` are its files, `unread` those of them that cannot be read, with the reason."""
+    found = lost_parts(folder, parts)
+    for part, fault in unread.items():
+        why = fault.message.removeprefix(f"{part}: ")
+        found.append(Finding(f"part {part.name} is left out, it cannot be read: {why}", severity="loss"))
+    return tuple(found)
+
+
+def joined_sources(
+    folder: Path, parts: Sequence[Source], unread: Mapping[Path, RecordingError] | None = None
+) -> Source:
     """The columns of all parts, each in the order of its times, with what is odd about every part.
 
-    A column may be absent in some of them; one whose arrays differ in length is left out, and that is said.
+    A column may be absent in some of them; one whose arrays differ in length is left out, and that is said, as are
+    parts that could not be read (`unread`).
     """
-    lost = tuple(lost_parts(folder, [part.path for part in parts]))
+    unread = unread or {}
+    lost = lost_findings(folder, [*(part.path for part in parts), *unread], unread)
     if len(parts) == 1:
         return replace(parts[0], path=folder, findings=(*lost, *parts[0].findings))
     parts = sorted(parts, key=_start)
-    findings = [*lost, *(found for part in parts for found in _of_part(part.path, part.findings))]
+    findings = [*lost, *(found for part in parts for found in of_part(part.path, part.findings))]
     columns: dict[str, Column] = {}
     late: dict[Path, list[str]] = {}
     for name in dict.fromkeys(name for part in parts for name in part.columns):
@@ -70,7 +81,7 @@ def joined_sources(folder: Path, parts: Sequence[Source]) -> Source:
     for path, names in late.items():
         text = f"{path.name} begins before the part before it ends ({names[0]}): put in the order of the times"
         findings.append(Finding(text))
-    details = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"} | _joined_details(parts)
+    details = joined_details(parts)
     return Source(folder, parts[0].format, columns, parts[0].origin, tuple(findings), details, tuple(columns))
 
 
@@ -88,32 +99,35 @@ def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
             if channel in GROUND_TRUTH and channel not in part:
                 continue
             if channel not in part or (pieces and part[channel].unit != pieces[0].unit):
-                raise RecordingError(
-                    f"{part.source}: channel '{channel}' is not logged as in {first.source}",
-                    "parts of one log are alike",
-                )
+                raise not_alike(part.source, channel, first.source)
             shift = part.origin - first.origin
             series = part[channel]
             if pieces and series.time[0] + shift <= pieces[-1].time[-1]:
-                raise RecordingError(
-                    f"{part.source}: overlaps the part before it ({channel}: starts at {series.time[0] + shift:g} s, "
-                    f"before {pieces[-1].time[-1]:g} s)",
-                    "parts of one log share one clock and follow one another",
-                )
+                raise overlapping(part.source, channel, series.time[0] + shift, pieces[-1].time[-1])
             pieces.append(Series(series.time + shift, series.values, series.unit))
         time = np.concatenate([piece.time for piece in pieces])
         joined[channel] = Series(time, np.concatenate([piece.values for piece in pieces]), pieces[0].unit)
-    findings = tuple(found for part in parts for found in _of_part(Path(part.source), part.findings))
+    findings = tuple(found for part in parts for found in of_part(Path(part.source), part.findings))
     source = ", ".join(part.source for part in parts)
-    digest = _joined_digest([part.digest for part in parts])
+    digest = joined_digest([part.digest for part in parts])
     return Recording(name, source, first.joints, joined, first.origin, findings, digest)
 
 
-def _joined_digest(digests: Sequence[str]) -> str:
-    return hashlib.sha256("".join(digests).encode()).hexdigest()
+def not_alike(part: str, channel: str, first: str) -> RecordingError:
+    """A part lacks a channel that the first one has."""
+    return RecordingError(f"{part}: channel '{channel}' is not logged as in {first}", "parts of one log are alike")
 
 
-def _of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
+def overlapping(part: str, channel: str, start: float, before: float) -> RecordingError:
+    """A channel starts [s] in a part before it ends [s] in the one before."""
+    return RecordingError(
+        f"{part}: overlaps the part before it ({channel}: starts at {start:g} s, before {before:g} s)",
+        "parts of one log share one clock and follow one another",
+    )
+
+
+def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
+    """What is odd about a part, with its name."""
     return (replace(found, message=f"{path.name}: {found.message}") for found in findings)
 
 
@@ -140,13 +154,15 @@ def _joined_column(name: str, parts: Sequence[Source], origin: float) -> tuple[C
     return Column(name, joined, time, parts[0].columns[name].unit), late
 
 
-def _joined_details(parts: Sequence[Source]) -> dict[str, str]:
-    """What the parts say of each topic, once: the messages of all are added up."""
+def joined_details(parts: Sequence[Source]) -> dict[str, str]:
+    """What the parts of a log say of themselves, and of each topic once: the messages of all are added up."""
+    if len(parts) == 1:
+        return dict(parts[0].details)
     said: dict[str, list[str]] = {}
     for part in parts:
         for key, text in part.details.items():
             said.setdefault(key, []).append(text)
-    joined = {}
+    joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
     for key, texts in said.items():
         counted = [match for text in texts if (match := _MESSAGES.fullmatch(text))]
         kinds = list(dict.fromkeys(match["what"] for match in counted))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,8 +15,11 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
-from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
+from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
+from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.groups import Group, Part, Parts, Written, stored
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
+from cdtool.formats.library_lines import collected_lines
 from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
@@ -55,18 +60,28 @@ class Tdms:
         if not self.sniff(path):
             raise RecordingError(f"{path}: is no TDMS file", "see cdtool list formats")
         findings: list[Finding] = []
-        with one_line_errors(path, "a TDMS file"), nptdms.TdmsFile.open(path) as file:
+        with (
+            one_line_errors(path, "a TDMS file"),
+            collected_lines("nptdms") as lines,
+            nptdms.TdmsFile.open(path) as file,
+        ):
             channels = _channels(file, findings)
             keys = [key for key in asked_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
                 raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
             check_size(path, sum(len(channels[key]) for key in keys))
-            if getattr(file.file_status, "incomplete_final_segment", False):
+            incomplete = getattr(file.file_status, "incomplete_final_segment", False)
+            if incomplete:
                 text = "the last segment is not complete: what it lacks is lost"
                 findings.append(Finding(text, severity="loss"))
-            origin = _origin(file, [channels[key] for key in keys])
-            columns = [_Channel(key, channels[key], channels, findings).sliced(origin) for key in keys]
+            tree = _Tree(channels, findings)
+            origin = tree.take_origin(keys, file.properties)
+            columns = [tree.sliced(key) for key in keys]
             yield from side_by_side(columns)
+            findings += [found for key in keys for found in rounding_finding(key, tree.rounded[key])]
+            findings += [
+                Finding(f"npTDMS says: {line}", severity="note" if incomplete else "warning") for line in lines
+            ]
             details = {key: str(value)[:80] for key, value in file.properties.items()}
         headers = {column.name: header_of(column) for column in columns}
         return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
@@ -89,77 +104,111 @@ def _channels(file: Any, findings: list[Finding]) -> dict[str, Any]:
     return found
 
 
-def _origin(file: Any, channels: Sequence[Any]) -> float:
-    """Seconds since 1970 of the earliest waveform, or what cdtool convert wrote; 0 where neither is told."""
-    if "cdtool.origin_s" in file.properties:
-        return float(file.properties["cdtool.origin_s"])
-    starts = [_start(channel) for channel in channels if channel.properties.get("wf_increment")]
-    known = [start for start in starts if start is not None]
-    return min(known) if starts and len(known) == len(starts) else 0.0
+class _Tree:
+    """The channels of an open file as columns, with clocks where the file knows them."""
 
+    def __init__(self, channels: Mapping[str, Any], findings: list[Finding]) -> None:
+        self._channels, self._findings = channels, findings
+        self.rounded: Counter[str] = Counter()
+        self._origin = self._epoch = Fraction(0)  # of waveforms, of stamps
+        self._clocks: dict[str, EpochClock] = {}
 
-def _start(channel: Any) -> float | None:
-    start = channel.properties.get("wf_start_time")
-    if start is None:
-        return None
-    seconds = (np.datetime64(start) - np.datetime64(0, "s")) / np.timedelta64(1, "us") / 1e6
-    return float(seconds) if seconds > 0 else None
+    def take_origin(self, keys: Sequence[str], properties: Mapping[str, Any]) -> float:
+        """What all times count from [s]: what cdtool convert wrote, or the earliest waveform or stamp since 1970.
 
+        What does not tell its start is taken to begin with the earliest; 0 where nothing does.
+        """
+        if "cdtool.origin_s" in properties:
+            return float(properties["cdtool.origin_s"])
+        begins = {key: _start(self._channels[key]) for key in keys if _step(self._channels[key]) is not None}
+        known = [start for start in begins.values() if start is not None]
+        clocks = {key: found[1] for key in keys if key not in begins and (found := self._clock(key)) is not None}
+        self._epoch = common_origin(clocks.values())
+        known += [self._epoch] if self._epoch else []
+        self._origin = min(known, default=Fraction(0))
+        untold = [key for key, start in begins.items() if start is None] + [key for key in clocks if not self._epoch]
+        if known and untold:
+            shown = ", ".join(untold[:3]) + (f" and {len(untold) - 3} more" if len(untold) > 3 else "")
+            text = f"others tell when they begin (wf_start_time), {shown} not: taken to begin with the first of them"
+            self._findings.append(Finding(text))
+        return float(self._origin)
 
-@dataclass(frozen=True)
-class _Channel:
-    """A channel of an open file, and those that may be its clock."""
+    def sliced(self, key: str) -> Sliced:
+        """A channel as a column."""
+        channel = self._channels[key]
+        count, unit, step = len(channel), _unit(channel), _step(channel)
 
-    key: str
-    channel: Any
-    channels: Mapping[str, Any]
-    findings: list[Finding]
+        def values(start: int, end: int) -> FloatArray:
+            return self._values(key, start, end)
 
-    def sliced(self, origin: float) -> Sliced:
-        """The channel as a column, with a clock where the file knows it."""
-        channel, count = self.channel, len(self.channel)
-        step = channel.properties.get("wf_increment")
-        if isinstance(step, float) and step > 0.0:
-            first = self._first(origin)
+        if step is not None:
+            first = self._first(channel)
 
             def by_step(start: int, end: int) -> FloatArray:
                 return first + np.arange(start, end, dtype=np.float64) * step
 
-            return Sliced(self.key, count, self._values, f"{first!r} {step!r} {count}", by_step, _unit(channel))
-        clock, factor = self._clock()
-        if clock is None:
-            return Sliced(self.key, count, self._values, unit=_unit(channel))
+            return Sliced(key, count, values, f"{first!r} {step!r} {count}", by_step, unit)
+        found = self._clock(key)
+        if found is None:
+            return Sliced(key, count, values, unit=unit)
+        path, clock = found
 
         def by_clock(start: int, end: int) -> FloatArray:
-            times = as_numbers(clock.name, clock[start:end], [])
-            return times if factor == 1.0 else times * factor
+            return clock.times(start, end, self._origin if self._epoch else Fraction(0))
 
-        return Sliced(self.key, count, self._values, f"{clock.path} {count}", by_clock, _unit(channel))
+        return Sliced(key, count, values, f"{path} {count}", by_clock, unit)
 
-    def _values(self, start: int, end: int) -> FloatArray:
-        values = as_numbers(self.key, self.channel[start:end], self.findings)
+    def _values(self, key: str, start: int, end: int) -> FloatArray:
+        raw = self._channels[key][start:end]
+        values = np.ascontiguousarray(raw, dtype=np.float64)
+        self.rounded[key] += rounded_integers(values) if raw.dtype.kind in "iu" else 0
         if len(values) == end - start:
             return values
         text = f"{end - start - len(values)} values from number {start + len(values)} on are missing"
-        self.findings.append(Finding(text, self.key, "loss"))
+        self._findings.append(Finding(text, key, "loss"))
         return np.pad(values, (0, end - start - len(values)), constant_values=np.nan)
 
-    def _first(self, origin: float) -> float:
+    def _first(self, channel: Any) -> float:
         """Time [s] of a waveform's first sample."""
-        start = _start(self.channel)
-        later = start - origin if start is not None and origin else 0.0
-        return later + float(self.channel.properties.get("wf_start_offset", 0.0))
+        start = _start(channel)
+        later = float(start - self._origin) if start is not None and self._origin else 0.0
+        return later + float(channel.properties.get("wf_start_offset", 0.0))
 
-    def _clock(self) -> tuple[Any, float]:
-        """The channel of times that stands beside it, and its factor to seconds; None where there is none."""
-        for clock in self.channels.values():
-            beside = clock.group_name == self.channel.group_name and clock.name in _CLOCK_NAMES
-            if not beside or clock is self.channel or self.channel.name in _CLOCK_NAMES:
+    def _clock(self, key: str) -> tuple[str, EpochClock] | None:
+        """The channel of times that stands beside it; None where there is none."""
+        channel = self._channels[key]
+        for clock in self._channels.values():
+            beside = clock.group_name == channel.group_name and clock.name in _CLOCK_NAMES
+            if not beside or clock is channel or channel.name in _CLOCK_NAMES:
                 continue
             unit = find_unit(_unit(clock) or "?")
-            if unit is not None and unit.si == "s" and len(clock) >= len(self.channel):
-                return clock, unit.factor
-        return None, 1.0
+            if unit is None or unit.si != "s" or len(clock) < len(channel):
+                continue
+            if clock.path not in self._clocks:
+                self._clocks[clock.path] = EpochClock(partial(_raw, clock), unit.factor)
+            return clock.path, self._clocks[clock.path]
+        return None
+
+
+def _raw(channel: Any, start: int, end: int) -> Any:
+    return channel[start:end]
+
+
+def _step(channel: Any) -> float | None:
+    """A waveform's sample period [s]; None of any other channel."""
+    step = channel.properties.get("wf_increment")
+    known = isinstance(step, int | float | np.number) and not isinstance(step, bool) and 0.0 < float(step) < np.inf
+    return float(step) if known else None
+
+
+def _start(channel: Any) -> Fraction | None:
+    """Seconds since 1970 of a waveform's start; None where it has none, or that of an empty stamp (1904)."""
+    start = channel.properties.get("wf_start_time")
+    if start is None:
+        return None
+    microseconds = np.datetime64(start, "us").astype(np.int64)
+    seconds = Fraction(int(microseconds), 10**6)
+    return seconds if seconds > 0 else None
 
 
 def _unit(channel: Any) -> str | None:

@@ -59,6 +59,7 @@ from cdtool.machines.tree_rows import (
     take_column,
     times,
     vector_of,
+    work_space,
 )
 from cdtool.recording import FloatArray
 
@@ -112,7 +113,6 @@ def _joint_torque(body: FloatArray, pair: FloatArray) -> None:
         pair[SLOT + TERMS + j] = drive * pair[SLOT + RATE_CHANGE + j] + share
 
 
-@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_ONLY}, {READ_TABLE}, {READ_TABLE}, {READ_TABLE}, {TABLE})")
 def sweep_inverse_dynamics(
     bodies: FloatArray,
     route: IndexArray,
@@ -123,9 +123,21 @@ def sweep_inverse_dynamics(
     torque: FloatArray,
 ) -> None:
     """M qdd + C qd + g of every sample: recursive Newton-Euler, gravity as an acceleration of the base."""
-    slots, fault = np.zeros((np.max(route[:, BEFORE]) + 2) * SLOT), np.zeros(BLOCK)
-    for j in range(3 * BLOCK):
-        slots[DV + j] = -gravity_vector[j // BLOCK]
+    _sweep(bodies, route, position, speed, acceleration, work_space(route, DV, -gravity_vector)[0], torque)
+
+
+@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {READ_TABLE}, {READ_TABLE}, {ROW}, {TABLE})")
+def _sweep(
+    bodies: FloatArray,
+    route: IndexArray,
+    position: FloatArray,
+    speed: FloatArray,
+    acceleration: FloatArray,
+    slots: FloatArray,
+    torque: FloatArray,
+) -> None:
+    """As `sweep_inverse_dynamics`, with the work space, whose base has its acceleration."""
+    fault = np.empty(BLOCK)
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)

@@ -50,6 +50,7 @@ from cdtool.machines.tree_rows import (
     take_column,
     times,
     vector_of,
+    work_space,
 )
 from cdtool.recording import FloatArray
 
@@ -102,38 +103,6 @@ def _joint_terms(body: FloatArray, pair: FloatArray) -> None:
         put_vector(pair, SLOT + TERMS + j, (momentum, turns * turning + slides * sliding, gravity))
 
 
-@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {READ_TABLE}, int64, int64, {ROW}, {ROW})")
-def _momentum_block(
-    bodies: FloatArray,
-    route: IndexArray,
-    position: FloatArray,
-    speed: FloatArray,
-    begin: int,
-    count: int,
-    slots: FloatArray,
-    fault: FloatArray,
-) -> None:
-    """p, C^T qd and g of a block into the result rows of every joint's slot."""
-    clear(slots, fault)
-    for i in range(len(bodies)):
-        before, origin = route[i, BEFORE], route[i, COPY_OF]
-        if origin >= 0:
-            copy_motion(slots, origin, before)
-        pair = slots[before * SLOT : (before + 2) * SLOT]
-        take_column(position, route[i, COLUMN], begin, count, pair, OFFSET, fault)
-        take_column(speed, route[i, COLUMN], begin, count, pair, RATE, fault)
-        fill_sine_cosine(pair, bodies[i, SLIDES])
-        _carry_motion(bodies[i], pair)
-    for i in range(len(bodies) - 1, -1, -1):
-        before, origin = route[i, BEFORE], route[i, COPY_OF]
-        pair = slots[before * SLOT : (before + 2) * SLOT]
-        _joint_terms(bodies[i], pair)
-        carry_load(bodies[i], pair)
-        if origin >= 0:
-            return_load(slots, origin, before)
-
-
-@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_ONLY}, {READ_TABLE}, {READ_TABLE}, {TABLE}, {TABLE}, {TABLE})")
 def sweep_momentum(
     bodies: FloatArray,
     route: IndexArray,
@@ -145,20 +114,10 @@ def sweep_momentum(
     gravity: FloatArray,
 ) -> None:
     """p = M qd, C^T qd and g, (n, J) each, of every sample."""
-    slots, fault = np.zeros((np.max(route[:, BEFORE]) + 2) * SLOT), np.zeros(BLOCK)
-    for j in range(3 * BLOCK):
-        slots[GRAVITY + j] = gravity_vector[j // BLOCK]
-    for begin in range(0, len(position), BLOCK):
-        count = min(BLOCK, len(position) - begin)
-        _momentum_block(bodies, route, position, speed, begin, count, slots, fault)
-        for i in range(len(bodies)):
-            own, column = route[i, BEFORE] + 1, route[i, COLUMN]
-            give_column(slots, own, TERMS, momentum, column, begin, count, fault)
-            give_column(slots, own, TERMS + BLOCK, velocity_force, column, begin, count, fault)
-            give_column(slots, own, TERMS + 2 * BLOCK, gravity, column, begin, count, fault)
+    none, (slots, fault) = np.empty(0), work_space(route, GRAVITY, gravity_vector)
+    _sweep(bodies, route, position, speed, slots, fault, momentum, velocity_force, gravity, gravity_vector, none, none)
 
 
-@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_ONLY}, {READ_TABLE}, {READ_TABLE}, {ROW}, {ROW})")
 def sweep_energies(
     bodies: FloatArray,
     route: IndexArray,
@@ -169,18 +128,61 @@ def sweep_energies(
     potential: FloatArray,
 ) -> None:
     """T = qd.p / 2 and U = -s.g_vec of every sample, s: first moment of all moving mass about the base's origin."""
-    slots, fault = np.zeros((np.max(route[:, BEFORE]) + 2) * SLOT), np.zeros(BLOCK)
-    for j in range(3 * BLOCK):
-        slots[GRAVITY + j] = gravity_vector[j // BLOCK]
+    none, (slots, fault) = np.empty((0, 0)), work_space(route, GRAVITY, gravity_vector)
+    _sweep(bodies, route, position, speed, slots, fault, none, none, none, gravity_vector, kinetic, potential)
+
+
+@kernel(
+    f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {READ_TABLE}, {ROW}, {ROW}, {TABLE}, {TABLE}, {TABLE}, "
+    f"{READ_ONLY}, {ROW}, {ROW})"
+)
+def _sweep(
+    bodies: FloatArray,
+    route: IndexArray,
+    position: FloatArray,
+    speed: FloatArray,
+    slots: FloatArray,
+    fault: FloatArray,
+    momentum: FloatArray,
+    velocity_force: FloatArray,
+    gravity: FloatArray,
+    gravity_vector: FloatArray,
+    kinetic: FloatArray,
+    potential: FloatArray,
+) -> None:
+    """Momentum, velocity force and gravity, or else the energies: of the results those that are not empty."""
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
-        _momentum_block(bodies, route, position, speed, begin, count, slots, fault)
-        for j in range(count):
-            twice = fault[j]
+        clear(slots, fault)
+        for i in range(len(bodies)):
+            before, origin, column = route[i, BEFORE], route[i, COPY_OF], route[i, COLUMN]
+            if origin >= 0:
+                copy_motion(slots, origin, before)
+            pair = slots[before * SLOT : (before + 2) * SLOT]
+            take_column(position, column, begin, count, pair, OFFSET, fault)
+            take_column(speed, column, begin, count, pair, RATE, fault)
+            fill_sine_cosine(pair, bodies[i, SLIDES])
+            _carry_motion(bodies[i], pair)
+        for i in range(len(bodies) - 1, -1, -1):
+            before, origin = route[i, BEFORE], route[i, COPY_OF]
+            pair = slots[before * SLOT : (before + 2) * SLOT]
+            _joint_terms(bodies[i], pair)
+            carry_load(bodies[i], pair)
+            if origin >= 0:
+                return_load(slots, origin, before)
+        if len(momentum) > 0:
             for i in range(len(bodies)):
-                own = (route[i, BEFORE] + 1) * SLOT
-                twice += slots[own + RATE + j] * slots[own + TERMS + j]
-            kinetic[begin + j] = 0.5 * twice
-            moment = get_vector(slots, S + j)
-            lifted = moment[0] * gravity_vector[0] + moment[1] * gravity_vector[1] + moment[2] * gravity_vector[2]
-            potential[begin + j] = fault[j] - lifted
+                own, column = route[i, BEFORE] + 1, route[i, COLUMN]
+                give_column(slots, own, TERMS, momentum, column, begin, count, fault)
+                give_column(slots, own, TERMS + BLOCK, velocity_force, column, begin, count, fault)
+                give_column(slots, own, TERMS + 2 * BLOCK, gravity, column, begin, count, fault)
+        if len(kinetic) > 0:
+            for j in range(count):
+                twice = fault[j]
+                for i in range(len(bodies)):
+                    own = (route[i, BEFORE] + 1) * SLOT
+                    twice += slots[own + RATE + j] * slots[own + TERMS + j]
+                kinetic[begin + j] = 0.5 * twice
+                moment = get_vector(slots, S + j)
+                lifted = moment[0] * gravity_vector[0] + moment[1] * gravity_vector[1] + moment[2] * gravity_vector[2]
+                potential[begin + j] = fault[j] - lifted

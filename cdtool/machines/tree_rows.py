@@ -48,6 +48,13 @@ VECTOR = "UniTuple(float64, 3)"
 MATRIX = "UniTuple(float64, 9)"
 
 
+def work_space(route: IndexArray, first: int, base: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Slots for a sweep, with a vector in the rows of the base's slot from `first` on, and a row of faults."""
+    slots = np.zeros((int(route[:, BEFORE].max()) + 2) * SLOT)
+    slots[first : first + 3 * BLOCK] = np.repeat(base, BLOCK)
+    return slots, np.zeros(BLOCK)
+
+
 @kernel(f"{VECTOR}({ROW}, int64)")
 def get_vector(rows: FloatArray, first: int) -> Vector:
     """Three rows at one sample."""

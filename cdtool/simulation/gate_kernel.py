@@ -160,8 +160,10 @@ def integrate_gate(
         integrator += (integral_gain * error + anti_windup_rate * (reference_force - wanted)) * sample_period
 
         for substep in range(substeps):
-            total[:] = 0.0
-            trial[:] = state
+            # Element by element: array assignments would triple the time to compile.
+            for index in range(7):
+                total[index] = 0.0
+                trial[index] = state[index]
             for stage in range(4):
                 if stage > 0:
                     reach = step if stage == 3 else 0.5 * step
@@ -225,7 +227,8 @@ def integrate_gate(
                 slope[5] = (post - contact) / post_mass
                 slope[6] = (reference_force - f_m) / current_lag
                 if stage == 0 and substep == 0:
-                    log[:7, sample] = state
+                    for index in range(7):
+                        log[index, sample] = state[index]
                     log[7, sample] = contact
                     log[8, sample] = slope[3]
                     log[9, sample] = counted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -83,7 +84,7 @@ def _predict(
     p00 = p01 = p02 = p11 = p12 = p22 = 0.0
     for k in range(len(values)):
         h = step[k]
-        if h == np.inf:
+        if h == math.inf:
             a0, a1, a2 = values[k], 0.0, 0.0
             p00, p01, p02, p11, p12 = 1e6, 0.0, 0.0, 1e6, 0.0
             # Without variance the square term stays 0: a line.

@@ -18,7 +18,7 @@ from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.kernels import compile_loaded
+from cdtool.kernel_warm_up import compile_loaded
 from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold

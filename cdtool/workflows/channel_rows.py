@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.formats.channel_assembly import as_logged
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.reading import mapped_source
+from cdtool.formats.part_pieces import FoundParts
+from cdtool.formats.reading import choose_format
 from cdtool.formats.source import Column
 from cdtool.machine_file import MachineFile
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import FloatArray, Series
+from cdtool.workflows.channel_pieces import ChannelPieces
+from cdtool.workflows.logged import read_logged
 
 # Rows of the longest clock that are handed on at once.
 _ROWS = 1 << 16
@@ -21,9 +23,8 @@ _ROWS = 1 << 16
 class ChannelRows:
     """A recording's groups, the channels of one clock together, and their rows as often as they are asked for."""
 
-    def __init__(self, path: Path, machine_file: MachineFile) -> None:
-        source, channels = mapped_source(path, machine_file)
-        self._recording: Recording = as_logged(source, channels, machine_file.machine)
+    def __init__(self, log: Path, machine_file: MachineFile) -> None:
+        self._recording = read_logged(log, machine_file).recording
         self.origin, self.findings = self._recording.origin, self._recording.findings
         clocks: dict[bytes, list[str]] = {}
         for name, series in self._recording.channels.items():
@@ -47,6 +48,23 @@ class ChannelRows:
         first = self._recording[channels[0]]
         columns = tuple(_header(channel, self._recording[channel]) for channel in channels)
         return Group(name, columns, len(first), True, float(first.time[0]), self._recording.joints)
+
+
+def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelPieces:
+    """The channels of a log or of its folder of parts: of MCAP files in pieces, of others in memory.
+
+    A coarse clock is made a straight line as a whole, and the torque of a duty needs the speed beside it: they are held
+    in memory, too. Raises RecordingError or ConfigurationError.
+    """
+    folder = FoundParts.of(log) if log.is_dir() else None
+    files = (log,) if folder is None else folder.filled
+    mapped = machine_file.topics.sources
+    plain = bool(mapped) and not any(item.duty for item in mapped)
+    if files and plain and all(choose_format(path).name == "mcap" for path in files):
+        pieces = ChannelPieces(files, machine_file, folder)
+        if not pieces.is_coarse:
+            return pieces
+    return ChannelRows(log, machine_file)
 
 
 def _header(name: str, series: Series) -> Column:

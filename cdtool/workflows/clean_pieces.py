@@ -13,7 +13,7 @@ from cdtool.recording import BoolArray, Finding, FloatArray
 
 _SHOWN = 3
 # As in clock/stamps.py; a test holds the two alike.
-_STRAY_SHARE, _RESTART_ROWS = 0.01, 3
+_STRAY_SHARE, _RESTART_ROWS, _COARSE_SHARE = 0.01, 3, 0.2
 _COUNTERS = (16, 32)
 
 
@@ -91,8 +91,8 @@ class _Restart:
 class CleanPieces:
     """Stamps [s] -> strictly increasing times; what is missing, repeated or runs backward is dropped.
 
-    A coarse clock, whose stamps repeat (clean_time makes a straight line of it), does not come here: guess_clock takes
-    no column for a clock that stands still at more than a fifth of its steps.
+    Of a coarse clock, whose stamps repeat, clean_time makes a straight line: this says only that it `is_coarse`.
+    guess_clock takes no column for a clock that stands still at more than a fifth of its steps.
     """
 
     def __init__(self) -> None:
@@ -103,6 +103,11 @@ class CleanPieces:
 
     def times(self, stamps: FloatArray, counted: FloatArray) -> FloatArray:
         """The times of those rows of a piece that are kept; `counted` are the stamps as the file has them."""
+        times: FloatArray = stamps[self.keep(stamps, counted)]
+        return times
+
+    def keep(self, stamps: FloatArray, counted: FloatArray) -> BoolArray:
+        """Which rows of a piece are kept."""
         known = np.isfinite(stamps)
         before, self._rows = self._rows, self._rows + len(stamps)
         index, kept = np.flatnonzero(known), stamps[known]
@@ -113,8 +118,15 @@ class CleanPieces:
         self._backward.add(index[backward], before)
         self._repeated.add(index[repeated], before)
         self._restart.add(counted[known], backward)
-        times: FloatArray = kept[~(backward | repeated)]
-        return times
+        keep = known
+        keep[index[backward | repeated]] = False
+        return keep
+
+    @property
+    def is_coarse(self) -> bool:
+        """So many stamps repeat that clean_time would make a straight line of the clock."""
+        known = self._rows - self._unknown.count
+        return known > 0 and self._repeated.count / known > _COARSE_SHARE
 
     def findings(self, first_row: int) -> list[Finding]:
         """What was dropped; `first_row` is the file's line of the first sample (0: not known)."""
@@ -122,32 +134,49 @@ class CleanPieces:
         return [rows.finding(self._rows, first_row, why) for rows, why in kinds if rows.count]
 
 
-def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Finding]:
+class Gaps:
     """Gaps and jitter of strictly increasing times [s] whose median step is `period` [s]."""
-    last, count, total = np.empty(0), 0, 0
-    shown: list[str] = []
-    regular, mean, squares = 0, 0.0, 0.0  # steps that are no gaps, and their spread so far
-    for piece in times:
-        total += len(piece)
-        time = np.concatenate((last, piece))
+
+    def __init__(self, period: float, channel: str) -> None:
+        self._period, self._channel = period, channel
+        self._last, self._total, self._count = np.empty(0), 0, 0
+        self._shown: list[str] = []
+        self._regular, self._mean, self._squares = 0, 0.0, 0.0  # steps that are no gaps, and their spread so far
+
+    def add(self, times: FloatArray) -> None:
+        """The times of a piece."""
+        self._total += len(times)
+        time = np.concatenate((self._last, times))
         steps = np.diff(time)
-        gaps = np.flatnonzero(steps > GAP_PERIODS * period)
-        count += len(gaps)
-        shown += [f"{time[i]:.3f} s ({steps[i] * 1e3:.0f} ms)" for i in gaps[: _SHOWN - len(shown)]]
-        usual = steps[steps <= GAP_PERIODS * period]
+        gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
+        self._count += len(gaps)
+        self._shown += [f"{time[i]:.3f} s ({steps[i] * 1e3:.0f} ms)" for i in gaps[: _SHOWN - len(self._shown)]]
+        usual = steps[steps <= GAP_PERIODS * self._period]
         if len(usual):
-            share = len(usual) / (regular + len(usual))
-            off = float(usual.mean()) - mean
-            squares += float(usual.var()) * len(usual) + off * off * regular * share
-            regular, mean = regular + len(usual), mean + off * share
-        last = time[-1:]
-    found = []
-    if total > 2:  # fewer stamps have no usual step
-        if count:
-            more = f" and {count - _SHOWN} more" if count > _SHOWN else ""
-            found.append(Finding(f"{count} gaps after {', '.join(shown)}{more}", channel))
-        jitter = float(np.sqrt(squares / regular)) / period if regular else 0.0
+            share = len(usual) / (self._regular + len(usual))
+            off = float(usual.mean()) - self._mean
+            self._squares += float(usual.var()) * len(usual) + off * off * self._regular * share
+            self._regular, self._mean = self._regular + len(usual), self._mean + off * share
+        self._last = time[-1:]
+
+    def findings(self) -> list[Finding]:
+        """What is odd about the steps."""
+        found: list[Finding] = []
+        if self._total <= 2:  # fewer stamps have no usual step
+            return found
+        if self._count:
+            more = f" and {self._count - _SHOWN} more" if self._count > _SHOWN else ""
+            found.append(Finding(f"{self._count} gaps after {', '.join(self._shown)}{more}", self._channel))
+        jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
         if jitter > 0.1:
-            text = f"the sample period varies by {100 * jitter:.0f} % (std) about {period * 1e3:.3g} ms"
-            found.append(Finding(text, channel))
-    return found
+            text = f"the sample period varies by {100 * jitter:.0f} % (std) about {self._period * 1e3:.3g} ms"
+            found.append(Finding(text, self._channel))
+        return found
+
+
+def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Finding]:
+    """Gaps and jitter of a clock whose times [s] come piece by piece."""
+    gaps = Gaps(period, channel)
+    for piece in times:
+        gaps.add(piece)
+    return gaps.findings()

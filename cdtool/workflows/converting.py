@@ -7,26 +7,32 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cdtool.errors import UsageError, nearest
+from cdtool.errors import RecordingError, UsageError, nearest
 from cdtool.formats.channel_assembly import file_digest
-from cdtool.formats.groups import UNVERIFIED, Group, Writer
+from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
+from cdtool.formats.part_pieces import FoundParts
+from cdtool.formats.parts import joined_digest
 from cdtool.formats.reading import log_parts
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import Finding
 from cdtool.version import __version__
-from cdtool.workflows.channel_rows import ChannelRows
+from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.converted_machine import converted_machine
 from cdtool.workflows.log_rows import LogRows
 from cdtool.workflows.written_file import written_file
+
+if TYPE_CHECKING:
+    from cdtool.workflows.runs import Progress
 
 _WRITERS = {
     ".csv": "cdtool.formats.csv_writing:write_csv_table",
     ".mcap": "cdtool.formats.mcap_writing:write_mcap_topics",
     ".parquet": "cdtool.formats.parquet_writing:write_table",
     ".feather": "cdtool.formats.parquet_writing:write_table",
-    ".h5": "cdtool.formats.hdf5:write_hdf5",
-    ".hdf5": "cdtool.formats.hdf5:write_hdf5",
+    ".h5": "cdtool.formats.hdf5_writing:write_hdf5",
+    ".hdf5": "cdtool.formats.hdf5_writing:write_hdf5",
     ".mf4": "cdtool.formats.mdf:write_mdf",
     ".tdms": "cdtool.formats.tdms:write_tdms",
 }
@@ -46,37 +52,66 @@ class Converted:
 
 
 def convert(
-    source: str | Path, output: str | Path, *, machine: str | Path | MachineFile | None = None, force: bool = False
+    source: str | Path,
+    output: str | Path,
+    *,
+    machine: str | Path | MachineFile | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
 ) -> Converted:
     """Write a log's mapped channels (as logged, SI), or without a machine file all its numeric columns, to `output`.
 
-    Nothing is resampled: each channel keeps its own clock. A CSV table has but one: of several clocks each gets a file
-    of its own, `output` with `.1`, `.2` before the suffix. Values are float64 to the bit. With a machine file another
-    one is written beside each file, which reads it. Raises UsageError for an unknown suffix and where a file is there.
+    A folder of parts, as rosbag2 makes it, is one log. Nothing is resampled: each channel keeps its own clock. A CSV
+    table has but one: of several clocks each gets a file of its own, `output` with `.1`, `.2` before the suffix. Values
+    are float64 to the bit. With a machine file another one is written beside each file, which reads it. Raises
+    UsageError for an unknown suffix and where a file is there.
     """
     log, target = Path(source), Path(output)
     writer = _writer(target)
     parts = log_parts(log)
-    if len(parts) > 1:
-        raise UsageError(f"{log}: is a log in {len(parts)} parts", "convert them one by one")
+    _check_apart(target, log, parts)
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows = ChannelRows(parts[0], machine_file) if machine_file else LogRows(parts[0])
+    rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
-    _check_free([*names, *companions], log, force)
-    provenance = _provenance(parts[0], rows.origin, machine_file, rows.findings)
+    _check_free([*names, *companions], parts, force)
+    provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
+    course = _Course(log, sum(group.rows for group in rows.groups), progress)
     with ExitStack() as stack:  # all of them or none
         for i, (path, part) in enumerate(pieces):
-            written = writer(stack.enter_context(written_file(path)), part, rows.parts(part), provenance)
+            ready = course.of(rows.parts(part))
+            written = writer(stack.enter_context(written_file(path)), part, ready, provenance)
             if machine_file is not None:
                 text = converted_machine(machine_file, path, part, written, companions[i])
                 stack.enter_context(written_file(companions[i])).write_text(text, encoding="utf-8")
     width = sum(len(parts) for group in rows.groups for parts in group.flat)
     made = tuple(map(str, names)), tuple(map(str, companions))
     return Converted(str(log), *made, width, len(rows.groups), tuple(rows.findings))
+
+
+@dataclass
+class _Course:
+    """The rows of a log on their way to the writer, counted: `rows` of them in all."""
+
+    log: Path
+    rows: int
+    progress: Progress | None
+    _done: int = 0
+
+    def of(self, parts: Parts) -> Parts:
+        """The parts as they come; what goes wrong as they are read is no fault of the file that is written."""
+        try:
+            for ready in parts:
+                yield ready
+                self._done += sum(len(part) for part in ready if part is not None)
+                if self.progress:
+                    self.progress(self._done, self.rows)
+        except OSError as fault:
+            text = f"{self.log}: cannot be read: {fault.strerror or fault}"
+            raise RecordingError(text, "check the disk it is on") from fault
 
 
 def _writer(target: Path) -> Writer:
@@ -88,9 +123,16 @@ def _writer(target: Path) -> Writer:
     return writer
 
 
-def _check_free(paths: Sequence[Path], log: Path, force: bool) -> None:
+def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
+    """A file of the parts' kind in their folder would be one of them from then on."""
+    alike = target.suffix.lower() == parts[0].suffix.lower()
+    if log.is_dir() and alike and target.parent.is_dir() and target.parent.samefile(log):
+        raise UsageError(f"{target}: would be a part of the log", "write it to another folder")
+
+
+def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> None:
     for path in paths:
-        if path.exists() and log.exists() and path.samefile(log):
+        if path.exists() and any(path.samefile(part) for part in parts):
             raise UsageError(f"{path}: is the log itself", "choose another name")
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already", "choose another name, or overwrite it with --force")
@@ -105,14 +147,20 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 
 
 def _provenance(
-    path: Path, origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
+    log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
 ) -> Mapping[str, str]:
+    """Of a log in parts each part's name and SHA-256, too; `sha256` is then that of these digests."""
+    if log.is_dir():
+        parts = FoundParts.of(log).every  # in the order of time
+    digests = {part.name: file_digest(part) for part in parts}
     told = {
-        "source": path.name,
-        "sha256": file_digest(path),
+        "source": log.name or log.resolve().name,
+        "sha256": joined_digest(list(digests.values())),
         "version": __version__,
         "origin_s": repr(origin),
     }
+    if log.is_dir():
+        told["parts"] = "; ".join(f"{name} {digest}" for name, digest in digests.items())
     if lost := [str(finding) for finding in findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
     if unverified := [finding.message for finding in findings if finding.message.endswith(": unverified")]:

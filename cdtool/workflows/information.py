@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from cdtool.workflows.accelerometer_check import accelerometer_findings
 from cdtool.workflows.motion_check import bandwidth_findings, motion_findings
 
 if TYPE_CHECKING:
-    from cdtool.formats.source import Column, Source
+    from cdtool.formats.source import Column
     from cdtool.workflows.log_figures import ClockFigures, LogFigures
 
 
@@ -101,8 +101,13 @@ def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.formats.csv import TableSource
+    from cdtool.formats.parts import joined_details
+    from cdtool.workflows.logged import read_logged
 
-    told, recording = _read(log, machine_file)
+    read = read_logged(log, machine_file)
+    files, low_pass = read.files, read.speed_low_pass
+    recording: Recording = machine_file.machine.referred_to_load(read.recording, low_pass)
+    del read
     channels = [
         _channel(_label(name, recording, j), series, j)
         for name, series in recording.channels.items()
@@ -110,25 +115,9 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     ]
     findings = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording)]
     findings += bandwidth_findings(recording, machine_file)
-    dialect = told.dialect if isinstance(told, TableSource) else ""
-    return Info(str(log), told.format, told.details, tuple(channels), tuple(dict.fromkeys(findings)), dialect)
-
-
-def _read(log: Path, machine_file: MachineFile) -> tuple[Source, Recording]:
-    """What the file itself tells, without its columns, and the recording; that of a log in parts too."""
-    from cdtool.formats.channel_assembly import assemble
-    from cdtool.formats.part_pieces import log_pieces
-    from cdtool.formats.pieces import Run
-    from cdtool.formats.reading import mapped_source, read_recording
-
-    if log.is_dir():
-        run = Run(log_pieces(log))
-        for _ in run:
-            pass
-        return run.source, read_recording(log, machine_file)
-    source, channel_map = mapped_source(log, machine_file)
-    recording: Recording = assemble(source, channel_map, machine_file.machine)
-    return replace(source, columns={}), recording
+    dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
+    found = tuple(dict.fromkeys(findings))
+    return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

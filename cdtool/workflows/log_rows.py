@@ -12,8 +12,8 @@ import numpy as np
 
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.mcap_writing import exact_pieces, exact_times
+from cdtool.formats.part_pieces import in_time_order, log_pieces
 from cdtool.formats.pieces import Piece, Pieces, read_pieces
-from cdtool.formats.reading import choose_format, has_topics
 from cdtool.formats.source import Column, Format, split_unit
 from cdtool.formats.time_order import by_time, values_of
 from cdtool.recording import FloatArray
@@ -36,14 +36,13 @@ class _Pick:
 
 
 class LogRows:
-    """A log that is read piece by piece: its groups, and their rows as often as they are asked for.
+    """A log, in one file or parts, read piece by piece: its groups, and their rows as often as they are asked for.
 
     A table's clock is guessed, since some containers need one. Topics with the same times, to the bit, are one group.
     """
 
     def __init__(self, path: Path) -> None:
-        found = choose_format(path)
-        self._figures = LogFigures(partial(_opened, found, path), has_topics(found))
+        self._figures = LogFigures(partial(log_pieces, path, read=_opened), in_time_order(path))
         source = self._figures.source
         self.origin, self.findings = source.origin, source.findings
         self.groups: list[Group] = []
@@ -123,7 +122,7 @@ class LogRows:
 
 
 def _opened(found: Format, path: Path, keys: Collection[str] | None) -> Pieces:
-    """A log's pieces; of an MCAP file that cdtool itself converted with the exact times: a message's are whole ns."""
+    """A file's pieces; of an MCAP file that cdtool itself converted with the exact times: a message's are whole ns."""
     pieces = read_pieces(found, path, keys)
     told = exact_times(path) if found.name == "mcap" else None
     return pieces if told is None else exact_pieces(pieces, float(told.get("cdtool.origin_s", "0")))

@@ -17,6 +17,7 @@ from cdtool.recording import Finding
 if TYPE_CHECKING:
     from cdtool.formats.mcap.container.clean_file import CleanFile
     from cdtool.formats.mcap.container.log import Log
+    from cdtool.workflows.runs import Progress
 
 _PIECE = 1 << 20
 _RECORD = "cdtool.recovered"
@@ -42,7 +43,9 @@ class Recovered:
         return not self.left_out and all(finding.severity != "loss" for finding in self.findings)
 
 
-def recover(source: Path, output: Path, unverified: bool = False, *, force: bool = False) -> Recovered:
+def recover(
+    source: Path, output: Path, unverified: bool = False, *, force: bool = False, progress: Progress | None = None
+) -> Recovered:
     """Write what is left of an MCAP file as a clean one; raises RecordingError where nothing is, UsageError.
 
     Messages are copied byte for byte. Those that no CRC covers (it is lost, or the writer made none) are left out, or,
@@ -71,11 +74,13 @@ def recover(source: Path, output: Path, unverified: bool = False, *, force: bool
     left_out = surveyed.unverified - kept
     result = Recovered(str(source), str(output), surveyed.count - left_out, kept, left_out, tuple(findings))
     with _replacing(output) as file:
-        _write(source, file, result, all_covered=surveyed.unverified == 0)
+        _write(source, file, result, surveyed.unverified == 0, progress)
     return result
 
 
-def _write(source: Path, file: IO[bytes], result: Recovered, all_covered: bool) -> None:
+def _write(
+    source: Path, file: IO[bytes], result: Recovered, all_covered: bool, progress: Progress | None = None
+) -> None:
     from cdtool.formats.mcap.container.clean_file import CleanFile
     from cdtool.formats.mcap.container.log import Log
     from cdtool.formats.mcap.container.records import Metadata
@@ -89,6 +94,8 @@ def _write(source: Path, file: IO[bytes], result: Recovered, all_covered: bool) 
         rest = [item for item in piece if not (all_covered or item.covered)]
         if rest and result.unverified:
             clean.add_messages(rest, covered=False)
+        if progress:
+            progress(log.count, result.messages + result.left_out)
     if log.unverified != result.unverified + result.left_out:
         raise RecordingError(f"{source}: changed while it was read", "wait until its recorder has closed it")
     _copy_extras(log, clean)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdtool.errors import CdtoolError, UsageError
+from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.plain_text import plain
 
 # A file's kind shows in its first bytes.
@@ -19,7 +19,8 @@ _HEAD = 1 << 13
 def written_file(target: Path) -> Iterator[Path]:
     """A path to write to, with the target's suffix; it becomes `target` where the block ends without an error.
 
-    Where it ends with one nothing is left behind. Raises UsageError where the folder is missing or cannot be written.
+    Where it ends with one nothing is left behind. Raises UsageError where the folder is missing or cannot be written,
+    RecordingError where writing fails in the block or behind it, on a full disk for instance.
     """
     if target.is_dir():
         raise UsageError(f"{target}: is a folder", "give the name of a file")
@@ -33,11 +34,16 @@ def written_file(target: Path) -> Iterator[Path]:
     part = Path(name)
     try:
         yield part
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())  # a disk that is full may show only now
         part.chmod(0o644)
         part.replace(target)
     except CdtoolError as fault:
         # Nobody knows the temporary file by its name.
         raise type(fault)(fault.message.replace(str(part), str(target)), fault.hint) from fault
+    except OSError as fault:
+        why = os.strerror(fault.errno) if fault.errno else " ".join(str(fault).split())[:200]
+        raise RecordingError(f"{target}: cannot be written: {why}", "check the folder and its space") from fault
     finally:
         part.unlink(missing_ok=True)
 

@@ -84,12 +84,6 @@ def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
     assert read_recording(path, machine(layout))["speed"].time.tolist() == [0, 1, 2, 3, 4]
 
 
-def test_a_blank_line_in_one_column_is_told_as_a_loss(log):
-    source = Csv().columns(log("x\n1.5\n2.5\n\n3.5\n4.5\n"))
-    assert told(source, "loss") == ["line 4 skipped: blank, perhaps missing samples"]
-    assert told(Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9)))), "loss") == []
-
-
 @pytest.mark.parametrize("head", ["", "t;x;y\n"], ids=["no header", "header"])
 def test_a_first_row_of_empty_cells_is_no_header(log, head):
     source = Csv().columns(log(head + ";;\n0;1;2\n1;2;3\n"))

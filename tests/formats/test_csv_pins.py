@@ -124,7 +124,7 @@ def test_a_counter_with_a_rate_is_a_clock_with_its_gaps(log, machine):
 def test_days_of_excel_are_refused_as_seconds_and_read_where_pinned(log, machine):
     rows = "t,i_motor,n_motor\n" + "".join(f"{45750.5 + i * 0.001 / 86400:.12f},1,{i}\n" for i in range(20))
     seconds = COLUMNS.replace('"ms"', '"s"')
-    with pytest.raises(RecordingError, match="days of Excel, or s"):
+    with pytest.raises(RecordingError, match=r"days of Excel \(2025-04-03 12:00:00, 1000 Hz\), or 45750\.5 s at 86"):
         read_recording(log(rows), machine(seconds))
     recording = read_recording(log(rows), machine(seconds + '[csv]\ntime_format = "excel"\n'))
     assert recording["speed"].time == pytest.approx(np.arange(20) * 0.001, abs=1e-6)

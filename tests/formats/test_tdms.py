@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
+from cdtool.formats.library_lines import collected_lines
 from cdtool.formats.reading import survey
 from cdtool.formats.tdms import Tdms
 
@@ -83,3 +86,93 @@ def test_damaged_files_are_one_line(saved):
             Tdms().columns(path)
         except RecordingError as fault:
             assert "\n" not in str(fault)
+
+
+START = np.datetime64("2025-03-04T05:06:07.5", "us")
+
+
+def later(seconds: float) -> np.datetime64:
+    return START + np.timedelta64(int(seconds * 1e6), "us")
+
+
+def test_of_waveforms_of_which_only_some_tell_their_start_the_others_keep_their_distance(saved):
+    path = saved(
+        [
+            channel("m", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=later(0.0)),
+            channel("m", "F", np.arange(5.0), wf_increment=0.01, wf_start_time=later(3600.25)),
+            channel("m", "n", np.arange(5.0), wf_increment=0.01, wf_start_offset=0.5),
+        ]
+    )
+    source = survey(path)
+    starts = {key: float(column.time[0]) for key, column in source.columns.items()}
+    assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
+    assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
+    (told,) = [finding for finding in source.findings if finding.severity == "warning"]
+    assert "(wf_start_time), n not: taken to begin with the first of them" in told.message
+
+
+def test_a_start_in_1904_is_an_empty_stamp_and_none(saved):
+    empty = np.datetime64("1904-01-01T00:00:00", "us")
+    rows = [channel("m", name, np.arange(5.0), wf_increment=0.01, wf_start_time=empty) for name in "ab"]
+    source = survey(saved(rows))
+    assert source.origin == 0.0 and not source.findings
+    source = survey(saved([*rows, channel("m", "c", np.arange(5.0), wf_increment=0.01, wf_start_time=START)]))
+    assert "a, b not: taken to begin" in str(source.findings[0])
+
+
+def test_an_increment_that_is_a_whole_number_is_a_clock_too(saved):
+    source = survey(saved([channel("m", "i", np.arange(5.0), wf_increment=2)]))
+    assert source.columns["i"].time.tolist() == [0, 2, 4, 6, 8]
+
+
+def test_stamps_in_nanoseconds_since_1970_are_exact_beside_waveforms(saved):
+    first = int(START.astype("datetime64[ns]").astype(np.int64)) + 123_456_789
+    stamps = first + np.cumsum(np.random.default_rng(5).integers(900_001, 1_100_000, 200))
+    path = saved(
+        [
+            channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
+            channel("b", "time", stamps, unit_string="ns"),
+            channel("b", "F", np.arange(200.0)),
+        ]
+    )
+    source = survey(path)
+    nanoseconds = stamps - first + 123_456_789
+    assert np.allclose(source.columns["F"].time, nanoseconds / 1e9, rtol=1e-15, atol=0.0)
+    assert source.columns["i"].time[0] == 0.0
+    assert "time: 200 values beyond 2^53" in " ".join(map(str, source.findings))
+
+
+def test_a_clock_that_counts_from_its_own_start_stays_there_and_is_told(saved):
+    path = saved(
+        [
+            channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
+            channel("b", "time", np.arange(5.0) / 1000.0, unit_string="s"),
+            channel("b", "F", np.arange(5.0)),
+        ]
+    )
+    source = survey(path)
+    assert source.columns["F"].time.tolist() == [0.0, 0.001, 0.002, 0.003, 0.004]
+    assert any("F not: taken to begin with the first" in str(finding) for finding in source.findings)
+
+
+def test_what_the_library_would_print_is_told_and_not_printed(saved, capfd, caplog):
+    path = saved([channel("m", "v", np.arange(100.0))])
+    path.write_bytes(path.read_bytes()[:-30])
+    handlers = list(logging.getLogger("nptdms.reader").handlers)
+    source = survey(path)
+    assert capfd.readouterr() == ("", "") and not caplog.records
+    told = [finding for finding in source.findings if finding.message.startswith("npTDMS says: Last segment")]
+    assert [finding.severity for finding in told] == ["note"]
+    assert [finding.severity for finding in source.findings].count("loss") == 1
+    assert logging.getLogger("nptdms.reader").handlers == handlers
+
+
+def test_only_the_lines_of_the_library_are_collected(caplog):
+    ours, other = logging.getLogger("nptdms.reader"), logging.getLogger("another")
+    with collected_lines("nptdms") as lines:
+        ours.warning("odd %d", 3)
+        ours.debug("not worth a word")
+        other.warning("of another one")
+    ours.warning("later")
+    assert lines == ["odd 3"]
+    assert [record.getMessage() for record in caplog.records] == ["of another one", "later"]

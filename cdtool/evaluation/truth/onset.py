@@ -2,7 +2,8 @@
 
 Conventions: the baseline and the noise come from the samples before the contact; a contact begins where the force,
 followed back from the first of `samples` samples above the upper level, left the lower level. State the rule in every
-report: in soft impacts the cell feels the contact tens of milliseconds after touch.
+report: in soft impacts the cell feels the contact tens of milliseconds after touch. The steps in which the cell reads
+come from the whole log: the truth is found afterwards, and nothing live rests on it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ _BASELINE_SHARE = 0.1
 _BASELINE_SAMPLES = 20
 # A standard deviation from the median absolute deviation of Gaussian noise.
 _MAD = 1.4826
+# Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
+_ROUNDING = 12.0**-0.5
+# Readings closer than this share of the largest one differ by what arithmetic rounds, not by a step of the cell.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,20 @@ def baseline(force: FloatArray) -> tuple[float, float]:
     return rest, _MAD * float(np.median(np.abs(first - rest)))
 
 
+def reading_step(force: FloatArray) -> float:
+    """The step in which a load cell (n,) reads [N]: the smallest distance between two of its readings; 0 of one alone.
+
+    Where it is coarser than the cell's noise, the median absolute deviation is 0 although the reading flickers by a
+    step: the noise is then no less than the rounding's own, step / sqrt(12) (Widrow and Kollar, Quantization Noise,
+    2008), so that 8 standard deviations are 2.3 steps. A cell that gives two readings only, such as a switch, has no
+    step beside its contacts, which stay below that: it is a `label`, or needs a level by hand. `force` holds no missing
+    samples.
+    """
+    distances = np.diff(np.unique(force))
+    distances = distances[distances > _SAME * float(np.max(np.abs(force)))]
+    return float(distances.min()) if len(distances) else 0.0
+
+
 def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
     series = recording["force"]
     present = np.isfinite(series.values[:, 0])
@@ -78,6 +97,7 @@ def _from_force(recording: Recording, rule: OnsetRule) -> list[Contact]:
     if len(force) < rule.samples + 2:
         return []
     rest, noise = baseline(force)
+    noise = max(noise, _ROUNDING * reading_step(force))
     above = rule.above if rule.above is not None else max(rule.sigmas * noise, 1e-9)
     back_to = min(rule.back_to if rule.back_to is not None else 0.5 * above, above)
     over = np.abs(force - rest)

@@ -7,16 +7,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from cdtool.channels import ChannelMap, TablePins
+from cdtool.channels import ChannelMap, TablePins, TimeSource
 from cdtool.errors import RecordingError, UsageError
+from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.source import Column, Source, column_key, split_unit, wanted_keys
+from cdtool.formats.source import Column, Source, column_key, wanted_keys
 from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Csv:
     """Tables of text: separator, header, decimal mark and encoding are found from the first lines, or pinned."""
 
     name: ClassVar[str] = "csv"
-    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat")
+    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat", ".lvm")
 
     def sniff(self, path: Path) -> bool:
         """True if the file starts as text that is no markup."""
@@ -48,15 +49,8 @@ class Csv:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> TableSource:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError with the line number."""
-        from cdtool.formats.csv.table import read_table
-
         dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
-        names = dialect.names
-        keys = list(names) if wanted is None else wanted_keys(path, wanted, names)
-        clock = None
-        if wanted is not None and wanted.time.column is not None:
-            clock = column_key(wanted.time.column, names)
-        return _source(path, dialect, read_table(path, dialect, keys, clock, wanted))
+        return _survey(path, dialect) if wanted is None else _wanted(path, dialect, wanted)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """All numeric columns, or those of `keys`, a MiB of the file at a time; raises RecordingError."""
@@ -79,11 +73,46 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     return find_dialect(path, sample, pins)
 
 
+def _survey(path: Path, dialect: Dialect) -> TableSource:
+    from cdtool.formats.csv.several_clocks import Clocks, clock_findings
+    from cdtool.formats.csv.table import read_table
+
+    table = read_table(path, dialect, dialect.names, None, None)
+    table.findings += clock_findings(dialect, Clocks.by_names(dialect), table.values)
+    return _source(path, dialect, table)
+
+
+def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
+    from cdtool.formats.csv.table import read_table
+
+    names, time = dialect.names, wanted.time
+    clock = column_key(time.column, names) if time.column is not None else None
+    clocks = Clocks.by_names(dialect, clock)
+    own = time.column == OWN_CLOCK and time.factor == 1.0
+    if len(clocks.groups) < 2 or (clock is None and not own):
+        return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
+    keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
+    table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
+    other = other_clock(dialect, clocks, clock, keys, table.values) if clock is not None else ""
+    if other and not own:
+        raise RecordingError(f"{path}: {other}", HINT)
+    if clock is not None and not other:
+        table.values = {key: values for key, values in table.values.items() if key in keys}
+        return _source(path, dialect, table)
+    if clock is not None:  # as it stands in the file, beside the others
+        table.values[clock] = table.values[clock] + table.origin
+    asked = [key for key in keys if key != clock]
+    columns, origin, told = own_clocks(path, dialect, clocks, asked, table.values)
+    table.values, table.findings = {}, [*table.findings, *told]
+    return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
+
+
 def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
-    names = dialect.names
-    told = {name: dialect.units[i] for i, name in enumerate(names) if i < len(dialect.units)}
+    from cdtool.formats.csv.several_clocks import told_unit
+
     columns = {
-        key: Column(key, values, unit="s" if key in table.stamped else split_unit(key)[1] or _bare(told.get(key)))
+        key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
         for key, values in table.values.items()
     }
     return TableSource(
@@ -93,7 +122,7 @@ def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
         origin=table.origin,
         findings=(*dialect.findings, *table.findings),
         details=dialect.details,
-        names=names,
+        names=dialect.names,
         first_row=dialect.first_line if table.unbroken else 0,
         dialect=dialect.as_pins,
     )
@@ -108,11 +137,3 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
     values = np.column_stack(list(columns.values()))
     body = (row * len(values)) % tuple(values.ravel().tolist())
     path.write_text(",".join(columns) + "\n" + body, encoding="utf-8", newline="\n")
-
-
-def _bare(unit: str | None) -> str | None:
-    """A cell of the row of units without its brackets."""
-    text = (unit or "").strip()
-    if text[:1] + text[-1:] in ("[]", "()"):
-        text = text[1:-1].strip()
-    return text if text not in ("", "-") else None

@@ -11,6 +11,7 @@ from typing import Any
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
+from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
 from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
 from cdtool.formats.csv.doubtful_commas import refuse_commas_that_may_be_decimal, refuse_one_column_of_decimals
 from cdtool.formats.csv.doubtful_points import settled_marks
@@ -38,6 +39,7 @@ class Dialect:
     `kinds` has one letter a cell: N numbers, T stamps, X words, M nothing in the sample. `trailing`: each row ends
     with a separator, so that its last cell is none. `stamped` and `words` are of the columns T and X, by their number.
     `commented`: the sample has comments that are no rows; `sampled` counts its rows; `preamble`: lines above them.
+    `blank_is_missing`: a blank line is a row whose only cell is empty.
     """
 
     text: Text
@@ -60,6 +62,7 @@ class Dialect:
     width: int
     kinds: str
     trailing: bool
+    blank_is_missing: bool
     stamped: dict[int, Stamped]
     words: dict[int, Seen]
     findings: tuple[Finding, ...]
@@ -107,7 +110,8 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
     marks = dialect.marks if dialect.marks.sure else settled_marks(dialect)
     if marks.note:
         findings.append(Finding(marks.note, severity="warning"))
-    return replace(dialect, marks=marks, findings=(*dialect.findings, *findings))
+    text = without_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
+    return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
@@ -145,8 +149,8 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
         refuse_one_column_of_decimals(path, rows, head, data)
     findings += _findings(text, head, told)
     trailing = _trailing(head, kinds, data)
-    below = [line for line in comments if line.number > head.first.number]
-    full = {line.number for line in below if len(split_line(line.text, separator)) == cut.width}
+    below = [x for x in comments if x.number > head.first.number]
+    full = {x.number for x in below if len(split_line(x.text, separator)) == cut.width}
     layout = pins.time_format if "%" in pins.time_format else ""
     columns: dict[int, list[str]] = {
         i: [cells[i] for _, cells in data if cells[i] not in pins.missing]
@@ -158,7 +162,6 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     stamped |= {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
     words = {i: _first_words(data, i) for i, letter in enumerate(kinds) if letter in "TX"}
     names = head.names[: cut.width - trailing] if head.names is not None else None
-    header_text = tuple(line.text for line in lines if line.number in (head.header_line, head.units_line))
     return Dialect(
         text=text,
         pins=pins,
@@ -171,7 +174,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
         header_line=head.header_line,
         units=head.units,
         units_line=head.units_line,
-        header_text=header_text,
+        header_text=tuple(line.text for line in lines if line.number in (head.header_line, head.units_line)),
         from_comment=head.from_comment,
         preamble=head.preamble,
         first_line=head.first.number,
@@ -180,6 +183,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
         width=cut.width,
         kinds=kinds,
         trailing=trailing,
+        blank_is_missing=are_missing(every, head.first.number, cut.width),
         stamped=stamped,
         words=words,
         findings=tuple(findings),

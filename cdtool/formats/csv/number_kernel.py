@@ -1,8 +1,7 @@
 """A decimal number in bytes -> the nearest float64, bit for bit what Python's float() gives.
 
-Up to 2^53 with a power of ten up to 22 one exact product or quotient rounds once (Clinger 1990). Beyond, the mantissa
-is multiplied by a 128-bit power of five, whose upper bits decide the rounding (Lemire 2021, "Number parsing at a
-gigabyte per second"). What neither decides (subnormal, overflow, more than 19 digits) the caller leaves to float().
+Up to 2^53 with a power of ten up to 22 one exact product or quotient rounds once (Clinger 1990); beyond that see
+decimal_kernel. What neither decides (subnormal, overflow, more than 19 digits) the caller leaves to float().
 """
 
 from __future__ import annotations
@@ -14,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.formats.decimal_kernel import POWERS, as_float, float_bits, powers_of_five
+from cdtool.formats.decimal_kernel import UNDECIDED as TOO_CLOSE
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
@@ -22,105 +23,41 @@ Words = npt.NDArray[np.uint64]
 
 # Where a number ends is its second result; instead of it:
 NOT_A_NUMBER, UNDECIDED = -1, -2
-_SMALLEST, _LARGEST = -342, 308
 BYTES = "Array(uint8, 1, 'C', readonly=True)"
-WORDS = "Array(uint64, 1, 'C', readonly=True)"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"
 
-_U0, _U1, _U3, _U9, _U48 = np.uint64(0), np.uint64(1), np.uint64(3), np.uint64(9), np.uint64(48)
-_U10, _U32, _U63 = np.uint64(10), np.uint64(32), np.uint64(63)
-_LOW_WORD, _ALL, _MASK = np.uint64(0xFFFFFFFF), np.uint64(0xFFFFFFFFFFFFFFFF), np.uint64(0x1FF)
-_TOP_BIT, _HIDDEN, _TWICE_HIDDEN = np.uint64(1 << 63), np.uint64(1 << 52), np.uint64(1 << 53)
+_U0, _U1, _U9, _U10, _U48, _TWICE_HIDDEN = map(np.uint64, (0, 1, 9, 10, 48, 2**53))
+_NAN, _INF, _INITY, _TRUE, _FALSE = (int.from_bytes(word) for word in (b"nan", b"inf", b"inity", b"true", b"false"))
 
 
 @cache
-def powers() -> tuple[FloatArray, Words, Words]:
-    """10^0 to 10^22, and the upper and lower halves of 5^-342 to 5^308, scaled to 128 bits."""
-    fives = [_scaled_five(exponent) for exponent in range(_SMALLEST, _LARGEST + 1)]
-    high = np.array([five >> 64 for five in fives], dtype=np.uint64)
-    low = np.array([five & (2**64 - 1) for five in fives], dtype=np.uint64)
-    return np.array([float(10**k) for k in range(23)]), high, low
+def powers() -> tuple[FloatArray, Words]:
+    """10^0 to 10^22, and the powers of five of decimal_kernel."""
+    return np.array([float(10**k) for k in range(23)]), powers_of_five()
 
 
-def _scaled_five(exponent: int) -> int:
-    """5^exponent times a power of two in [2^127, 2^128): rounded down, its reciprocal up."""
-    if exponent >= 0:
-        power: int = 5**exponent
-        bits = power.bit_length()
-        return power << (128 - bits) if bits <= 128 else power >> (bits - 128)
-    power = int(5**-exponent)
-    bits = (power - 1).bit_length()
-    if exponent >= -27:
-        return int((1 << (bits + 127)) // power + 1)
-    reciprocal = (1 << (2 * bits + 128)) // power + 1
-    return int(reciprocal >> (reciprocal.bit_length() - 128))
-
-
-@kernel("UniTuple(uint64, 2)(uint64, uint64)")
-def _product(a: np.uint64, b: np.uint64) -> tuple[np.uint64, np.uint64]:
-    """Upper and lower half of a product of two 64-bit words."""
-    a_high, a_low = a >> _U32, a & _LOW_WORD
-    b_high, b_low = b >> _U32, b & _LOW_WORD
-    low = a_low * b_low
-    left, right = a_high * b_low, a_low * b_high
-    middle = (low >> _U32) + (left & _LOW_WORD) + (right & _LOW_WORD)
-    high = a_high * b_high + (left >> _U32) + (right >> _U32) + (middle >> _U32)
-    return high, (middle << _U32) | (low & _LOW_WORD)
-
-
-@kernel(f"Tuple((float64, boolean))(uint64, int64, {WORDS}, {WORDS})")
-def _nearest(mantissa: np.uint64, exponent: int, high5: Words, low5: Words) -> tuple[float, bool]:
-    """mantissa * 10^exponent rounded to the nearest float64, and whether that is decided; mantissa > 0."""
-    if exponent < -307 or exponent > 288:
-        return 0.0, False
-    shift = 0
-    word = mantissa
-    while word & _TOP_BIT == _U0:
-        word = word << _U1
-        shift += 1
-    at = exponent + 342
-    high, low = _product(word, high5[at])
-    if high & _MASK == _MASK:
-        second, _ = _product(word, low5[at])
-        low = low + second
-        if second > low:
-            high = high + _U1
-    if low == _ALL and (exponent < -27 or exponent > 55):
-        return 0.0, False
-    upper = high >> _U63
-    drop = upper + np.uint64(9)
-    digits = high >> drop
-    power: Any = ((217706 * exponent) >> 16) + 63 + np.int64(upper) - shift + 1023
-    if power <= 0 or power >= 2046:
-        return 0.0, False
-    if low <= _U1 and -4 <= exponent <= 23 and digits & _U3 == _U1 and digits << drop == high:
-        digits = digits - _U1  # exactly between two: to the even one
-    digits = (digits + (digits & _U1)) >> _U1
-    if digits >= _TWICE_HIDDEN:
-        digits = _HIDDEN
-        power += 1
-    return math.ldexp(np.float64(digits), power - 1075), True
+@kernel(f"int64({BYTES}, int64, int64)")
+def letters(data: Bytes, at: int, count: int) -> int:
+    """So many letters (at most 8) as one number, in lower case."""
+    word: Any = 0
+    for i in range(at, at + count):
+        word = 256 * word + (np.int64(data[i]) | 32)
+    return int(word)
 
 
 @kernel(f"Tuple((float64, int64))({BYTES}, int64)")
 def _word(data: Bytes, at: int) -> tuple[float, int]:
     """nan, inf, infinity, true (1) and false (0), in any case."""
-    first, second, third = data[at] | 32, data[at + 1] | 32, data[at + 2] | 32
-    if first == 110 and second == 97 and third == 110:
+    word = letters(data, at, 3)
+    if word == _NAN:
         return math.nan, at + 3
-    if first == 105 and second == 110 and third == 102:
-        end = at + 3
-        if data[end] | 32 == 105:
-            for i, letter in enumerate((105, 110, 105, 116, 121)):
-                if data[end + i] | 32 != letter:
-                    return 0.0, NOT_A_NUMBER
-            end += 5
-        return math.inf, end
-    if first == 116 and second == 114 and third == 117 and data[at + 3] | 32 == 101:
+    if word == _INF:
+        if data[at + 3] | 32 != 105:
+            return math.inf, at + 3
+        return math.inf, at + 8 if letters(data, at + 3, 5) == _INITY else NOT_A_NUMBER
+    if letters(data, at, 4) == _TRUE:
         return 1.0, at + 4
-    if first == 102 and second == 97 and third == 108 and data[at + 3] | 32 == 115 and data[at + 4] | 32 == 101:
-        return 0.0, at + 5
-    return 0.0, NOT_A_NUMBER
+    return 0.0, at + 5 if letters(data, at, 5) == _FALSE else NOT_A_NUMBER
 
 
 @kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, {FLOATS})")
@@ -158,9 +95,9 @@ def quick_number(data: Bytes, at: int, decimal: int, tens: FloatArray) -> tuple[
     return -value if negative else value, end
 
 
-@kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, int64, {FLOATS}, {WORDS}, {WORDS})")
+@kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, int64, {FLOATS}, {POWERS})")
 def read_number(
-    data: Bytes, at: int, decimal: int, thousands: int, tens: FloatArray, high5: Words, low5: Words
+    data: Bytes, at: int, decimal: int, thousands: int, tens: FloatArray, fives: Words
 ) -> tuple[float, int]:
     """The number that starts at `data[at]`, and where it ends (or NOT_A_NUMBER, UNDECIDED).
 
@@ -241,10 +178,8 @@ def read_number(
     elif not lost and mantissa <= _TWICE_HIDDEN and -22 <= exponent <= 22:
         value = np.float64(mantissa) * tens[exponent] if exponent >= 0 else np.float64(mantissa) / tens[-exponent]
     else:
-        value, sure = _nearest(mantissa, exponent, high5, low5)
-        if sure and lost:
-            above, sure = _nearest(mantissa + _U1, exponent, high5, low5)
-            sure = sure and above == value
-        if not sure:
+        bits = float_bits(mantissa, exponent, fives)
+        if bits == TOO_CLOSE or (lost and float_bits(mantissa + _U1, exponent, fives) != bits):
             return 0.0, UNDECIDED
+        value = as_float(bits)
     return -value if negative else value, p

@@ -40,7 +40,7 @@ class OddLines:
     With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
     `unread` are these cells by column, each with its line. `dropped` are the rows that are none, with their lines;
     `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none), `blank`
-    are lines that hold nothing, `words` perhaps a footer.
+    are lines that hold nothing, `empty` those of them that are rows, `words` perhaps a footer.
     """
 
     path: Path
@@ -52,6 +52,7 @@ class OddLines:
     skipped: dict[str, list[int]] = field(default_factory=dict)
     cut_line: int = 0
     blank: list[int] = field(default_factory=list)
+    empty: list[int] = field(default_factory=list)
     words: list[tuple[int, int, str]] = field(default_factory=list)
 
     def attach(self, rows: Rows, targets: Integers) -> None:
@@ -73,6 +74,8 @@ class OddLines:
         """What was skipped, each kind once; blank lines behind the last row are not worth a word."""
         found = list(self.left_out.values())
         found += [self._unread(column) for column in self.unread if column not in self.left_out]
+        if self.empty:
+            found.append(Finding(f"{shown_lines(self.empty)} blank: taken as missing samples"))
         blank = [line for line in self.blank if line < last_line]
         if blank and self.dialect.width == 1 and 2 * len(blank) < last_line - self.dialect.first_line:
             found.append(Finding(f"{shown_lines(blank)} skipped: blank, perhaps missing samples", severity="loss"))

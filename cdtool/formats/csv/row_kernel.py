@@ -11,8 +11,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.csv.number_kernel import BYTES, FLOATS, WORDS, Bytes, Words, quick_number, read_number
+from cdtool.formats.csv.number_kernel import BYTES, FLOATS, Bytes, Words, quick_number, read_number
 from cdtool.formats.csv.stamp_kernel import PROGRAMS, Programs, read_stamp
+from cdtool.formats.decimal_kernel import POWERS
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
@@ -32,9 +33,18 @@ def count_lines(data: Bytes, line_end: int) -> int:
     return count
 
 
+@kernel(f"int64({BYTES}, int64, b1)")
+def _past_blanks(data: Bytes, at: int, tabs: bool) -> int:
+    """The first byte from `at` on that is no blank, nor a tab if `tabs` count as such."""
+    p = at
+    while data[p] == 32 or (tabs and data[p] == 9):
+        p += 1
+    return p
+
+
 @kernel(
     f"void({BYTES}, int64, int64[::1], int64[::1], {PROGRAMS}, float64[:, ::1], int64[:, ::1], int64, int64[::1],"
-    f" int64[:, ::1], int64[::1], {FLOATS}, {WORDS}, {WORDS})"
+    f" int64[:, ::1], int64[::1], {FLOATS}, {POWERS})"
 )
 def read_rows(
     data: Bytes,
@@ -49,8 +59,7 @@ def read_rows(
     odd: Integers,
     counts: Integers,
     tens: FloatArray,
-    high5: Words,
-    low5: Words,
+    fives: Words,
 ) -> None:
     """Read the lines of `data[:stop]`, the last byte of which ends a line, into the rows from `row` on.
 
@@ -60,8 +69,9 @@ def read_rows(
     """
     line_end, separator, decimal, thousands = marks[0], marks[1], marks[2], marks[3]
     quote, comment = marks[4], marks[5]
+    other_end = 23 - line_end  # of \n and \r the one that ends no line
     width = len(targets)
-    tab_is_blank = separator != 9
+    tabs = separator != 9
     by_blanks = separator == BLANK_SEPARATOR
     # Outside quotes a separator is one, whatever else it may stand for.
     bare_decimal = -1 if decimal == separator else decimal
@@ -75,12 +85,9 @@ def read_rows(
     first_row = row
     while p < stop:
         begin = p
-        while (
-            data[p] == 32
-            or (data[p] == 9 and tab_is_blank)
-            or ((data[p] == 13 or data[p] == 10) and data[p] != line_end)
-        ):
-            p += 1
+        p = _past_blanks(data, p, tabs)
+        while data[p] == other_end:
+            p = _past_blanks(data, p + 1, tabs)
         if data[p] == line_end:
             blank[blanks] = line
             blanks += 1
@@ -90,91 +97,73 @@ def read_rows(
         plain = data[p] != comment
         column = 0
         while plain:
-            if quick and targets[column] >= 0:  # nearly every cell: a plain number up to the separator
+            target = targets[column]
+            if quick and target >= 0:  # nearly every cell: a plain number up to the separator
                 value, end = quick_number(data, p, bare_decimal, tens)
-                if end >= 0:
-                    if data[end] == separator and column < last:
-                        numbers[targets[column], row] = value
-                        column += 1
-                        p = end + 1
-                        continue
-                    if data[end] == line_end and column == last:
-                        numbers[targets[column], row] = value
-                        column = width
+                if end >= 0 and data[end] == (separator if column < last else line_end):
+                    numbers[target, row] = value
+                    column += 1
+                    if column == width:
                         p = end
                         break
-            while data[p] == 32 or (data[p] == 9 and tab_is_blank):
-                p += 1
-            target = targets[column]
+                    p = end + 1
+                    continue
+            p = _past_blanks(data, p, tabs)
             quoted = data[p] == quote
             if quoted:
-                p += 1
-                while data[p] == 32:
-                    p += 1
+                p = _past_blanks(data, p + 1, False)
+            b = data[p]
             if target == LEFT:
                 if quoted:
-                    while data[p] != quote and data[p] != line_end and data[p] != 0:
+                    while b != quote and b != line_end and b != 0:
                         p += 1
-                    plain = data[p] == quote
+                        b = data[p]
+                    plain = b == quote
                     p += plain
                 else:
-                    while data[p] != separator and data[p] != line_end and data[p] not in (0, 10, 13):
-                        if by_blanks and data[p] == 9:
-                            break
+                    while b != separator and b != line_end and b != other_end and b != 0 and not (by_blanks and b == 9):
                         p += 1
+                        b = data[p]
             else:
-                b = data[p]
-                if b in (separator, line_end, 10, 13) or (quoted and b == quote):
-                    if target >= 0:
-                        numbers[target, row] = math.nan
-                    elif target <= STAMP:
-                        stamps[STAMP - target, row] = MISSING_STAMP
-                elif target >= 0:
-                    value, end = read_number(
-                        data,
-                        p,
-                        decimal if quoted else bare_decimal,
-                        thousands if quoted else bare_thousands,
-                        tens,
-                        high5,
-                        low5,
-                    )
-                    plain = end >= 0
-                    if plain:
+                empty = b in (separator, line_end, other_end) or (quoted and b == quote)
+                end = p
+                if target >= 0:
+                    value = math.nan
+                    if not empty:
+                        point = decimal if quoted else bare_decimal
+                        value, end = read_number(data, p, point, thousands if quoted else bare_thousands, tens, fives)
+                    if end >= 0:
                         numbers[target, row] = value
-                        p = end
                 elif target <= STAMP:
-                    stamp, end = read_stamp(data, p, programs[STAMP - target])
-                    plain = end >= 0
-                    if plain:
+                    stamp = MISSING_STAMP
+                    if not empty:
+                        stamp, end = read_stamp(data, p, programs[STAMP - target])
+                    if end >= 0:
                         stamps[STAMP - target, row] = stamp
-                        p = end
-                else:
-                    plain = False
-                if quoted and plain:
-                    while data[p] == 32:
-                        p += 1
-                    plain = data[p] == quote
-                    p += plain
+                elif not empty:
+                    end = -1
+                plain = end >= 0
+                if plain:
+                    p = end
+                    if quoted:
+                        p = _past_blanks(data, p, False)
+                        plain = data[p] == quote
+                        p += plain
             if not plain:
                 break
             cell_end = p
-            while data[p] == 32 or (data[p] == 9 and tab_is_blank):
-                p += 1
+            p = _past_blanks(data, p, tabs)
             column += 1
             b = data[p]
             if b == line_end:
                 break
-            if b in (10, 13):
-                while data[p] != line_end and data[p] in (10, 13):
+            if b == other_end:
+                while data[p] == other_end:
                     p += 1
                 plain = data[p] == line_end
                 break
-            if by_blanks:
-                plain = p > cell_end and column < width
-            else:
-                plain = b == separator and column < width
-                p += plain
+            plain = column < width and (p > cell_end if by_blanks else b == separator)
+            p += plain and not by_blanks
         if not plain or column != width:
             while data[p] != line_end:
                 p += 1

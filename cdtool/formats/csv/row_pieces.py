@@ -35,6 +35,7 @@ class RowPieces(RowReader):
                 odd.words[0] = (-1, *odd.words[0][1:])
             odd.finish(int(np.flatnonzero(kept)[-1]) if kept.any() else -1)
             odd.blank += (done.blank + line).tolist()
+            odd.empty += (done.empty + line).tolist()
             rows.not_rows = np.sort(np.concatenate([done.blank + line, np.array(sorted(dropped.values()), np.int64)]))
             rows.numbers, rows.stamps = rows.numbers[:, : done.rows], rows.stamps[:, : done.rows]
             if dropped:

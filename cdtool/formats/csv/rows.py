@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.formats.cores import usable_cores
+from cdtool.cores import usable_cores
+from cdtool.formats.csv.blank_lines import filled
 from cdtool.formats.csv.cells import NARROW_BLANKS
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.marks import thousands_byte
@@ -30,11 +31,12 @@ _THREADS = 4
 
 @dataclass(frozen=True)
 class _Read:
-    """What one block gave: its rows and lines, and those lines that are not plain."""
+    """What one block gave: its rows and lines, and those that are not plain; `empty` are blank lines that are rows."""
 
     rows: int
     lines: int
     blank: Integers
+    empty: Integers
     odd: list[OddLine]
 
 
@@ -87,6 +89,7 @@ class RowReader:
         place = 0
         for done, room in self._blocks(rows):
             blank.append(done.blank + line)
+            odd.empty += (done.empty + line).tolist()
             for item in done.odd:
                 odd.take(item, line)
             runs.append((place, done.rows))
@@ -146,6 +149,9 @@ class RowReader:
             encoding = "utf-8" if self.dialect.text.recoded else self.dialect.text.encoding
             lines = block[:size].replace(self.dialect.marks.thousands.encode(encoding), b"'")
             block, size = lines + end * AFTER, len(lines)
+        empty = np.empty(0, dtype=np.int64)
+        if self.dialect.blank_is_missing:
+            block, size, empty = filled(block, size, end)
         data = np.frombuffer(block, dtype=np.uint8)
         blank = np.empty(count, dtype=np.int64)
         odd = np.empty((count, 4), dtype=np.int64)
@@ -169,7 +175,7 @@ class RowReader:
             OddLine(line, row, bytes(block[first:last]), line == final)
             for line, row, first, last in odd[: counts[3]].tolist()
         ]
-        return _Read(int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), listed)
+        return _Read(int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
 
     def _marks(self) -> Integers:
         dialect = self.dialect

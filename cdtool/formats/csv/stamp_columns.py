@@ -9,14 +9,12 @@ import numpy as np
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import Rows
-from cdtool.formats.csv.stamps import NS, over_midnight, seconds_since
+from cdtool.formats.csv.stamps import Layout, seconds_since, unwrapped
 from cdtool.recording import Finding, FloatArray
-
-_DAY = 86400 * NS
 
 
 class StampColumns:
-    """Stamps -> seconds since the first of them that has a date, or since midnight; `origin` [ns] is that first one.
+    """Stamps -> seconds since the first of them that has a date (`origin` [ns]), or since midnight or the full hour.
 
     Rows may come piece by piece, in the file's order.
     """
@@ -25,7 +23,7 @@ class StampColumns:
         self._dialect, self._read, self._dates = dialect, read, dates
         self._columns = [column for column in read if column not in dates.values()]
         self.origin: int | None = None
-        self._nights = dict.fromkeys(self._columns, 0)
+        self._passed = dict.fromkeys(self._columns, 0)  # midnights, or full hours
         self._last: dict[int, Integers] = {}
 
     @property
@@ -49,15 +47,19 @@ class StampColumns:
             # Before them the last stamp so far: midnight may lie between two pieces.
             times = np.concatenate((self._last.get(column, stamps[known][:1]), stamps[known]))
             self._last[column] = times[-1:].copy()
-            passed = over_midnight(times, np.ones(len(times), dtype=bool))
-            stamps[known] = times[1:] + self._nights[column] * _DAY
-            self._nights[column] += passed
+            period, _ = self._layout(column).wraps
+            passed = unwrapped(times, np.ones(len(times), dtype=bool), period)
+            stamps[known] = times[1:] + self._passed[column] * period
+            self._passed[column] += passed
         if dated and self.origin is None and known.any():
             self.origin = int(stamps[known][0])
         return seconds_since(stamps, known, self._start(column))
 
     def _dated(self, column: int) -> bool:
-        return self._dialect.stamped[column].layouts[0].dated or column in self._dates
+        return self._layout(column).dated or column in self._dates
+
+    def _layout(self, column: int) -> Layout:
+        return self._dialect.stamped[column].layouts[0]
 
     def _start(self, column: int) -> int:
         return self.origin if self._dated(column) and self.origin is not None else 0
@@ -66,12 +68,12 @@ class StampColumns:
         """How each is written, and what its seconds count from."""
         found = []
         for column in self._columns:
-            text = ""
+            text, anew = "", self._layout(column).wraps[1]
             if column in self._dates:
                 text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
-            elif self._nights[column]:
-                text = f"passes midnight {self._nights[column]} times; "
-            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else "midnight"
-            text += f"written as {self._dialect.stamped[column].layouts[0].pattern}; in s since {since}"
+            elif self._passed[column]:
+                text = f"passes {anew} {self._passed[column]} times; "
+            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else anew
+            text += f"written as {self._layout(column).pattern}; in s since {since}"
             found.append(Finding(text, self._dialect.names[column], "note"))
         return found

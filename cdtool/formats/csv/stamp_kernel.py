@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.csv.number_kernel import BYTES, NOT_A_NUMBER, Bytes
+from cdtool.formats.csv.number_kernel import BYTES, NOT_A_NUMBER, Bytes, letters
 from cdtool.kernels import kernel
 
 Programs = npt.NDArray[np.int64]
@@ -18,19 +18,9 @@ YEAR, SHORT_YEAR, MONTH, DAY, HOUR, MINUTE, SECOND = -1, -2, -3, -4, -5, -6, -7
 POINT_FRACTION, FRACTION, ZONE, MONTH_NAME, HALF_DAY, DATE_GAP = -8, -9, -10, -11, -12, -13
 STEPS = 32
 _NS = 1_000_000_000
-_MONTHS = (
-    0x6A616E,
-    0x666562,
-    0x6D6172,
-    0x617072,
-    0x6D6179,
-    0x6A756E,
-    0x6A756C,
-    0x617567,
-    0x736570,
-    0x6F6374,
-    0x6E6F76,
-    0x646563,
+_MONTHS = tuple(
+    int.from_bytes(name)
+    for name in (b"jan", b"feb", b"mar", b"apr", b"may", b"jun", b"jul", b"aug", b"sep", b"oct", b"nov", b"dec")
 )
 _MONTH_DAYS = (31, 29, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
@@ -93,7 +83,7 @@ def _days(year: int, month: int, day: int) -> int:
     return era * 146097 + of_era * 365 + of_era // 4 - of_era // 100 + of_year - 719468
 
 
-@kernel(f"UniTuple(int64, 2)({BYTES}, int64, {PROGRAM})")
+@kernel(f"UniTuple(int64, 2)({BYTES}, int64, {PROGRAM})", entry=True)
 def read_stamp(data: Bytes, at: int, program: npt.NDArray[np.int64]) -> tuple[int, int]:
     """Nanoseconds since 1970-01-01 (of a time of day: since midnight) and the end, or NOT_A_NUMBER."""
     year, month, day, hour, minute, second, nano, east, half = 1970, 1, 1, 0, 0, 0, 0, 0, -1
@@ -126,9 +116,7 @@ def read_stamp(data: Bytes, at: int, program: npt.NDArray[np.int64]) -> tuple[in
         elif step == ZONE:
             east, p = _zone(data, p)
         elif step == MONTH_NAME:
-            name: Any = 0
-            for i in range(3):
-                name = 256 * name + (np.int64(data[p + i]) | 32)
+            name = letters(data, p, 3)
             month = 0
             for i, known in enumerate(_MONTHS):
                 if name == known:

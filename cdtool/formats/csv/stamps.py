@@ -43,7 +43,7 @@ _MINUTES = "%M:%S.%f"
 _FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:])(?P<digits>[0-9]+)(?P<after>.*)")
 _LOOKED = 200
 NS = 1_000_000_000
-_DAY = 86400 * NS
+_MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,15 @@ class Layout:
     def timed(self) -> bool:
         """True if the stamps name a time of day."""
         return "%H" in self.pattern or "%I" in self.pattern
+
+    @property
+    def wraps(self) -> tuple[int, str]:
+        """After how many ns stamps without a day begin anew, and what they pass there."""
+        if "%H" in self.pattern or ("%I" in self.pattern and "%p" in self.pattern):
+            return _DAY, "midnight"
+        if "%I" in self.pattern:
+            return _HALF_DAY, "noon or midnight"
+        return (_HOUR, "the full hour") if "%M" in self.pattern else (_MINUTE, "the full minute")
 
     @property
     def program(self) -> list[int]:
@@ -196,16 +205,19 @@ def _known() -> tuple[Layout, ...]:
     return tuple(Layout(pattern) for pattern in patterns)
 
 
-def over_midnight(
-    stamps: np.ndarray[tuple[int], np.dtype[np.int64]], known: np.ndarray[tuple[int], np.dtype[np.bool_]]
+def unwrapped(
+    stamps: np.ndarray[tuple[int], np.dtype[np.int64]],
+    known: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    period: int = _DAY,
 ) -> int:
-    """Count a day on at each midnight that times of day pass, in place; returns how many there were.
+    """Count `period` [ns] on each time that stamps without a day begin anew, in place; returns how often they did.
 
-    A step back by more than half a day is a midnight; a smaller one is left, and told with the clock.
+    A step back by more than half of it is such a passage, as midnight for times of day; a smaller one is left, and told
+    with the clock. A pause of a whole period or more does not show in the stamps.
     """
     rows = np.flatnonzero(known)
-    passed = np.cumsum(np.diff(stamps[rows], prepend=stamps[rows[:1]]) < -_DAY // 2)
-    stamps[rows] += passed * _DAY
+    passed = np.cumsum(np.diff(stamps[rows], prepend=stamps[rows[:1]]) < -(period // 2))
+    stamps[rows] += passed * period
     return int(passed[-1]) if len(passed) else 0
 
 

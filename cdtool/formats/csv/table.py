@@ -12,18 +12,15 @@ from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.exact_clock import exact_differences
+from cdtool.formats.csv.excel_days import DAY_S, since_1970, two_readings
 from cdtool.formats.csv.last_line import RECENT, is_whole
 from cdtool.formats.csv.odd_lines import OddLines, not_numeric
 from cdtool.formats.csv.rows import RowReader, Rows
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import Finding, FloatArray
-
-# Days since 1899-12-30, as Excel counts them, of 1970; and of the years 2000 to 2100.
-_EXCEL_1970, _EXCEL_FIRST, _EXCEL_LAST = 25569.0, 36526.0, 73051.0
-# A clock in seconds that stands there and steps by less than this would sample at more than 500 kHz.
-_EXCEL_STEP = 2e-6
-_DAY_S = 86400.0
 
 
 @dataclass
@@ -82,6 +79,8 @@ def read_table(
         raise no_numbers(path, findings)
     if clock is not None and wanted is not None:
         _set_clock(path, table, clock, wanted)
+        _set_exact(dialect, rows, table, clock, wanted.time.factor)
+    table.findings += _rounded(table.values)
     table.values = {key: table.values[key] for key in dialect.names if key in table.values}
     return table
 
@@ -175,17 +174,28 @@ def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None
     if not len(finite):
         return
     if wanted.pins.time_format == "excel":
-        table.origin = (float(finite[0]) - _EXCEL_1970) * _DAY_S
-        table.values[clock] = (values - finite[0]) * _DAY_S
+        table.origin = since_1970(float(finite[0]))
+        table.values[clock] = (values - finite[0]) * DAY_S
         return
-    steps = np.diff(finite)
-    step = float(np.median(steps)) if len(steps) else 0.0
-    in_days = _EXCEL_FIRST < finite[0] < _EXCEL_LAST and 0.0 < step < _EXCEL_STEP
-    if in_days and wanted.time.factor == 1.0 and not wanted.pins.time_format:
+    readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
+    if readings:
         raise RecordingError(
-            f"{path}: column '{clock}' starts at {finite[0]:.9g} in steps of {step:.3g}: days of Excel, or s?",
+            f"{path}: column '{clock}' {readings}",
             'pin time_format = "excel" or "number" in [csv] of the machine file',
         )
+
+
+def _set_exact(dialect: Dialect, rows: Rows, table: Table, clock: str, factor: float) -> None:
+    """Read the clock anew where its stamps have more digits than float64."""
+    if clock in table.stamped or table.origin:
+        return
+    exact = exact_differences(dialect, rows, dialect.names.index(clock), table.values[clock], factor)
+    if exact is not None:
+        table.values[clock], table.origin = exact
+
+
+def _rounded(values: Mapping[str, FloatArray]) -> list[Finding]:
+    return [found for key, column in values.items() for found in rounding_finding(key, rounded_integers(column))]
 
 
 def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) -> list[Finding]:

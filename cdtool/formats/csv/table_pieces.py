@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,10 +13,13 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.odd_lines import OddLines
 from cdtool.formats.csv.row_pieces import RowPieces
 from cdtool.formats.csv.rows import Rows
+from cdtool.formats.csv.several_clocks import Clocks, clock_findings
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
 from cdtool.formats.csv.table import Asked, Table, end_findings, no_numbers
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import Piece
+from cdtool.recording import FloatArray
 
 
 def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, Table]:
@@ -24,9 +28,15 @@ def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generat
     odd = OddLines(path, dialect, True, left_out=asked.left_out)
     stamped = StampColumns(dialect, asked.stamps, asked.dates)
     blocks = _Blocks(RowPieces(path, dialect, asked.numeric, asked.stamps))
+    clocks = Clocks.by_names(dialect)
+    first: dict[str, FloatArray] = {}
+    rounded: Counter[str] = Counter()
 
     def piece(rows: Rows) -> Piece:
         numbers = {dialect.names[column]: rows.numbers[k] for k, column in enumerate(asked.numeric)}
+        rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
+        if not first:  # as much of the clocks as shows whether they are several
+            first.update({key: numbers[key] for i in clocks.columns if (key := dialect.names[i]) in numbers})
         return Piece("", None, numbers | stamped.seconds(rows), rows.count)
 
     for rows in blocks.all_but_the_last(odd):
@@ -36,6 +46,8 @@ def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generat
     numeric = {dialect.names[column] for column in asked.numeric if column not in odd.left_out}
     names = [name for name in dialect.names if name in (*numeric, *stamped.names)]
     findings += stamped.findings()
+    findings += clock_findings(dialect, clocks, first)
+    findings += [found for name in names for found in rounding_finding(name, rounded[name])]
     if not names:
         raise no_numbers(path, findings)
     unbroken = blocks.unbroken and not len(blocks.last.not_rows)

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mcap.columns import UndecodableError
+from cdtool.formats.mcap.columns.uniform import UniformTaker
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
+from cdtool.formats.mcap.decoders import Decoders
 from cdtool.formats.mcap.fields import parse_field
-from cdtool.formats.mcap.gathering import Decoders, Gathering
+from cdtool.formats.mcap.gathering import Gathering
+from cdtool.formats.mcap.refused_chunks import refused_chunks
+from cdtool.formats.mcap.sequence_jumps import SequenceJumps
+from cdtool.formats.mcap.taken import Bound
 from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Column, Source, with_topics
@@ -46,9 +54,11 @@ class Mcap:
         """All numeric fields, some MiB of the file at a time; raises RecordingError."""
         log = Log(path)
         topics: dict[str, TopicSurvey] = {}
+        jumps = SequenceJumps()
         origin: int | None = None
         for piece in ahead(log.pieces()):
             origin = _origin(path, log) if origin is None else origin
+            jumps.add(piece, origin)
             for messages in piece:
                 name = messages.stream.channel.topic
                 survey = topics.setdefault(name, TopicSurvey(name))
@@ -61,7 +71,7 @@ class Mcap:
                     findings.append(item)
                 else:
                     columns[item.name] = item
-        return _source(path, log, columns, findings, log.origin)
+        return _source(path, log, columns, findings + jumps.findings(), log.origin)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""
@@ -70,8 +80,9 @@ class Mcap:
             for messages in chain.from_iterable(Log(path, topic.__eq__).pieces()):
                 decoder = decoders.of(messages.stream, messages.batch)
                 if decoder is not None:
-                    return decoder.element_names(messages.batch.first(1))
-        except (RecordingError, UndecodableError):  # the survey says what is wrong
+                    with suppress(UndecodableError):  # another channel of the topic may be decoded
+                        return decoder.element_names(messages.batch.first(1))
+        except RecordingError:  # the survey says what is wrong
             return ()
         return ()
 
@@ -82,7 +93,8 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
         fields = texts.setdefault(source.topic, [])
         if source.field not in fields:
             fields.append(source.field)
-    log = Log(path, texts.__contains__)
+    taker = UniformTaker(publish=wanted.time.clock == "publish")
+    log = Log(path, texts.__contains__, taker=taker)
     topics = {
         name: Gathering(
             f"{path}: {name}",
@@ -94,9 +106,17 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
         )
         for name, fields in texts.items()
     }
-    for piece in ahead(log.pieces()):
+    pieces = log.pieces()
+    # The taker has to learn from the first piece before the second one is made.
+    for piece in chain(islice(pieces, 1), ahead(pieces)):
         for messages in piece:
-            topics[messages.stream.channel.topic].add(messages.stream, messages.batch)
+            topic = topics[messages.stream.channel.topic]
+            if messages.parts:
+                topic.confirm(messages.stream, messages.parts)
+            else:
+                topic.add(messages.stream, messages.batch)
+        if any(not messages.parts for messages in piece):
+            taker.learn(_bound(log, topics))
     findings = log.findings()
     wanted = with_topics(path, wanted, [topic.name for topic in log.topics.values() if topic.count])
     for name in dict.fromkeys(source.topic for source in wanted.sources):
@@ -115,8 +135,21 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
         if f"{source.topic} {source.field}" not in columns:
             column, found = topics[source.topic].column(texts[source.topic].index(source.field), origin)
             columns[column.name] = column
-            findings += found
+            findings += [*found, *rounding_finding(column.name, rounded_integers(column.values))]
     return _source(path, log, columns, findings, origin)
+
+
+def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
+    """By id the channels that whole chunks may hold to be taken: wanted ones with a recipe, and those not asked for."""
+    channels = log.summary.channels.values()
+    alone = Counter(channel.topic for channel in channels)
+    bound: dict[int, Bound] = {}
+    for channel in channels:
+        if channel.topic not in topics:
+            bound[channel.id] = None
+        elif alone[channel.topic] == 1 and (found := topics[channel.topic].bound(channel.id)) is not None:
+            bound[channel.id] = found
+    return bound
 
 
 def _origin(path: Path, log: Log) -> int:
@@ -132,4 +165,5 @@ def _origin(path: Path, log: Log) -> int:
 
 def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
     details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))
+    told = (*findings, *refused_chunks(log))
+    return Source(path, Mcap.name, columns, origin / 1e9, told, details, tuple(columns))

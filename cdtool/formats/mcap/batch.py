@@ -45,3 +45,6 @@ class Batch:
     def _before(self, distance: int, size: int) -> npt.NDArray[np.uint8]:
         places = (self.start - distance)[:, np.newaxis] + np.arange(size)
         return np.ascontiguousarray(self.data[places])
+
+
+NO_BATCH = Batch(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.uint64))

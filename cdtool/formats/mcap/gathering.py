@@ -10,65 +10,16 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError, decoder_for
-from cdtool.formats.mcap.columns.gathered import ABSENT, DECODED, OTHER_JOINTS
+from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError
+from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
 from cdtool.formats.mcap.container.definitions import Stream
+from cdtool.formats.mcap.decoders import Decoders
 from cdtool.formats.mcap.fields import Field, FieldMissingError, missing
 from cdtool.formats.mcap.rows import Rows
 from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
+from cdtool.formats.mcap.taken import Bound, Destination, Numbers, Part
 from cdtool.formats.source import Column
 from cdtool.recording import Finding, FloatArray
-
-
-class Decoders:
-    """One decoder a channel, made when its first messages come; what cannot be decoded is counted, with a reason."""
-
-    def __init__(self) -> None:
-        self._made: dict[int, Decoder | UndecodableError] = {}
-        self.decoded = 0
-        self.failed = 0
-        self.reason = ""
-
-    def of(self, stream: Stream, batch: Batch) -> Decoder | None:
-        """The decoder of a channel; None, and its messages counted, where there is none."""
-        number = stream.channel.id
-        if number not in self._made:
-            schema = stream.schema
-            described = (schema.encoding, schema.name, schema.data) if schema is not None else ("", "", b"")
-            try:
-                self._made[number] = decoder_for(stream.channel.message_encoding, *described)
-            except UndecodableError as fault:
-                self._made[number] = fault
-        made = self._made[number]
-        if isinstance(made, UndecodableError):
-            self._fail(len(batch), str(made))
-            return None
-        return made
-
-    def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
-        """What only the wanted places show: a channel's messages cannot be decoded; they are counted."""
-        self._made[stream.channel.id] = fault
-        self._fail(len(batch), str(fault))
-
-    def keep(self, gathered: Gathered) -> npt.NDArray[np.bool_]:
-        """Which messages of a batch were decoded; the others are counted."""
-        whole: npt.NDArray[np.bool_] = gathered.status == DECODED
-        count = int(np.count_nonzero(whole))
-        self.decoded += count
-        if count < len(whole):
-            self._fail(len(whole) - count, gathered.reason)
-        return whole
-
-    def _fail(self, count: int, reason: str) -> None:
-        self.failed += count
-        self.reason = self.reason or " ".join(reason.split())[:200]
-
-    def failure(self, topic: str, severity: str = "loss") -> list[Finding]:
-        """The finding about messages that could not be decoded."""
-        if not self.failed:
-            return []
-        text = f"{self.failed} of {self.failed + self.decoded} messages cannot be decoded: {self.reason}"
-        return [Finding(text, topic, "warning" if severity == "warning" else "loss")]
 
 
 class _Field:
@@ -100,6 +51,20 @@ class _Field:
         if count is not None:
             self._count(tally(count))
         self.rows.append(values)
+
+    def share(self, numbers: Numbers) -> FloatArray | None:
+        """The column, for more messages that all have these numbers; None where others came before."""
+        table = self.rows.share(() if numbers.single else (len(numbers.at),))
+        return None if self.elsewhere is not None else table
+
+    def confirm(self, table: FloatArray, rows: slice) -> None:
+        """More messages, which stand in these rows of a column that was shared."""
+        count = rows.stop - rows.start
+        if self.elsewhere is not None:
+            self.elsewhere.append(np.zeros(count, np.bool_))
+        if table.ndim > 1:
+            self._count(Counter({table.shape[1]: count}))
+        self.rows.confirm(table, rows)
 
     def _count(self, found: Counter[int]) -> None:
         if not self.widths.keys() - {0} and (widths := found.keys() - {0}):
@@ -156,6 +121,27 @@ class Gathering:
             if field.elsewhere is not None and not field.names:
                 field.names = decoder.names(batch, field.field)
 
+    def bound(self, channel: int) -> Bound:
+        """How more messages of the topic's channel (its id) become rows of these columns; None where they do not."""
+        recipe = self.decoders.recipe(channel, self._wanted, self.joints, self.clock == "header")
+        if recipe is None:
+            return None
+        stamps = self._stamps.share(())
+        tables = [field.share(numbers) for field, numbers in zip(self._fields, recipe.fields, strict=True)]
+        there = tuple(table for table in tables if table is not None)
+        if stamps is None or len(there) < len(tables):
+            return None
+        return recipe, Destination(there, stamps, self._stamps.count)
+
+    def confirm(self, stream: Stream, parts: Sequence[Part]) -> None:
+        """Take messages that were put into rows by `bound`."""
+        for part in _joined(parts):
+            self.decoders.decoded += part.count
+            self._stamps.confirm(part.destination.stamps, part.rows)
+            self.orders.add(stream.channel.id, part.destination.stamps[part.rows], part.ascending)
+            for field, table in zip(self._fields, part.destination.tables, strict=True):
+                field.confirm(table, part.rows)
+
     def column(self, index: int, origin: int) -> tuple[Column, list[Finding]]:
         """The field of that number as a column, sorted by the chosen clock; raises RecordingError."""
         field = self._fields[index]
@@ -190,11 +176,14 @@ class Gathering:
             return batch.log_time
         if self.clock == "publish":
             return batch.publish_time
-        if gathered.stamps is None or gathered.has_stamp is None or not bool(np.all(gathered.has_stamp[whole])):
-            raise RecordingError(
-                f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
-            )
+        if gathered.stamps is None or gathered.has_stamp is None or not gathered.has_stamp[whole].all():
+            raise self._no_stamp()
         return gathered.stamps
+
+    def _no_stamp(self) -> RecordingError:
+        return RecordingError(
+            f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
+        )
 
     def _absent(self, decoder: Decoder, batch: Batch) -> str:
         """The field that the schema does not have."""
@@ -204,6 +193,18 @@ class Gathering:
             except FieldMissingError:
                 return field.text
         return self._wanted[0].text
+
+
+def _joined(parts: Sequence[Part]) -> list[Part]:
+    """The same, those one behind the other as one."""
+    joined: list[Part] = []
+    for part in parts:
+        together = joined[-1].before(part) if joined else None
+        if together is None:
+            joined.append(part)
+        else:
+            joined[-1] = together
+    return joined
 
 
 def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:

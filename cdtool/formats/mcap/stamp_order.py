@@ -20,9 +20,9 @@ class StampOrders:
         self._topic = topic
         self._orders: dict[int, StampOrder] = {}
 
-    def add(self, channel: int, stamps: Stamps) -> None:
-        """The stamps of a channel's next messages."""
-        self._orders.setdefault(channel, StampOrder()).add(stamps)
+    def add(self, channel: int, stamps: Stamps, ascending: bool = False) -> None:
+        """The stamps of a channel's next messages; `ascending`: they are known to be."""
+        self._orders.setdefault(channel, StampOrder()).add(stamps, ascending)
 
     def findings(self) -> list[Finding]:
         """What is odd about their order, once all were seen."""
@@ -40,17 +40,18 @@ class StampOrder:
         self._lowest: int | None = None
         self._highest = 0
 
-    def add(self, stamps: Stamps) -> None:
-        """The stamps of the next messages."""
+    def add(self, stamps: Stamps, ascending: bool = False) -> None:
+        """The stamps of the next messages; `ascending`: they are known to be."""
         if not len(stamps):
             return
         if self._lowest is None:
             self._lowest = self._highest = int(stamps[0])
-        if int(stamps[0]) < self._highest or bool(np.any(stamps[1:] < stamps[:-1])):
+        ascending = ascending or not bool(np.any(stamps[1:] < stamps[:-1]))
+        if int(stamps[0]) < self._highest or not ascending:
             self._look(stamps)
         self._count += len(stamps)
-        self._lowest = min(self._lowest, int(stamps.min()))
-        self._highest = max(self._highest, int(stamps.max()))
+        self._lowest = min(self._lowest, int(stamps[0] if ascending else stamps.min()))
+        self._highest = max(self._highest, int(stamps[-1] if ascending else stamps.max()))
 
     def _look(self, stamps: Stamps) -> None:
         highest = np.maximum.accumulate(np.maximum(stamps, np.array(self._highest).astype(stamps.dtype)))

@@ -10,11 +10,13 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.formats.distribution import Distribution
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
 from cdtool.formats.mcap.container.definitions import Stream
+from cdtool.formats.mcap.decoders import Decoders
 from cdtool.formats.mcap.fields import Field, parse_field
-from cdtool.formats.mcap.gathering import Decoders, in_order, tally
+from cdtool.formats.mcap.gathering import in_order, tally
 from cdtool.formats.mcap.stamp_order import StampOrders
 from cdtool.formats.pieces import Piece
 from cdtool.formats.source import Column
@@ -37,6 +39,7 @@ class TopicSurvey:
         self._shapes: dict[str, tuple[int, ...]] = {}  # of a field's row, once a message holds it
         self._late = Distribution()
         self._orders = StampOrders(topic)
+        self._rounded: Counter[str] = Counter()
         self._is_late = self._stamped = False
 
     def pieces(self, stream: Stream, batch: Batch, origin: int) -> Iterator[Piece]:
@@ -105,6 +108,7 @@ class TopicSurvey:
             return None
         if values.shape[1:] != self._shapes[name]:
             return np.full((len(values), *self._shapes[name]), np.nan)
+        self._rounded[name] += rounded_integers(values)
         if not there.all():
             values = np.where(there.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
         return values
@@ -119,6 +123,7 @@ class TopicSurvey:
                 text = f"arrays of {' and '.join(map(str, sorted(widths)))} elements: left out"
                 yield Finding(text, full, "note")
             elif widths:
+                yield from rounding_finding(full, self._rounded[name], "note")
                 yield Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
         yield from self._header()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts, reading_step
 from cdtool.recording import Recording, Series
 
 TIME = np.arange(4000) * 1e-3
@@ -44,6 +44,42 @@ def test_without_levels_they_come_from_the_noise():
 def test_noise_alone_is_no_contact():
     assert find_contacts(recording(ramp(9.0, 0.0, noise=1.0)), OnsetRule()) == []
     assert find_contacts(recording(np.zeros(4000)), OnsetRule()) == []
+
+
+@pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
+@pytest.mark.parametrize("offset", [0.0, 312.7])
+def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset):
+    force = np.full(4000, offset)
+    force[2000:2010] += step  # the only one: the noise, by its median, is 0
+    assert find_contacts(recording(force), OnsetRule()) == []
+    force[3000:3010] -= step
+    assert find_contacts(recording(force), OnsetRule()) == []
+
+
+@pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
+def test_of_a_load_cell_without_noise_a_contact_begins_above_eight_deviations_of_its_rounding(step):
+    heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms from 2 s on
+    (contact,) = find_contacts(recording(heights), OnsetRule())
+    assert 8.0 / np.sqrt(12.0) == pytest.approx(2.309, abs=1e-3)
+    # Upper level 2.31 steps, first above it at 3; lower level 1.15 steps, left where the reading comes to 2.
+    assert contact.start == pytest.approx(2.020)
+    assert contact.uncertainty == pytest.approx(0.0005 + 0.010)
+    assert contact.peak_force == pytest.approx(50 * step)
+
+
+def test_steps_finer_than_the_noise_change_nothing():
+    force = ramp(2.0, 5000.0, noise=1.0)
+    (smooth,) = find_contacts(recording(force), OnsetRule())
+    (stepped,) = find_contacts(recording(np.round(force / 0.01) * 0.01), OnsetRule())
+    assert (stepped.start, stepped.end) == (smooth.start, smooth.end)
+
+
+def test_what_arithmetic_rounds_is_no_step_of_the_load_cell():
+    reading = np.zeros(4000)
+    reading[2000:2010] = 3.0
+    reading[3000:3010] = 3.0 * (1.0 + 1e-15)
+    assert reading_step(reading) == 3.0
+    assert reading_step(np.zeros(5)) == 0.0
 
 
 def test_a_rebound_is_the_same_contact_and_a_later_touch_another():

@@ -13,7 +13,10 @@ import lz4.frame
 import numpy as np
 import pytest
 import zstandard
+from mcap.writer import CompressionType, Writer
 
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.container import chunks
 from cdtool.formats.mcap.container.records import MAGIC
 from tests.formats.mcap.small_files import read_or_refused
@@ -147,3 +150,51 @@ def test_lz4_gives_the_same_in_pieces_of_whatever_size(monkeypatch, given, taken
     header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(packed))
     chunks.Decompressor().fill(header, packed, room)
     assert room.tobytes() == content.tobytes()
+
+
+def camera_in_the_dark(path, compression):
+    """A cell at 100 Hz beside black images of 300 kB: together 200 MB of nearly nothing."""
+    image = b"\0\1\0\0" + bytes(300_000)
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression, chunk_size=1 << 20)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        cell, camera = writer.register_channel("/cell", "cdr", schema), writer.register_channel("/camera", "raw", 0)
+        for i in range(700):
+            writer.add_message(cell, i * 10**7, b"\0\1\0\0" + struct.pack("<d", i), i * 10**7, i + 1)
+            writer.add_message(camera, i * 10**7, image, i * 10**7, i + 1)
+        writer.finish()
+    return path
+
+
+def test_an_honest_log_of_dark_images_is_told_how_to_be_read_whole(tmp_path):
+    packed_log = camera_in_the_dark(tmp_path / "packed.mcap", CompressionType.ZSTD)
+    for wanted in (
+        None,
+        ChannelMap(TimeSource(), (ChannelSource("force", topic="/cell", field="data"),), ("a",), True),
+    ):
+        source = Mcap().columns(packed_log, wanted)
+        told = [str(found) for found in source.findings if "not damaged but refused" in found.message]
+        assert len(told) == 1 and "`mcap decompress LOG -o PLAIN`" in told[0]
+        assert any(found.severity == "loss" for found in source.findings)
+    plain = camera_in_the_dark(tmp_path / "plain.mcap", CompressionType.NONE)
+    source = Mcap().columns(plain)
+    assert source.columns["/cell data"].values.tolist() == list(range(700))
+    assert not [found for found in source.findings if found.severity == "loss" or "refused" in found.message]
+
+
+def test_numbers_that_never_change_are_read_however_long(tmp_path, monkeypatch):
+    """A frozen joint shrinks to a tenth: its times do not."""
+    monkeypatch.setattr(chunks, "_LONG", 1 << 20)
+    monkeypatch.setattr(chunks, "LARGEST", 1 << 20)
+    path = tmp_path / "frozen.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD, chunk_size=1 << 19)
+        writer.start()
+        channel = writer.register_channel("/q", "json", 0)
+        for i in range(60_000):
+            writer.add_message(channel, i * 10**6, b'{"position": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]}', i * 10**6)
+        writer.finish()
+    source = Mcap().columns(path)
+    assert len(source.columns["/q position[:]"].values) == 60_000
+    assert not [found for found in source.findings if found.severity == "loss"]

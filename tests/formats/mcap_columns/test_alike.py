@@ -22,12 +22,12 @@ def messages(draw):
             other[:size] = bytes(a if hidden else b for a, hidden, b in zip(first, mask, other, strict=False))
         rest.append(bytes(other[: draw(st.integers(size - 1, len(other)))] if not draw(st.integers(0, 9)) else other))
     copied = draw(st.lists(st.integers(0, size - WORD), max_size=5))
-    return first, mask, rest, copied
+    return first, mask, rest, copied, draw(st.lists(st.integers(0, 7), min_size=len(copied), max_size=len(copied)))
 
 
 @given(messages())
 def test_words_are_copied_where_every_message_is_alike(given_messages):
-    first, mask, rest, copied = given_messages
+    first, mask, rest, copied, shift = given_messages
     every = [first, *rest]
     data = np.frombuffer(b"".join(every), np.uint8)
     length = np.array([len(each) for each in every])
@@ -43,6 +43,7 @@ def test_words_are_copied_where_every_message_is_alike(given_messages):
         len(first) + 2,
         *compared,
         np.array(copied, np.uint64),
+        8 * np.array(shift, np.uint64),
         np.arange(k) * n,
         np.ones(k, np.int64),
         taken,
@@ -53,7 +54,11 @@ def test_words_are_copied_where_every_message_is_alike(given_messages):
     )
     assert alike == expected
     if alike:
-        words = [int.from_bytes(each[at : at + WORD], "little") for at in copied for each in every]
+        words = [
+            int.from_bytes(each[at + up : at + WORD], "little")
+            for at, up in zip(copied, shift, strict=True)
+            for each in every
+        ]
         assert taken.tolist() == words
 
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.formats.mcap.columns.gathered import ByteArray, IntArray
 from cdtool.formats.mcap.columns.walk_kernel import PLACES
+from cdtool.formats.mcap.taken import Words
+from cdtool.instructions import prefetch
 from cdtool.kernels import kernel
-from cdtool.prefetch import prefetch
-
-WordArray = npt.NDArray[np.uint64]
 
 WORD = 8  # bytes
 _LINE = 64  # bytes of the cache's lines
@@ -20,26 +18,27 @@ _MOST_AHEAD = 1024  # bytes of a message
 
 @kernel(
     f"b1(Array(uint64, 1, 'A', readonly=True, aligned=False), {PLACES}, {PLACES}, int64, int64, "
-    "uint64[::1], uint64[::1], uint64[::1], uint64[::1], int64[::1], int64[::1], uint64[::1])"
+    "uint64[::1], uint64[::1], uint64[::1], uint64[::1], uint64[::1], int64[::1], int64[::1], uint64[::1])"
 )
 def take_alike(
-    words: WordArray,
+    words: Words,
     start: IntArray,
     length: IntArray,
     shortest: int,
     longest: int,
-    compared: WordArray,
-    mask: WordArray,
-    pattern: WordArray,
-    copied: WordArray,
+    compared: Words,
+    mask: Words,
+    pattern: Words,
+    copied: Words,
+    shift: Words,
     first: IntArray,
     step: IntArray,
-    taken: WordArray,
+    taken: Words,
 ) -> bool:
-    """Copy the word at `copied[k]` of message i to `taken[first[k] + i step[k]]`; False where a message is not alike.
+    """Copy a message's words to `taken`; False where one is not alike (Alike; taken.py).
 
-    `words[p]` are the 8 bytes from byte p on. Alike: from `shortest` to `longest` bytes, and at `compared` (m,) the
-    bits of `mask` as in `pattern`. All these places begin at least 8 bytes before `shortest`.
+    `words[p]` are the 8 bytes from byte p on. The word at `copied[k]` of message i, moved down by `shift[k]` bits,
+    becomes `taken[first[k] + i step[k]]`.
     """
     span = min(shortest, _MOST_AHEAD)
     for i in range(start.size):
@@ -55,16 +54,16 @@ def take_alike(
         if differing:
             return False
         for k in range(copied.size):
-            taken[np.uint64(first[k] + i * step[k])] = words[begin + copied[k]]
+            taken[np.uint64(first[k] + i * step[k])] = words[begin + copied[k]] >> shift[k]
     return True
 
 
-def words_of(data: ByteArray) -> WordArray:
+def words_of(data: ByteArray) -> Words:
     """The 8 bytes from every byte on, as overlapping numbers."""
     return np.ndarray((max(0, len(data) - WORD + 1),), np.uint64, data, strides=(1,))
 
 
-def compared_words(mask: ByteArray, pattern: ByteArray) -> tuple[WordArray, WordArray, WordArray]:
+def compared_words(mask: ByteArray, pattern: ByteArray) -> tuple[Words, Words, Words]:
     """Places (m,), masks and patterns of the words that hold all bytes of `mask` (at least 8 bytes) that are not 0."""
     places: list[int] = []
     for at in np.flatnonzero(mask).tolist():

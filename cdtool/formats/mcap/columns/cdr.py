@@ -13,11 +13,12 @@ import numpy as np
 
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns.gathered import UndecodableError
+from cdtool.formats.mcap.columns.pattern import Pattern, pattern_of
 from cdtool.formats.mcap.columns.slots import Found, Place
 from cdtool.formats.mcap.columns.typed import TypedDecoder
 from cdtool.formats.mcap.columns.walk_kernel import LONG, OTHER_KIND
 from cdtool.formats.mcap.columns.walk_program import Program, compile_program
-from cdtool.formats.mcap.columns.walked import Pattern, pattern_of, walk_all
+from cdtool.formats.mcap.columns.walked import walk_all
 from cdtool.formats.mcap.layouts.layout import Schema, Text
 
 _ENCAPSULATION = 4
@@ -51,6 +52,10 @@ class WalkFinder:
             self._patterns[places] = pattern
             found = pattern.found(batch) if pattern is not None else None
         return self.checked(batch, places) if found is None else found
+
+    def pattern(self, places: tuple[Place, ...]) -> Pattern | None:
+        """What the last messages had in common; None where they had nothing."""
+        return self._patterns.get(places)
 
     def checked(self, batch: Batch, places: tuple[Place, ...]) -> Found:
         """The same, found message by message."""

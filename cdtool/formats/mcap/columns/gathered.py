@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.fields import Field, FieldMissingError
+from cdtool.formats.mcap.taken import Recipe
 from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -69,6 +70,10 @@ class Decoder(Protocol):
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> Gathered:
         """The wanted fields of all messages; whole arrays whose elements are named come in the order of `joints`."""
+        ...
+
+    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> Recipe | None:
+        """How more messages like the last ones become the same fields; None where they do not at once."""
         ...
 
     def names(self, batch: Batch, field: Field) -> list[str]:

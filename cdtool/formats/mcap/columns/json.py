@@ -83,6 +83,9 @@ class JsonDecoder:
             _stamp_message(row, message, times, there)
         return Gathered(picked, status, reason, times, there)
 
+    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> None:
+        """None: numbers are written in different lengths."""
+
     def names(self, batch: Batch, field: Field) -> list[str]:
         """What the first ten messages call the elements of the field's array, sorted."""
         found: set[str] = set()

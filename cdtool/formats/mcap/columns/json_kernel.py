@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.mcap.columns.decimal_kernel import UNDECIDED, float_bits
+from cdtool.formats.decimal_kernel import UNDECIDED, float_bits
 from cdtool.formats.mcap.columns.gathered import ByteArray, IntArray
 from cdtool.kernels import kernel
 
@@ -18,17 +18,25 @@ VALUE, TEXT, END = 0, 1, 2
 OTHER, FITS, UNCLEAR = 0, 1, 2  # what becomes of a message; UNCLEAR: it fits, but Python must convert a number
 
 # Unsigned constants: a signed one beside an unsigned number would make a float of both.
-_0, _1, _2, _3, _4, _7, _8, _10, _16, _32, _48, _56, _63, _64 = map(
-    np.uint64, (0, 1, 2, 3, 4, 7, 8, 10, 16, 32, 48, 56, 63, 64)
+_0, _1, _4, _5, _7, _8, _9, _10, _16, _32, _48, _56, _63, _64 = map(
+    np.uint64, (0, 1, 4, 5, 7, 8, 9, 10, 16, 32, 48, 56, 63, 64)
 )
 _ZEROS, _SIXES, _HIGH = np.uint64(0x3030303030303030), np.uint64(0x4646464646464646), np.uint64(0x8080808080808080)
 _QUOTES, _SLASHES = np.uint64(0x2222222222222222), np.uint64(0x5C5C5C5C5C5C5C5C)
 _ONES, _SPACES = np.uint64(0x0101010101010101), np.uint64(0x2020202020202020)
 _PAIRS, _UPPER, _LOWER = np.uint64(0x000000FF000000FF), np.uint64(0x000F424000000064), np.uint64(0x0000271000000001)
-_NAN, _TRUE = np.uint64(0x7FF8000000000000), np.uint64(0x3FF0000000000000)
+_NULL, _TRUE, _FALSE = (np.uint64(int.from_bytes(word)) for word in (b"null", b"true", b"false"))
+_NAN, _ONE = np.uint64(0x7FF8000000000000), np.uint64(0x3FF0000000000000)  # as float64
 _TENS = np.array([10**n for n in range(9)], dtype=np.uint64)
 _LARGEST = np.array([(2**64 - 10**n) // 10**n for n in range(9)], dtype=np.uint64)  # n digits more fit 64 bits
 _MOST_DIGITS = np.uint64(4000)  # Python bounds those of an int
+
+
+@kernel("uint64(uint64)")
+def _first(found: np.uint64) -> np.uint64:
+    """Which byte of a word is the first whose highest bit is set, the others being 0; 8 where none is."""
+    first: np.uint64 = ((((found & (~found + _1)) >> _7) - _1) & _ONES) * _ONES >> _56
+    return first
 
 
 @kernel(
@@ -79,29 +87,28 @@ def read_alike(
                     word = words[p]
                     quote, slash = word ^ _QUOTES, word ^ _SLASHES
                     found = ((quote - _ONES) & ~quote) | ((slash - _ONES) & ~slash) | ((word - _SPACES) & ~word)
-                    found = (found | word) & _HIGH
-                    p += ((((found & (~found + _1)) >> _7) - _1) & _ONES) * _ONES >> _56
-                    if found != _0:
+                    count = _first((found | word) & _HIGH)
+                    p += count
+                    if count != _8:
                         break
-                while p < end and data[p] >= 0x20 and data[p] < 0x80 and data[p] != 0x22 and data[p] != 0x5C:
+                while p < end:
+                    byte = data[p]
+                    if byte < 0x20 or byte >= 0x80 or byte == 0x22 or byte == 0x5C:
+                        break
                     p += _1
                 continue  # the next literal begins with the closing quote
             if byte >= 0x61:  # null, true, false
-                if p + np.uint64(5 if byte == 0x66 else 4) > end:
+                size = _5 if byte == 0x66 else _4
+                if p + size > end:
                     break
-                second, third, fourth = data[p + _1], data[p + _2], data[p + _3]
-                if byte == 0x6E and second == 0x75 and third == 0x6C and fourth == 0x6C:
-                    value = _NAN
-                elif byte == 0x74 and second == 0x72 and third == 0x75 and fourth == 0x65:
-                    value = _TRUE
-                elif byte == 0x66 and second == 0x61 and third == 0x6C and fourth == 0x73 and data[p + _4] == 0x65:
-                    value = _0
-                    p += _1
-                else:
+                word = _0
+                for k in range(size):
+                    word = word << _8 | data[p + k]
+                if word != _NULL and word != _TRUE and word != _FALSE:
                     break
-                p += _4
+                p += size
                 if column >= 0:
-                    bits[i, column] = value
+                    bits[i, column] = _NAN if word == _NULL else _ONE if word == _TRUE else _0
                 continue
             # -? (0 | [1-9][0-9]*) (. [0-9]+)? ([eE] [+-]? [0-9]+)?
             negative = np.uint64(byte == 0x2D)
@@ -110,46 +117,43 @@ def read_alike(
             overflow = False
             begin = p
             whole = True
-            q = 0
+            sound = False
             after = p  # the point
             while True:
-                # Of a fraction _8 digits at a time, and those that are left at once.
+                # Of a fraction 8 digits at a time, and those that are left at once.
                 while not whole and p + _8 <= end:
                     word = words[p]
                     low = word - _ZEROS
-                    found = ((word + _SIXES) | low) & _HIGH
-                    count = _8
-                    if found != _0:
-                        count = ((((found & (~found + _1)) >> _7) - _1) & _ONES) * _ONES >> _56
-                        if count == _0:
-                            break
-                        low <<= _64 - _8 * count
+                    count = _first(((word + _SIXES) | low) & _HIGH)
+                    if count == _0:
+                        break
+                    low <<= _64 - _8 * count
                     overflow = overflow or w > _LARGEST[count]
                     low = low * _10 + (low >> _8)
                     upper = (low & _PAIRS) * _UPPER
                     lower = ((low >> _16) & _PAIRS) * _LOWER
                     w = w * _TENS[count] + ((upper + lower) >> _32)
                     p += count
-                    if found != _0:
+                    if count != _8:
                         break
-                while p < end and data[p] >= 0x30 and data[p] <= 0x39:
+                while p < end:
+                    digit = np.uint64(data[p]) - _48
+                    if digit > _9:
+                        break
                     overflow = overflow or w > _LARGEST[1]
-                    w = w * _10 + np.uint64(data[p]) - _48
+                    w = w * _10 + digit
                     p += _1
-                if not whole or p >= end or data[p] != 0x2E:
+                if not whole:
                     break
-                if p == begin or (data[begin] == 0x30 and p > begin + _1):
+                sound = p > begin and (data[begin] != 0x30 or p == begin + _1)  # type: ignore[assignment]
+                if not sound or p >= end or data[p] != 0x2E:
                     break
                 whole = False
                 p += _1
                 after = p
-            if whole:
-                if p == begin or (data[begin] == 0x30 and p > begin + _1) or p - begin > _MOST_DIGITS:
-                    break
-            elif p == after:
+            if not sound or (p - begin > _MOST_DIGITS if whole else p == after):
                 break
-            else:
-                q = np.int64(after) - np.int64(p)  # type: ignore[assignment]
+            q = np.int64(0) if whole else np.int64(after) - np.int64(p)
             if p < end and data[p] | 0x20 == 0x65:
                 whole = False
                 p += _1
@@ -158,8 +162,11 @@ def read_alike(
                     p += _1
                 after = p
                 power = 0
-                while p < end and data[p] >= 0x30 and data[p] <= 0x39:
-                    power = min(power * 10 + np.int64(data[p]) - 0x30, 100000)  # type: ignore[assignment]
+                while p < end:
+                    digit = np.uint64(data[p]) - _48
+                    if digit > _9:
+                        break
+                    power = min(power * 10 + np.int64(digit), 100000)  # type: ignore[assignment]
                     p += _1
                 if p == after:
                     break

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.formats.decimal_kernel import powers_of_five
 from cdtool.formats.mcap.columns import json_kernel as kernel
-from cdtool.formats.mcap.columns.decimal_kernel import powers_of_five
 from cdtool.formats.mcap.columns.gathered import ByteArray, IntArray
 from cdtool.formats.mcap.fields import STAMPS, Field, FieldMissingError, numeric_fields
 

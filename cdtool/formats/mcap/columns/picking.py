@@ -67,30 +67,44 @@ def elements_called(plan: Plan, found: Found) -> Called:
     return Called(element, picking.state, picking.fault)
 
 
+def elements_of(
+    plan: Plan, count: int, names: tuple[str, ...], joints: Sequence[str]
+) -> int | list[int] | slice | None:
+    """Which of `count` elements, called `names`, the plan takes: one, some in this order, all, or None: it depends."""
+    index = plan.index
+    if index is None:
+        return 0
+    if index != WHOLE:
+        element = int(index) if is_element_number(index) else names.index(index) if index in names else count
+        return element if element < count else None
+    if not joints or plan.names is None:
+        return slice(None)
+    try:
+        order = order_of(count, names, joints)
+    except FieldMissingError:
+        return None
+    return slice(None) if order is None or order == list(range(count)) else order
+
+
 def _picked_at_once(plan: Plan, found: Found, joints: Sequence[str]) -> Picked | None:
     """The field where all messages have as many elements with the same names; None where that is not known."""
     slot = found.slots[plan.place]
-    elements, index = slot.uniform, plan.index
-    if not found.whole or not elements or plan.arrays:
+    count = slot.uniform
+    if not found.whole or not count or plan.arrays:
+        return None
+    names: tuple[str, ...] = ()
+    if plan.names is not None and (joints or plan.index != WHOLE):
+        if not found.names[plan.names].alike(found.rows):
+            return None
+        names = found.names[plan.names].of(0)
+    elements = elements_of(plan, count, names, joints)
+    if elements is None:
         return None
     n = len(found.status)
     state = np.broadcast_to(_THERE, n)
-    if index is None or (is_element_number(index) and int(index) < elements):
-        return Picked(slot.numbers(None, int(index or 0), 1)[:, 0], None, state, alike=True)
-    if index != WHOLE:
-        return None
-    order = None
-    if joints and plan.names is not None:
-        names = found.names[plan.names]
-        if not names.alike(found.rows):
-            return None
-        try:
-            order = order_of(elements, names.of(0), joints)
-        except FieldMissingError:
-            return None
-    values = slot.numbers(None, 0, elements)
-    if order is not None and order != list(range(elements)):
-        values = values[:, order]
+    if isinstance(elements, int):
+        return Picked(slot.numbers(None, elements, 1)[:, 0], None, state, alike=True)
+    values = slot.numbers(None, 0, count)[:, elements]
     return Picked(values, np.broadcast_to(np.int64(values.shape[1]), n), state, alike=True)
 
 

@@ -79,6 +79,9 @@ class TagFinder:
         reason = _reason(batch, status) if damaged.any() else ""
         return Found(damaged.astype(np.uint8), reason, slots, names, whole=not damaged.any())
 
+    def pattern(self, places: tuple[Place, ...]) -> None:
+        """None: where a field lies depends on the numbers before it."""
+
 
 def _reason(batch: Batch, status: ByteArray) -> str:
     first = int(np.flatnonzero(status)[0])

@@ -73,7 +73,7 @@ def read_tags(
     used = 0
     for i in range(start.size):
         p = start[i]
-        status[i] = WHOLE
+        fate = WHOLE
         for s in range(count.shape[1]):
             count[i, s] = scratch[_ROOM, s] = 0
         for s in range(nodes.shape[0]):
@@ -85,10 +85,10 @@ def read_tags(
         depth = 0
         scratch[_ENDS, 0], scratch[_NODE_AT, 0], scratch[_GROUP_AT, 0] = p + length[i], 0, 0
         while True:
-            end = scratch[_ENDS, depth]
+            end, node, group = scratch[_ENDS, depth], scratch[_NODE_AT, depth], scratch[_GROUP_AT, depth]
             if p >= end:
-                if scratch[_GROUP_AT, depth] > 0:
-                    status[i] = CUT
+                if group > 0:
+                    fate = CUT
                     break
                 depth -= 1
                 if depth < 0:
@@ -96,13 +96,10 @@ def read_tags(
                 continue
             key, p = varint(data, p, end)
             number, wire = np.int64(key >> np.uint64(3)), np.int64(key & np.uint64(7))
-            if p < 0 or number == 0 or key > np.uint64(0xFFFFFFFF):
-                status[i] = CUT
+            if p < 0 or number == 0 or key > np.uint64(0xFFFFFFFF) or wire > 5 or (wire == 4 and group != number):
+                fate = CUT
                 break
             if wire == 4:
-                if scratch[_GROUP_AT, depth] != number:
-                    status[i] = CUT
-                    break
                 depth -= 1
                 continue
             value = np.uint64(0)
@@ -111,96 +108,94 @@ def read_tags(
             if wire == 0 or wire == 2:
                 value, at = varint(data, p, end)
                 size = np.int64(value) if wire == 2 else 0  # type: ignore[assignment]
-            elif wire > 5:
-                at = -1
             if at < 0 or size < 0 or size > end - at:
-                status[i] = CUT
+                fate = CUT
                 break
             p = at + size
-            node = scratch[_NODE_AT, depth]
             inner = -1
-            if node >= 0:
-                for t in range(nodes[node, 0], nodes[node, 1]):
-                    if tags[t, NUMBER] != number:
-                        continue
-                    holds, slot = tags[t, HOLDS], tags[t, SLOT]
-                    if tags[t, ONEOF] >= 0:
-                        # Another member of the oneof, and all that it nests, is gone.
-                        other = scratch[_CHOSEN, tags[t, ONEOF]]
-                        if other >= 0 and other != t:
-                            for s in range(tags[other, FIRST_SLOT], tags[other, LAST_SLOT]):
-                                count[i, s] = scratch[_ROOM, s] = 0
-                            for s in range(tags[other, FIRST_NODE], tags[other, LAST_NODE]):
-                                seen[i, s] = 0
-                        scratch[_CHOSEN, tags[t, ONEOF]] = t
-                    if holds == UNWANTED:
-                        continue
-                    if MESSAGE <= holds <= COUNT:
-                        if (holds != COUNT and (wire == 3) != (holds == GROUP)) or (wire != 2 and wire != 3):
-                            status[i] = WRONG
-                        if holds == COUNT:
-                            count[i, slot] += 1
-                        elif tags[t, ELEMENT] < 0 or tags[t, ELEMENT] == scratch[_TIMES, t]:
-                            inner = tags[t, NODE]
-                            seen[i, inner] = 1
-                        scratch[_TIMES, t] += 1
-                        continue
-                    expected = 2 if holds == TEXTS else holds & 15
-                    packed = wire == 2 and holds < TEXTS and holds >= REPEATED
-                    if wire != expected and not packed:
-                        status[i] = WRONG
-                        continue
-                    q = at
-                    if packed and expected != VARINT and count[i, slot] == 0 and size > 0:
-                        # The usual case at once: all elements of an array.
-                        width = 8 if expected == EIGHT else 4
-                        many = size // width
-                        if many * width != size:
-                            status[i] = CUT
-                            break
-                        begin[i, slot] = used
-                        used += many
+            first_tag, last_tag = (nodes[node, 0], nodes[node, 1]) if node >= 0 else (0, 0)
+            for t in range(first_tag, last_tag):
+                if tags[t, NUMBER] != number:
+                    continue
+                holds, slot, oneof = tags[t, HOLDS], tags[t, SLOT], tags[t, ONEOF]
+                if oneof >= 0:
+                    # Another member of the oneof, and all that it nests, is gone.
+                    other = scratch[_CHOSEN, oneof]
+                    if other >= 0 and other != t:
+                        for s in range(tags[other, FIRST_SLOT], tags[other, LAST_SLOT]):
+                            count[i, s] = scratch[_ROOM, s] = 0
+                        for s in range(tags[other, FIRST_NODE], tags[other, LAST_NODE]):
+                            seen[i, s] = 0
+                    scratch[_CHOSEN, oneof] = t
+                if holds == UNWANTED:
+                    continue
+                if MESSAGE <= holds <= COUNT:
+                    if (holds != COUNT and (wire == 3) != (holds == GROUP)) or (wire != 2 and wire != 3):
+                        fate = WRONG
+                    times, element = scratch[_TIMES, t], tags[t, ELEMENT]
+                    if holds == COUNT:
+                        count[i, slot] += 1
+                    elif element < 0 or element == times:
+                        inner = tags[t, NODE]
+                        seen[i, inner] = 1
+                    scratch[_TIMES, t] = times + 1
+                    continue
+                expected = 2 if holds == TEXTS else holds & 15
+                packed = wire == 2 and holds < TEXTS and holds >= REPEATED
+                if wire != expected and not packed:
+                    fate = WRONG
+                    continue
+                first, held, room = begin[i, slot], count[i, slot], scratch[_ROOM, slot]
+                width = 8 if expected == EIGHT else 4
+                q = at
+                if packed and expected != VARINT and held == 0 and size > 0:
+                    # The usual case at once: all elements of an array.
+                    held = room = size // width
+                    if held * width != size:
+                        fate = CUT
+                        break
+                    first = used
+                    used += held
+                    if used > pool.size:
+                        return -1
+                    for k in range(held):
+                        pool[first + k] = at + k * width
+                    q = p
+                while q < p or not packed:
+                    if packed and expected == VARINT:
+                        value, q = varint(data, q, p)
+                    elif packed:
+                        value = np.uint64(q)
+                        q += width
+                    elif expected == 2:
+                        value = np.uint64(at - start[i]) << np.uint64(32) | np.uint64(size)
+                    elif expected != VARINT:
+                        value = np.uint64(at)
+                    if q < 0 or q > p:
+                        fate = CUT
+                        break
+                    if holds < REPEATED:
+                        held = 0
+                    if held == room:
+                        further = room == 0 or first + room != used
+                        moved, first = first, used if further else first
+                        room = 2 * room + 1 if further else room + 1
+                        used = first + room
                         if used > pool.size:
                             return -1
-                        for k in range(many):
-                            pool[begin[i, slot] + k] = at + k * width
-                        count[i, slot] = scratch[_ROOM, slot] = many
-                        q = p
-                    while q < p or not packed:
-                        if packed and expected == VARINT:
-                            value, q = varint(data, q, p)
-                        elif packed:
-                            value = np.uint64(q)
-                            q += 8 if expected == EIGHT else 4
-                        elif expected == 2:
-                            value = np.uint64(at - start[i]) << np.uint64(32) | np.uint64(size)
-                        elif expected != VARINT:
-                            value = np.uint64(at)
-                        if q < 0 or q > p:
-                            status[i] = CUT
-                            break
-                        if holds < REPEATED:
-                            count[i, slot] = 0
-                        if count[i, slot] == scratch[_ROOM, slot]:
-                            moved, held = begin[i, slot], scratch[_ROOM, slot]
-                            further = held == 0 or moved + held != used
-                            scratch[_ROOM, slot] = 2 * held + 1 if further else held + 1
-                            begin[i, slot] = used if further else moved
-                            used = begin[i, slot] + scratch[_ROOM, slot]
-                            if used > pool.size:
-                                return -1
-                            if further:  # elements that come between those of another field move to the pool's end
-                                for k in range(held):
-                                    pool[begin[i, slot] + k] = pool[moved + k]
-                        pool[begin[i, slot] + count[i, slot]] = value
-                        count[i, slot] += 1
-                        if not packed:
-                            break
-            if status[i] != WHOLE:
+                        if further:  # elements that come between those of another field move to the pool's end
+                            for k in range(held):
+                                pool[first + k] = pool[moved + k]
+                    pool[first + held] = value
+                    held += 1
+                    if not packed:
+                        break
+                begin[i, slot], count[i, slot], scratch[_ROOM, slot] = first, held, room
+            if fate != WHOLE:
                 break
             if inner >= 0 or wire == 3:
                 if depth == DEEPEST:
-                    status[i] = CUT
+                    fate = CUT
                     break
                 depth += 1
                 scratch[_NODE_AT, depth] = inner
@@ -208,4 +203,5 @@ def read_tags(
                 scratch[_ENDS, depth] = end if wire == 3 else p
                 if wire != 3:
                     p = at
+        status[i] = fate
     return used

@@ -10,15 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns.by_name import NamedPlan, gather_by_name, numbered
+from cdtool.formats.mcap.columns.by_name import NamedPlan, gather_by_name
 from cdtool.formats.mcap.columns.gathered import ByteArray, Gathered, IntArray
-from cdtool.formats.mcap.columns.picking import WHOLE, Plan, nowhere, pick
+from cdtool.formats.mcap.columns.pattern import Pattern
+from cdtool.formats.mcap.columns.picking import Plan, nowhere, pick
+from cdtool.formats.mcap.columns.recipes import recipe_of
+from cdtool.formats.mcap.columns.resolution import names_place, resolve
 from cdtool.formats.mcap.columns.slots import Found, Place
-from cdtool.formats.mcap.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
-from cdtool.formats.mcap.layouts.layout import Layout, Member, Message, Number, Schema, Text
+from cdtool.formats.mcap.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError
+from cdtool.formats.mcap.layouts.layout import Layout, Member, Message, Number, Schema
+from cdtool.formats.mcap.taken import Recipe
 
 _MOST_FIELDS = 4096
-_NO_MEMBERS = Layout("", ())  # of a number or text
 _LATEST = 9_223_372_035  # s: an int64 of ns holds no more
 
 
@@ -27,6 +30,10 @@ class Finder(Protocol):
 
     def find(self, batch: Batch, places: tuple[Place, ...]) -> Found:
         """The places, each asked for once."""
+        ...
+
+    def pattern(self, places: tuple[Place, ...]) -> Pattern | None:
+        """What the last messages had in common; None where they had nothing."""
         ...
 
 
@@ -53,10 +60,7 @@ class TypedDecoder:
         """The wanted fields of all messages; one that the schema does not have is absent in all, with its fault."""
         plans = [self.plan(each) for each in wanted]
         stamp = self.stamp_places() if stamps else ()
-        places = dict.fromkeys(
-            place for plan in plans if not isinstance(plan, FieldMissingError) for place in plan.places
-        )
-        found = self.finder.find(batch, (*places, *(place for place in stamp if place not in places)))
+        found = self.finder.find(batch, _places(plans, stamp))
         parts = [self._gathered(plan, found, batch, joints) for plan in plans]
         picked = tuple(part.picked[0] for part in parts)
         status, reason = _damaged(found, parts)
@@ -64,6 +68,15 @@ class TypedDecoder:
             return Gathered(picked, status, reason)
         times, there = stamp_times(found, stamp)
         return Gathered(picked, status, reason, times, there)
+
+    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> Recipe | None:
+        """How more messages like the last ones become the same fields; None where they do not at once."""
+        plans = [plan for plan in (self.plan(each) for each in wanted) if isinstance(plan, Plan)]
+        stamp = self.stamp_places() if stamps else ()
+        if len(plans) < len(wanted) or (stamps and not stamp):
+            return None
+        pattern = self.finder.pattern(_places(plans, stamp))
+        return None if pattern is None else recipe_of(pattern, plans, joints, stamp)
 
     def _gathered(
         self, plan: Plan | NamedPlan | FieldMissingError, found: Found, batch: Batch, joints: Sequence[str]
@@ -90,7 +103,7 @@ class TypedDecoder:
 
     def element_names(self, batch: Batch) -> tuple[str, ...]:
         """The array of texts `name` of the first message, in its order; empty where there is none."""
-        place = _names_place(self.schema.root, ())
+        place = names_place(self.schema.root, ())
         if place is None:
             return ()
         found = self.finder.find(batch.first(1), (place,))
@@ -121,6 +134,12 @@ class TypedDecoder:
         return self.schema.nested(member.kind).member(name)
 
 
+def _places(plans: Sequence[Plan | NamedPlan | FieldMissingError], stamp: tuple[Place, ...]) -> tuple[Place, ...]:
+    """All that plans and stamp need, each once."""
+    needed = (place for plan in plans if not isinstance(plan, FieldMissingError) for place in plan.places)
+    return tuple(dict.fromkeys((*needed, *stamp)))
+
+
 def _some(batch: Batch, rows: IntArray) -> Batch:
     """The messages `rows` of a batch."""
     if len(rows) == len(batch):
@@ -137,72 +156,6 @@ def _damaged(found: Found, parts: Sequence[Gathered]) -> tuple[ByteArray, str]:
             first = not status.any() or np.argmax(more) < np.argmax(status != 0)
             status, reason = np.maximum(status, part.status), part.reason if first else reason
     return status, reason
-
-
-def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
-    """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
-    layout = schema.root
-    place: Place = ()
-    arrays: list[tuple[Place, int]] = []
-    last = len(field.steps) - 1
-    for i, (name, index) in enumerate(field.steps):
-        member = layout.member(name)
-        if member is None:
-            raise FieldMissingError(f"there is no '{name}'", layout.names)
-        parent, place = place, (*place, name)
-        if index is not None and member.array is None:
-            raise FieldMissingError(f"'{name}' is not an array", [name])
-        if index == WHOLE or (i == last and index is not None):
-            if index == WHOLE:
-                names = _names_place(layout, parent)
-            else:
-                names = None if is_element_number(index or "") else _named_place(layout, parent)
-            _require_number(field, member)
-            return Plan(field, place, index, tuple(arrays), names)
-        if member.array is not None and index is None:
-            raise FieldMissingError(
-                f"'{field.text}' is an array" if i == last else f"there is no '{field.steps[i + 1][0]}'",
-                [f"{field.text}[0]", f"{field.text}[:]"] if i == last else (),
-            )
-        if index is not None:
-            if isinstance(member.kind, Message) and schema.nested(member.kind).entry:
-                raise FieldMissingError(
-                    f"'{name}' is a map, whose entries have no order", advice="log the value in a field of its own"
-                )
-            if not is_element_number(index):
-                plan = NamedPlan(Plan(field, place, index, tuple(arrays), _named_place(layout, parent)), i)
-                resolve(numbered(field, i, 0), schema)  # whichever element it is, what stands behind it must be there
-                return plan
-            arrays.append((place, int(index)))
-            place = (*place, int(index))
-        if i == last:
-            _require_number(field, member)
-            return Plan(field, place, None, tuple(arrays))
-        layout = schema.nested(member.kind) if isinstance(member.kind, Message) else _NO_MEMBERS
-    raise FieldMissingError(f"'{field.text}' names nothing")
-
-
-def _require_number(field: Field, member: Member) -> None:
-    if isinstance(member.kind, Text):
-        raise FieldMissingError(f"'{field.text}' holds a text, not a number")
-    if isinstance(member.kind, Message):
-        raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
-
-
-def _named_place(layout: Layout, parent: Place) -> Place:
-    """The place of the texts that must be there; raises FieldMissingError."""
-    place = _names_place(layout, parent)
-    if place is None:
-        problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
-        raise FieldMissingError(problem, layout.names)
-    return place
-
-
-def _names_place(layout: Layout, parent: Place) -> Place | None:
-    member = layout.member("name")
-    if member is None or member.array is None or not isinstance(member.kind, Text):
-        return None
-    return (*parent, "name")
 
 
 def _numeric_names(schema: Schema, layout: Layout, prefix: str, above: tuple[str, ...]) -> Iterator[str]:

@@ -16,14 +16,19 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Self
 
-from cdtool.formats.cores import usable_cores
+import numpy as np
+
+from cdtool.cores import usable_cores
 from cdtool.formats.mcap.container.buffers import Buffers
 from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Decompressor, chunk_header
 from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.foretold import foretold_messages
 from cdtool.formats.mcap.container.records import ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.formats.mcap.taken import Taken, Taker
 
 # Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
 # through the processor's cache, with less, what there is to do for each piece of memory counts.
@@ -31,31 +36,62 @@ JOINED = 14 << 20
 _LARGEST = 16 << 20  # chunks beyond this size are read one by one
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
+_SUBMITTED = 3  # chunks to one thread: handing them over costs as much as a tenth of one
 # Memory that was never used before costs as much as decompressing into it does: it is kept from log to log.
 _BUFFERS = Buffers(JOINED)
 
 
 @dataclass(frozen=True)
+class _Filled:
+    """A chunk that was checked: its header, and either its messages, if they were taken, or its address in memory."""
+
+    header: ChunkHeader
+    address: int = 0
+    taken: Taken | None = None
+
+
+class _Reader:
+    """What one thread reads with at a time."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = FileBytes(path)
+        self.decompressor = Decompressor()
+        self._room = np.empty(0, np.uint8)
+
+    def room(self, size: int) -> Bytes:
+        """Memory that is used for one chunk after another, so that it stays in the processor's cache."""
+        if size > len(self._room):
+            self._room = np.empty(size, np.uint8)
+        return self._room[:size]
+
+
+@dataclass(frozen=True)
 class _Group:
-    """Memory for a group of chunks, and each one's header, place in the memory, and whether it is there."""
+    """Memory for a group of chunks, and what becomes of each; None: it has to be read when its turn comes."""
 
     memory: Bytes
-    chunks: tuple[Future[tuple[ChunkHeader, int] | None], ...]
+    chunks: tuple[Future[list[_Filled | None]], ...]
 
 
 class ChunksAhead:
-    """The chunks of `summary` at places that are not in `skip`; without a CRC of the summary, none."""
+    """The chunks of `summary` at places that are not in `skip`; without a CRC of the summary, none.
 
-    def __init__(self, path: Path, summary: Summary, skip: Container[int]) -> None:
-        self._path = path
+    `taker` is given each one, as long as `definitions` are of one meaning.
+    """
+
+    def __init__(
+        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: Taker | None
+    ) -> None:
+        self._path, self._definitions, self._taker = path, definitions, taker
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
+        self._rows = foretold_messages(chunks) if taker is not None else {}
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
         self._started: dict[int, _Group] = {}
-        self._there: dict[ChunkHeader, int] = {}
+        self._there: dict[ChunkHeader, _Filled] = {}
         self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
-        self._readers: SimpleQueue[tuple[FileBytes, Decompressor]] = SimpleQueue()
+        self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
     def __enter__(self) -> Self:
         return self
@@ -66,7 +102,7 @@ class ChunksAhead:
         if self._threads is not None:
             self._threads.shutdown(cancel_futures=True)
         while not self._readers.empty():
-            self._readers.get()[0].close()
+            self._readers.get().file.close()
 
     def begins(self, at: int) -> bool:
         """The chunk at byte `at` is the first of a group: it and the others have memory of their own."""
@@ -80,63 +116,86 @@ class ChunksAhead:
         for passed in [place for place in self._started if place < at]:
             del self._started[passed]
         following: int | None = at
-        for _ in range(1 + _GROUPS_AHEAD):
+        # What a taker learns from the first group holds for the next ones only if it comes before them.
+        learning = self._taker is not None and at == next(iter(self._groups))
+        for _ in range(1 if learning else 1 + _GROUPS_AHEAD):
             if following is not None and following not in self._started:
                 self._started[following] = self._start(self._groups[following])
             following = self._following.get(following) if following is not None else None
         group = self._started.pop(at)
-        chunks = [chunk.result() for chunk in group.chunks]
+        chunks = [chunk for several in group.chunks for chunk in several.result()]
         if not all(chunks) or len(group.memory) < size:
             return _BUFFERS.take(size)
-        self._there = {header: place for chunk in chunks if chunk is not None for header, place in [chunk]}
+        self._there = {chunk.header: chunk for chunk in chunks if chunk is not None}
         return group.memory
 
     def holds(self, header: ChunkHeader, content: Bytes) -> bool:
         """The chunk with this header stands in `content` already, checked."""
-        return self._there.get(header) == content.ctypes.data
+        filled = self._there.get(header)
+        return filled is not None and filled.address == content.ctypes.data
+
+    def taken(self, header: ChunkHeader) -> Taken | None:
+        """The messages of the chunk with this header; None where they have to be looked at."""
+        filled = self._there.get(header)
+        return None if filled is None or self._definitions.ambiguous else filled.taken
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
         memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
-        begun, end = [], 0
+        places, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size
-            begun.append(self._threads.submit(self._fill, index, memory[start:end]))
-        return _Group(memory, tuple(begun))
+            places.append((index, memory[start:end]))
+        several = [places[i : i + _SUBMITTED] for i in range(0, len(places), _SUBMITTED)]
+        return _Group(memory, tuple(self._threads.submit(self._fill_all, some) for some in several))
 
-    def _fill(self, index: ChunkIndex, content: Bytes) -> tuple[ChunkHeader, int] | None:
+    def _fill_all(self, places: list[tuple[ChunkIndex, Bytes]]) -> list[_Filled | None]:
+        return [self._fill(index, content) for index, content in places]
+
+    def _fill(self, index: ChunkIndex, content: Bytes) -> _Filled | None:
         at = index.chunk_start_offset
         try:
-            file, decompressor = self._reader()
+            reader = self._reader()
         except OSError:
             return None
         try:
-            header = chunk_header(at, file.read(at, HEADER_LENGTH))
+            header = chunk_header(at, reader.file.read(at, HEADER_LENGTH))
             if header is None or not header.uncompressed_crc or not same_figures(index, header):
                 return None
             header.check()
-            decompressor.read(file, header, content)
+            if self._taker is None or not self._taker.ready or at not in self._rows:
+                reader.decompressor.read(reader.file, header, content)
+                return _Filled(header, content.ctypes.data)
+            room = reader.room(len(content))
+            reader.decompressor.read(reader.file, header, room)
+            taken = self._taker.take(room, self._rows[at], self._knows)
+            if taken is not None:
+                return _Filled(header, taken=taken)
+            content[:] = room
+            return _Filled(header, content.ctypes.data)
         except (DamageError, OSError):
             return None
-        else:
-            return header, content.ctypes.data
         finally:
-            self._readers.put((file, decompressor))
+            self._readers.put(reader)
 
-    def _reader(self) -> tuple[FileBytes, Decompressor]:
+    def _knows(self, opcode: int, body: bytes) -> bool:
+        return self._definitions.knows(opcode, body, covered=True)
+
+    def _reader(self) -> _Reader:
         try:
             return self._readers.get_nowait()
         except Empty:
-            return FileBytes(self._path), Decompressor()
+            return _Reader(self._path)
 
 
 def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
+    """The first one is a single chunk, as a taker learns from it."""
     group: list[ChunkIndex] = []
-    size = 0
+    size = most = 0
     for index in chunks:
-        if group and size + index.uncompressed_size > JOINED:
+        if group and size + index.uncompressed_size > most:
             yield group
-            group, size = [], 0
+            group, size, most = [], 0, JOINED
         if index.uncompressed_size <= _LARGEST:
             group.append(index)
             size += index.uncompressed_size

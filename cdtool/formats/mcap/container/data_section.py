@@ -25,6 +25,7 @@ from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss, Losses
+from cdtool.formats.mcap.container.record_length import NO_KIND, record_length
 from cdtool.formats.mcap.container.records import (
     MAGIC,
     PREFIX,
@@ -42,12 +43,12 @@ from cdtool.formats.mcap.container.resync import Resync
 from cdtool.formats.mcap.container.room import Piece, Room, Walked
 from cdtool.formats.mcap.container.skim import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.taken import Taker
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
-_NO_KIND = "a record of kind 0, which there is not"
 _REASONS = {
-    why.NO_KIND: _NO_KIND,
+    why.NO_KIND: NO_KIND,
     why.TOO_LONG: "a record claims more bytes than its chunk has left",
     why.SHORT_MESSAGE: "a message shorter than its header",
 }
@@ -60,18 +61,24 @@ class DataSection:
     tells other times than their messages.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, skip: Mapping[int, object]) -> None:
+    def __init__(
+        self,
+        file: FileBytes,
+        summary: Summary,
+        definitions: Definitions,
+        skip: Mapping[int, object],
+        taker: Taker | None,
+    ) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
         self.extras: dict[tuple[int, int, int], None] = {}
         self.end: DataEnd | None = None
-        self.end_at = 0
-        self.other_times = 0
+        self.end_at = self.other_times = 0
         self.room = Room(definitions)
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
-        self._ahead = ChunksAhead(file.path, summary, skip)
+        self._ahead = ChunksAhead(file.path, summary, skip, definitions, taker)
         self._window = _SMALLEST_WINDOW
         self._claims = Claims()
         self._resync = Resync(file, summary)
@@ -99,7 +106,7 @@ class DataSection:
                 if opcode == Chunk.opcode and header is not None and header.data + header.size > self._file.size:
                     yield from self._cut_chunk(header)
                     return
-                length = self._length(at, head)
+                length = record_length(at, head, self._file.size)
                 if opcode == Footer.opcode:
                     return
                 if opcode in _OUTSIDE_CHUNKS:
@@ -122,18 +129,6 @@ class DataSection:
             raise DamageError("a chunk's compression has no name that there is")
         return opcode
 
-    def _length(self, at: int, head: memoryview) -> int:
-        """Length of the record at `at`, prefix included; raises DamageError where it cannot be."""
-        left = self._file.size - at - PREFIX
-        if left < 0:
-            raise DamageError(f"the file ends within a record: {left + PREFIX} bytes are left")
-        length = int.from_bytes(head[1:PREFIX], "little")
-        if head[0] == 0:
-            raise DamageError(_NO_KIND)
-        if length > left:
-            raise DamageError(f"a record claims {length} bytes where {left} are left")
-        return PREFIX + length
-
     def _resume(self, at: int, reason: str) -> int:
         begin, found = self._resync.after(at)
         behind = self._file.size if found is None else found
@@ -153,18 +148,25 @@ class DataSection:
             header.check()
             self._claims.add(header)
             if self._ahead.begins(header.at) or not self.room.fits(header.uncompressed_size, covered):
-                yield from self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered)
+                yield from self.room.flush()  # before the next group is waited for: it may be taken by these
+                self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered)
             content = self.room.take(header.uncompressed_size)
-            if not self._ahead.holds(header, content):
+            taken = self._ahead.taken(header)
+            if taken is None and not self._ahead.holds(header, content):
                 self._decompressor.read(self._file, header, content)
         except DamageError as fault:
             self._lost = self.losses.add(Loss.of_chunk(header, self._summary, str(fault)))
             return
         self._resync.proven = header.at + header.length
-        walked = yield from self.room.walk(len(content))
-        self._note(walked, header.at, len(content))
-        if walked.why == why.DONE and walked.times is not None:
-            self.other_times += walked.times != (header.message_start_time, header.message_end_time)
+        if taken is not None:
+            yield from self.room.pass_over(len(content), taken)
+            times: tuple[int, int] | None = taken.times
+        else:
+            walked = yield from self.room.walk(len(content))
+            self._note(walked, header.at, len(content))
+            times = walked.times if walked.why == why.DONE else None
+        if times is not None:
+            self.other_times += times != (header.message_start_time, header.message_end_time)
 
     def _is_chunk(self, start: int) -> bool:
         return start < self._file.size and self._file.read(start, 1)[0] == Chunk.opcode
@@ -188,7 +190,8 @@ class DataSection:
         header.check()
         self.losses.stopped = True
         self.losses.add(loss)
-        yield from self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
+        yield from self.room.flush()
+        self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
         content = self.room.take(header.uncompressed_size)
         packed = self._file.passing(header.data, left)
         if header.compression:

@@ -77,6 +77,22 @@ class Definitions:
         found = (self._find(channel) for channel in self._channels | self._fallback.channels)
         return [stream for stream in found if isinstance(stream, Stream)]
 
+    def told_otherwise(self) -> list[str]:
+        """Topics whose channel or schema the summary defines otherwise than the data."""
+        known = {stream.channel.id: stream for stream in self.streams()}
+        return [
+            channel.topic
+            for channel in self._fallback.channels.values()
+            if channel.id in known
+            and (
+                known[channel.id].channel != channel
+                or (
+                    (schema := known[channel.id].schema) is not None
+                    and self._fallback.schemas.get(schema.id, schema) != schema
+                )
+            )
+        ]
+
     def _find(self, channel_id: int) -> Stream | DamageError:
         # A definition that was lost with its chunk may still stand in a summary without a CRC.
         channel = self._channels.get(channel_id) or self._fallback.channels.get(channel_id)

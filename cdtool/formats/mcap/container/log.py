@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.formats.mcap.batch import Batch
+from cdtool.formats.mcap.batch import NO_BATCH, Batch
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import Definitions, Stream
@@ -20,16 +20,21 @@ from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.formats.mcap.taken import Part, Taker
 from cdtool.recording import Finding
 
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one channel; `covered`: a CRC covers them and what their ids mean."""
+    """Messages of one channel; `covered`: a CRC covers them and what their ids mean.
+
+    They are either a batch or `parts` that a taker made columns of, chunk by chunk.
+    """
 
     stream: Stream
     batch: Batch
     covered: bool
+    parts: tuple[Part, ...] = ()
 
 
 @dataclass
@@ -48,7 +53,8 @@ class Log:
 
     `wanted` says which topics are asked for: of others messages are counted only, and chunks without any wanted one are
     passed over where the summary proves right. Without `use_index` every chunk is read, from the front. Unless it is
-    `strict`, a file of which nothing is left, or whose values are known to be wrong, is no error but a finding.
+    `strict`, a file of which nothing is left, or whose values are known to be wrong, is no error but a finding. A
+    `taker` may make columns of chunks.
     """
 
     def __init__(
@@ -57,6 +63,7 @@ class Log:
         wanted: Callable[[str], bool] | None = None,
         use_index: bool = True,
         strict: bool = True,
+        taker: Taker | None = None,
     ) -> None:
         self.path = path
         self._strict = strict
@@ -65,7 +72,7 @@ class Log:
         self.summary = read_summary(self._file)
         self._skip = skippable(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
-        self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
+        self.section = DataSection(self._file, self.summary, self._definitions, self._skip, taker)
         self.profile = profile_of(self._file)
         self.counts: Counter[int] = Counter()
         self.topics: dict[str, Topic] = {}
@@ -99,25 +106,33 @@ class Log:
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
     def _usable(self, piece: Piece) -> Iterator[Messages]:
-        lost = self.section.losses.messages
+        for channel in dict.fromkeys(channel for taken in piece.taken for channel in taken.counts):
+            count = sum(taken.counts.get(channel, 0) for taken in piece.taken)
+            parts = tuple(taken.parts[channel] for taken in piece.taken if channel in taken.parts)
+            yield from self._counted(channel, count, piece.covered, NO_BATCH, parts)
         for channel, batch in piece.batches:
             if channel in piece.cuts:
                 kept = int(np.searchsorted(batch.start, piece.cuts[channel]))
                 if kept < len(batch):
-                    lost[self._definitions.ambiguous[channel]] += len(batch) - kept
+                    reason = self._definitions.ambiguous[channel]
+                    self.section.losses.messages[reason] += len(batch) - kept
                 batch = batch.first(kept)
-                if not kept:
-                    continue
-            try:
-                stream = self._definitions.stream(channel)
-            except DamageError as fault:
-                lost[str(fault)] += len(batch)
-                continue
-            self.counts[channel] += len(batch)
-            covered = piece.covered and stream.covered
-            self.unverified += 0 if covered else len(batch)
-            if self._wanted(stream.channel.topic):
-                yield Messages(stream, batch, covered)
+            if len(batch):
+                yield from self._counted(channel, len(batch), piece.covered, batch)
+
+    def _counted(
+        self, channel: int, count: int, covered: bool, batch: Batch, parts: tuple[Part, ...] = ()
+    ) -> Iterator[Messages]:
+        try:
+            stream = self._definitions.stream(channel)
+        except DamageError as fault:
+            self.section.losses.messages[str(fault)] += count
+            return
+        self.counts[channel] += count
+        covered = covered and stream.covered
+        self.unverified += 0 if covered else count
+        if self._wanted(stream.channel.topic):
+            yield Messages(stream, batch, covered, parts)
 
     def _finish(self) -> None:
         section = self.section
@@ -218,20 +233,5 @@ class Log:
             read = {channel: count for channel, count in self.counts.items() if count}
             if stated != read and statistics.message_count == self.count:
                 found.append(Finding("the summary disagrees with the data: other message counts by channel"))
-        return found + self._other_definitions()
-
-    def _other_definitions(self) -> list[Finding]:
-        known = {stream.channel.id: stream for stream in self._definitions.streams()}
-        differing = [
-            channel.topic
-            for channel in self.summary.channels.values()
-            if channel.id in known
-            and (
-                known[channel.id].channel != channel
-                or (
-                    (schema := known[channel.id].schema) is not None
-                    and self.summary.schemas.get(schema.id, schema) != schema
-                )
-            )
-        ]
-        return [Finding("the summary defines it otherwise than the data", topic) for topic in differing]
+        text = "the summary defines it otherwise than the data"
+        return found + [Finding(text, topic) for topic in self._definitions.told_otherwise()]

@@ -13,19 +13,22 @@ from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.formats.mcap.taken import Taken
 
 
 @dataclass(frozen=True)
 class Piece:
     """Messages in one piece of memory, channel by channel.
 
-    `covered`: a CRC covers the bytes; `cuts`: channels whose definition changes at a place of `data`.
+    `covered`: a CRC covers the bytes; `cuts`: channels whose definition changes at a place of `data`. `taken`: chunks
+    whose messages are columns already; then there are no batches.
     """
 
     data: Bytes
     batches: tuple[tuple[int, Batch], ...]
     covered: bool
     cuts: Mapping[int, int]
+    taken: tuple[Taken, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class Room:
         self._used = 0
         self._covered = False
         self._cuts: dict[int, int] = {}
+        self._taken: list[Taken] = []
 
     def fits(self, size: int, covered: bool) -> bool:
         """`size` more bytes can lie beside what is there, and a CRC covers both or neither."""
@@ -58,13 +62,21 @@ class Room:
         """Memory for the next chunk; it counts once `walk` is told of it."""
         return self._data[self._used : self._used + size]
 
-    def renew(self, memory: Bytes, covered: bool) -> Iterator[Piece]:
-        """Hand out what is there, and begin anew with `memory`."""
-        yield from self.flush()
+    def renew(self, memory: Bytes, covered: bool) -> None:
+        """Begin anew with `memory`, once what is there was handed out."""
         self._data, self._covered = memory, covered
+
+    def pass_over(self, size: int, taken: Taken) -> Iterator[Piece]:
+        """The next `size` bytes are a chunk whose messages are columns already."""
+        if self._table.count:
+            yield from self._hand_out()
+        self._taken.append(taken)
+        self._used += size
 
     def walk(self, size: int, top_level: bool = False) -> Generator[Piece, None, Walked]:
         """Take the records of the next `size` bytes; gives a Walked. Hands out pieces where the table is full."""
+        if self._taken:
+            yield from self._hand_out()
         at, end, before = self._used, self._used + size, self._table.count
         faults: list[str] = []
         emptied = False
@@ -107,6 +119,11 @@ class Room:
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, start))
 
     def _hand_out(self) -> Iterator[Piece]:
+        if self._taken:
+            taken, self._taken = tuple(self._taken), []
+            if self.first_time is None or self.first_time >= NO_DATE:
+                self.first_time = taken[0].first_time
+            yield Piece(self._data, (), self._covered, {}, taken)
         if not self._table.count:
             return
         if self.first_time is None or self.first_time >= NO_DATE:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.instructions import prefetch
 from cdtool.kernels import kernel
-from cdtool.prefetch import prefetch
 
 # Why a walk ended.
 DONE, FULL, OTHER_KIND, NO_KIND, TOO_LONG, SHORT_MESSAGE = range(6)

@@ -7,7 +7,9 @@ Python.
 
 from __future__ import annotations
 
+import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,12 @@ from cdtool.kernels import kernel
 
 SMALLEST, LARGEST = -342, 308
 UNDECIDED = np.uint64(0xFFFFFFFFFFFFFFFF)  # the bits of a NaN
+POWERS = "Array(uint64, 2, 'C', readonly=True)"
+
+# Unsigned constants: a signed one beside an unsigned number would make a float of both.
+_0, _1, _3, _9, _32, _52, _63, _64 = map(np.uint64, (0, 1, 3, 9, 32, 52, 63, 64))
+_LOW_WORD, _MASK = np.uint64(0xFFFFFFFF), np.uint64(0x1FF)
+_HIDDEN, _TWICE_HIDDEN = np.uint64(2**52), np.uint64(2**53)
 
 
 @cache
@@ -36,46 +44,53 @@ def powers_of_five() -> npt.NDArray[np.uint64]:
 @kernel("UniTuple(uint64, 2)(uint64, uint64)")
 def product(a: np.uint64, b: np.uint64) -> tuple[np.uint64, np.uint64]:
     """The upper and lower 64 bits of a b."""
-    half, low = np.uint64(32), np.uint64(0xFFFFFFFF)
-    a1, a0, b1, b0 = a >> half, a & low, b >> half, b & low
-    first = a0 * b0
-    middle = a1 * b0 + (first >> half)
-    other = a0 * b1 + (middle & low)
-    return a1 * b1 + (middle >> half) + (other >> half), a * b
+    a1, a0, b1, b0 = a >> _32, a & _LOW_WORD, b >> _32, b & _LOW_WORD
+    middle = a1 * b0 + (a0 * b0 >> _32)
+    other = a0 * b1 + (middle & _LOW_WORD)
+    return a1 * b1 + (middle >> _32) + (other >> _32), a * b
 
 
-@kernel("uint64(uint64, int64, Array(uint64, 2, 'C', readonly=True))")
+@kernel(f"uint64(uint64, int64, {POWERS})")
 def float_bits(w: np.uint64, q: int, powers: npt.NDArray[np.uint64]) -> np.uint64:
     """The bits of the float64 nearest to w 10^q; UNDECIDED where that is subnormal, infinite or too close to call."""
-    one = np.uint64(1)
-    if w == np.uint64(0):
+    if w == _0:
         return w
     if q < SMALLEST or q > LARGEST:
         return UNDECIDED
-    zeros = 0
-    for step in (32, 16, 8, 4, 2, 1):
-        if w >> np.uint64(64 - step) == np.uint64(0):
-            w = w << np.uint64(step)
+    zeros = _0
+    step = _32
+    while step > _0:
+        if w >> (_64 - step) == _0:
+            w = w << step
             zeros += step
+        step = step >> _1
     high, low = product(w, powers[q - SMALLEST, 0])
-    if high & np.uint64(0x1FF) == np.uint64(0x1FF):
+    if high & _MASK == _MASK:
         second, _ = product(w, powers[q - SMALLEST, 1])
         low += second
         if second > low:
-            high += one
+            high += _1
     if low == UNDECIDED and (q < -27 or q > 55):
         return UNDECIDED
-    upper = np.int64(high >> np.uint64(63))
-    shift = np.uint64(upper + 9)
+    upper = high >> _63
+    shift = upper + _9
     mantissa = high >> shift
-    exponent = ((217706 * q) >> 16) + 63 + upper - zeros + 1023
-    if low <= one and q >= -4 and q <= 23 and mantissa & np.uint64(3) == one and mantissa << shift == high:
-        mantissa -= one  # exactly between two float64: to the even one
-    mantissa = (mantissa + (mantissa & one)) >> one
-    if mantissa >= np.uint64(2**53):
-        mantissa = np.uint64(2**52)
+    exponent = ((217706 * q) >> 16) + 1086 + np.int64(upper) - np.int64(zeros)
+    if low <= _1 and q >= -4 and q <= 23 and mantissa & _3 == _1 and mantissa << shift == high:
+        mantissa -= _1  # exactly between two float64: to the even one
+    mantissa = (mantissa + (mantissa & _1)) >> _1
+    if mantissa >= _TWICE_HIDDEN:
+        mantissa = _HIDDEN
         exponent += 1
     if exponent <= 0 or exponent >= 0x7FF:
         return UNDECIDED
-    bits: np.uint64 = (mantissa & np.uint64(2**52 - 1)) | (np.uint64(exponent) << np.uint64(52))
+    bits: np.uint64 = (mantissa & (_HIDDEN - _1)) | (np.uint64(exponent) << _52)
     return bits
+
+
+@kernel("float64(uint64)")
+def as_float(bits: np.uint64) -> float:
+    """The normal, positive float64 with these bits."""
+    digits: Any = (bits & (_HIDDEN - _1)) | _HIDDEN
+    power: Any = np.int64(bits >> _52)
+    return math.ldexp(np.float64(digits), power - 1075)

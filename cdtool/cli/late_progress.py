@@ -1,0 +1,51 @@
+"""A progress bar for commands that are mostly done before one could be read."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from threading import Lock, Timer
+from typing import TYPE_CHECKING
+
+from cdtool.cli.console import progress
+
+if TYPE_CHECKING:
+    from cdtool.workflows.runs import Progress
+
+# Shorter waits need no bar [s].
+_AFTER = 1.0
+
+
+@contextmanager
+def late_progress(what: str, after: float = _AFTER) -> Iterator[Progress | None]:
+    """The bar of `progress`, drawn where the block takes longer than `after` [s]; None where there is no terminal.
+
+    Until it is told how much there is to do, it only moves.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with ExitStack() as drawn:
+        bars: list[Progress] = []
+        lock, ended = Lock(), False
+
+        def draw() -> None:
+            with lock:
+                bar = None if ended else drawn.enter_context(progress(what))
+                if bar is not None:
+                    bars.append(bar)
+
+        def advance(done: int, total: int) -> None:
+            for bar in bars:
+                bar(done, total)
+
+        timer = Timer(after, draw)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield advance
+        finally:
+            timer.cancel()
+            with lock:
+                ended = True

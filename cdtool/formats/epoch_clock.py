@@ -1,0 +1,77 @@
+"""The clock of a container that may count from an epoch: its first stamp is taken off before anything is rounded.
+
+Nanoseconds since 1970 have 19 digits, float64 has 16: only their differences are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.clock import EPOCH
+from cdtool.recording import FloatArray
+
+
+@dataclass(frozen=True)
+class EpochClock:
+    """Stamps as a file holds them: `read(start, end)` gives them, integers as integers.
+
+    A stamp counts `factor` [s] from `base` [s] after 1970, or after what nobody tells; those in `missing` are none.
+    """
+
+    read: Callable[[int, int], npt.NDArray[Any]]
+    factor: float
+    base: Fraction = Fraction(0)
+    missing: tuple[float, ...] = ()
+    first: Fraction | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "first", _exact(self.read(0, 1)[0]))
+
+    @property
+    def start(self) -> Fraction | None:
+        """The first stamp [s], exactly; None where it is no number."""
+        return None if self.first is None else self.base + self.first * _decimal(self.factor)
+
+    def times(self, start: int, end: int, origin: Fraction) -> FloatArray:
+        """Times [s] after `origin`; NaN where there is no stamp."""
+        raw = self.read(start, end)
+        if not origin or self.start is None:
+            times = np.asarray(raw, dtype=np.float64) * self.factor + float(self.base - origin)
+        else:
+            times = _since(raw, self.first or Fraction(0)) * self.factor + float(self.start - origin)
+        if self.missing:
+            times[np.isin(raw, self.missing)] = np.nan
+        return times
+
+
+def common_origin(clocks: Iterable[EpochClock]) -> Fraction:
+    """The first stamp of all [s], to be taken off, where clocks count from an epoch; 0 where one does not."""
+    starts = [clock.start for clock in clocks if clock.start is not None]
+    earliest = min(starts, default=Fraction(0))
+    return earliest if earliest > EPOCH else Fraction(0)
+
+
+def _since(raw: npt.NDArray[Any], first: Fraction) -> FloatArray:
+    """Stamps less the first one; between integers without rounding."""
+    if raw.dtype.kind == "u":  # modulo 2^64, which gives stamps before the first one their sign
+        return (raw.astype(np.uint64) - np.uint64(int(first))).view(np.int64).astype(np.float64)
+    if raw.dtype.kind == "i":
+        return (raw.astype(np.int64) - np.int64(int(first))).astype(np.float64)
+    return np.asarray(raw, dtype=np.float64) - float(first)
+
+
+def _exact(stamp: Any) -> Fraction | None:
+    if isinstance(stamp, np.integer):
+        return Fraction(int(stamp))
+    return Fraction(float(stamp)) if np.isfinite(float(stamp)) else None
+
+
+def _decimal(factor: float) -> Fraction:
+    """1e-9 is meant to be 1 / 10^9, which a float is not."""
+    return Fraction(repr(factor))

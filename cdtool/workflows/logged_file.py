@@ -1,0 +1,201 @@
+"""The mapped channels of an MCAP file as logged, in SI, piece by piece: what channel_assembly makes of columns."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.channels import ChannelSource
+from cdtool.errors import RecordingError
+from cdtool.formats.channel_assembly import (
+    apart_findings,
+    check_width,
+    in_si,
+    masked_findings,
+    stuck_findings,
+)
+from cdtool.formats.distribution import Distribution
+from cdtool.formats.mcap.mapped_pieces import MappedLog
+from cdtool.formats.pieces import Piece, Run
+from cdtool.formats.reading import _held
+from cdtool.formats.source import Column, Source
+from cdtool.formats.time_order import Lateness, by_time
+from cdtool.machine_file import MachineFile
+from cdtool.recording import MEASURED, Finding, FloatArray
+from cdtool.workflows.clean_pieces import CleanPieces, Gaps
+
+
+class LoggedChannel:
+    """A channel's samples so far: cleaned and in SI, with what is odd about them.
+
+    `period` [s] is the median step, where it is known: then gaps are looked for, too.
+    """
+
+    def __init__(self, path: Path, item: ChannelSource, period: float | None = None) -> None:
+        self._path, self.item, self.joints = path, item, len(item.factor)
+        self.clean = CleanPieces()
+        self.rows, self.first, self.last = 0, np.nan, np.nan
+        self.steps = Distribution()
+        self.digest: Any = hashlib.blake2b(digest_size=16)  # of the times
+        self._gaps = None if period is None else Gaps(period, item.channel)
+        self._infinite = self._saturated = self._missing = 0
+        self._known = np.zeros(self.joints, np.int64)
+        self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
+
+    def add(self, stamps: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values."""
+        keep = self.clean.keep(stamps, stamps)
+        time = stamps[keep]
+        table = np.full((len(stamps), self.joints), np.nan) if values is None else values.reshape(len(stamps), -1)
+        check_width(self._path, self.item, table.shape[1])
+        rows, infinite, saturated = in_si(self.item, table[keep])
+        self._infinite, self._saturated = self._infinite + infinite, self._saturated + saturated
+        present = np.isfinite(rows)
+        self._missing += rows.size - int(np.count_nonzero(present))
+        self._known += np.count_nonzero(present, axis=0)
+        self._least = np.fmin(self._least, np.fmin.reduce(rows, axis=0, initial=np.inf))
+        self._most = np.fmax(self._most, np.fmax.reduce(rows, axis=0, initial=-np.inf))
+        if len(time):
+            self.steps.add(np.diff(time) if self.rows == 0 else np.diff(time, prepend=self.last))
+            self.first, self.last = float(time[0]) if self.rows == 0 else self.first, float(time[-1])
+            self.digest.update(time)
+            self.rows += len(time)
+            if self._gaps is not None:
+                self._gaps.add(time)
+        return (time + self.item.time_offset if self.item.time_offset else time), rows
+
+    @property
+    def is_coarse(self) -> bool:
+        """Its clock is to be made a straight line of, for which clean_time needs it as a whole."""
+        return self.item.channel != "event" and self.clean.is_coarse
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time [s], `time_offset` included."""
+        return self.first + self.item.time_offset, self.last + self.item.time_offset
+
+    @property
+    def constant(self) -> list[bool]:
+        """Joint by joint: does the value never change?"""
+        return list(map(bool, (self._known > 1) & (self._least == self._most)))
+
+    def findings(self) -> list[Finding]:
+        """What is odd, in the words of channel_assembly."""
+        found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
+        found += masked_findings(self.item, self._infinite, self._saturated)
+        found += self._gaps.findings() if self._gaps is not None else []
+        if self._missing:
+            text = f"{self._missing} of {self.rows * self.joints} values are missing (NaN)"
+            found.append(Finding(text, self.item.channel))
+        return found
+
+
+class LoggedFile:
+    """An MCAP file that is read once for its figures, twice where its messages do not stand in the order of time.
+
+    `channels` hold the figures, `late` [s] by how much any sample stands behind later ones. Gaps are known once
+    `pieces` has been run through. Raises RecordingError.
+    """
+
+    def __init__(self, path: Path, machine_file: MachineFile) -> None:
+        self.path, self._items = path, machine_file.topics.sources
+        self._log = MappedLog(path, machine_file.topics)
+        self._is_sorted = True
+        self.channels = self._new()
+        source, lateness = self._survey()
+        self.late = lateness.late
+        self._columns: Mapping[str, list[Column]] = {name: [column] for name, column in source.columns.items()}
+        if not (self._is_sorted and self._log.settled):
+            self._survey_in_order()
+        source, held = _held(source, machine_file.topics)
+        self.channels = {item.channel: self.channels[item.channel] for item in held.sources}
+        self.origin, self._told = source.origin, source.findings
+        for channel in self.channels.values():
+            check_width(path, channel.item, math.prod(source.columns[channel.item.described].values.shape[1:]))
+            if not channel.rows:
+                raise RecordingError(f"{path}: channel '{channel.item.channel}' has no sample with a time")
+        offsets = [item.time_offset for item in held.sources]
+        self.late += max(offsets, default=0.0) - min(offsets, default=0.0)
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample of any channel [s]."""
+        return min((channel.span[0] for channel in self.channels.values()), default=np.inf)
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample of any channel [s]."""
+        return max((channel.span[1] for channel in self.channels.values()), default=-np.inf)
+
+    @property
+    def is_coarse(self) -> bool:
+        """A channel's clock cannot be cleaned piece by piece."""
+        return any(channel.is_coarse for channel in self.channels.values())
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is odd about the file and its channels."""
+        found = [*self._told, *(item for channel in self.channels.values() for item in channel.findings())]
+        found += stuck_findings({name: self.channels[name].constant for name in MEASURED if name in self.channels})
+        found += apart_findings({name: channel.span for name, channel in self.channels.items()})
+        return tuple(found)
+
+    def pieces(self, names: Collection[str], shift: float) -> Iterator[Piece]:
+        """The channels of those names, each a clock of its own; `shift` [s] is added to their times."""
+        again = {
+            name: LoggedChannel(self.path, channel.item, channel.steps.median)
+            for name, channel in self.channels.items()
+            if name in names
+        }
+        for piece in self._in_order():
+            for channel, time, rows in _added(again, piece):
+                if len(time):
+                    name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
+                    yield Piece(name, time + shift, {name: values}, len(time))
+        self.channels |= again
+
+    def _survey(self) -> tuple[Source, Lateness]:
+        """The figures, as if all were in order."""
+        lateness, orders = Lateness(), dict[str, Lateness]()
+        run = Run(self._log.pieces())
+        for piece in run:
+            if piece.time is not None:
+                lateness.add(piece.time)
+                orders.setdefault(piece.clock, Lateness()).add(piece.time)
+            for _ in _added(self.channels, piece):
+                pass
+        self._is_sorted = all(order.late == 0.0 for order in orders.values())
+        return run.source, lateness
+
+    def _survey_in_order(self) -> None:
+        self.channels = self._new()
+        for piece in self._in_order():
+            for _ in _added(self.channels, piece):
+                pass
+
+    def _new(self) -> dict[str, LoggedChannel]:
+        return {item.channel: LoggedChannel(self.path, item) for item in self._items}
+
+    def _in_order(self) -> Iterator[Piece]:
+        """The fields' pieces, those of each field in the order of their times."""
+        run = Run(self._log.pieces())
+        if self._is_sorted:
+            yield from run
+        else:
+            for ready in by_time(run, self._columns, self.late, sort=True):
+                yield from ready.values()
+
+
+def _added(
+    channels: Mapping[str, LoggedChannel], piece: Piece
+) -> Iterator[tuple[LoggedChannel, FloatArray, FloatArray]]:
+    """The channels that a field's piece is one of, with their times and values in it."""
+    for channel in channels.values():
+        if channel.item.described == piece.clock and piece.time is not None:
+            yield channel, *channel.add(piece.time, piece.values.get(piece.clock))

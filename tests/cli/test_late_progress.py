@@ -1,0 +1,85 @@
+"""The progress of convert, recover and init: on a terminal, and only where it takes a while."""
+
+from __future__ import annotations
+
+import sys
+from time import sleep
+
+import pytest
+
+from cdtool.cli.late_progress import late_progress
+from cdtool.workflows.converting import convert
+from cdtool.workflows.recovering import recover
+from tests.test_converting import table
+from tests.test_converting_parts import write_part
+
+
+class Terminal:
+    """A stderr that says it is one, and keeps what is written."""
+
+    encoding = "utf-8"
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        self.text += text
+        return len(text)
+
+    def flush(self) -> None:
+        pass
+
+
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """A terminal as stderr; no fixture, since pytest changes stderr behind those."""
+    made = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", made)
+    return made
+
+
+def test_nothing_is_drawn_where_there_is_no_terminal(capsys):
+    with late_progress("converting", after=0.0) as advance:
+        assert advance is None
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_is_drawn_where_it_is_done_soon(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with late_progress("converting", after=60.0) as advance:
+        assert advance is not None
+        advance(1, 2)
+    assert stderr.text == ""
+
+
+def test_a_bar_comes_where_it_takes_longer_and_goes_at_the_end(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with late_progress("converting", after=0.0) as advance:
+        sleep(0.3)
+        assert advance is not None
+        advance(3, 7)
+        sleep(0.3)
+    assert "converting" in stderr.text and "3/7" in stderr.text
+    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")  # the line is wiped
+
+
+def test_an_error_in_the_block_comes_through_and_wipes_the_bar(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with pytest.raises(ValueError, match="mine"), late_progress("converting", after=0.0):
+        sleep(0.3)
+        raise ValueError("mine")
+    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")
+
+
+def test_convert_counts_its_rows_and_recover_its_messages_up_to_all_of_them(tmp_path):
+    log = table(tmp_path / "run.csv", rows=40_000)
+    steps: list[tuple[int, int]] = []
+    convert(log, tmp_path / "out.csv", progress=lambda done, total: steps.append((done, total)))
+    assert steps == sorted(steps) and steps[-1] == (40_000, 40_000)
+    steps.clear()
+    part = write_part(tmp_path / "part.mcap", 0.0)
+    recover(part, tmp_path / "out.mcap", progress=lambda done, total: steps.append((done, total)))
+    assert steps[-1] == (192, 192)

@@ -1,0 +1,100 @@
+"""Messages that never reached a log show in the numbers that their writer gave them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.writer import Writer
+
+from cdtool.formats.mcap import Mcap
+from tests.formats.mcap.small_files import small_file
+
+MS = 10**6
+
+
+def write(path, messages, chunk_size=400):
+    """Messages (topic, time [ms], number)."""
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=chunk_size)
+        writer.start()
+        channels = {topic: writer.register_channel(topic, "json", 0) for topic in {item[0]: 0 for item in messages}}
+        for topic, time, number in messages:
+            payload = json.dumps({"x": float(time)}).encode()
+            writer.add_message(channels[topic], 1000 * MS + time * MS, payload, 1000 * MS + time * MS, number)
+        writer.finish()
+    return path
+
+
+def told(path):
+    return [str(found) for found in Mcap().columns(path).findings if "did not reach the log" in found.message]
+
+
+def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
+    numbers = [i + 1 for i in range(400) if i not in (100, 101, 102, 300)]
+    path = write(tmp_path / "log.mcap", [("/a", number - 1, number) for number in numbers])
+    text = "the numbers of its messages jump in 2 places, the first after 0.099 s: 4 did not reach the log"
+    assert told(path) == [f"/a: {text}"]
+    (finding,) = [found for found in Mcap().columns(path).findings if "numbers" in found.message]
+    assert finding.severity == "warning"
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        [0] * 200,
+        list(range(1, 201)),
+        list(range(7, 2007, 10)),
+        [*range(1, 101), *range(1, 101)],
+        [*range(2**32 - 100, 2**32), *range(100)],
+        np.random.default_rng(1).integers(0, 2**32, 200).tolist(),
+    ],
+    ids=["no numbers", "all there", "every tenth", "started anew", "32 bits pass over", "no count"],
+)
+def test_what_is_no_count_with_jumps_is_not_told(tmp_path, numbers):
+    assert not told(write(tmp_path / "log.mcap", [("/a", i, number) for i, number in enumerate(numbers)]))
+
+
+def test_each_topic_is_counted_by_itself(tmp_path):
+    messages = [("/a", i, i + 1) for i in range(300) if i != 200]
+    messages += [("/b", 10 * i, i + 1) for i in range(30)]
+    messages.sort(key=lambda item: item[1])
+    (only,) = told(write(tmp_path / "log.mcap", messages))
+    assert only.startswith("/a: the numbers of its messages jump in one place, the first after 0.199 s: 1 did not")
+
+
+def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_path):
+    small_file(tmp_path / "whole.mcap", messages=200)  # two topics, one count
+    assert not told(tmp_path / "whole.mcap")
+    messages = [("/b" if i % 3 == 2 else "/a", i, i + 1) for i in range(300) if not 100 <= i < 110]
+    (only,) = told(write(tmp_path / "log.mcap", messages))
+    assert only == "the numbers of the messages jump in one place, the first after 0.099 s: 10 did not reach the log"
+
+
+@settings(max_examples=40, deadline=None)
+@given(lost=st.sets(st.integers(1, 298), max_size=60), chunk=st.sampled_from([100, 1000, 10**6]))
+def test_any_loss_between_the_first_and_the_last_message_is_counted(tmp_path_factory, lost, chunk):
+    messages = [("/a", i, i + 1) for i in range(300) if i not in lost]
+    found = told(write(tmp_path_factory.mktemp("jumps") / "log.mcap", messages, chunk))
+    assert len(found) == bool(lost)
+    if lost:
+        assert f": {len(lost)} did not reach the log" in found[0]
+
+
+def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_read(tmp_path):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=300)
+        writer.start()
+        unknown, known = (writer.register_channel("/a", encoding, 0) for encoding in ("morse", "json"))
+        for i in range(50):
+            writer.add_message(unknown, i * MS, b"...---...", i * MS)
+            writer.add_message(known, i * MS, json.dumps({"name": ["x"], "v": i}).encode(), i * MS)
+        writer.finish()
+    source = Mcap().columns(path)
+    assert source.columns["/a v"].values.tolist() == list(range(50))
+    assert any("50 of 100 messages cannot be decoded" in str(found) for found in source.findings)
+    assert Mcap().element_names(path, "/a") == ("x",)

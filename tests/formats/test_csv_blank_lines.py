@@ -1,0 +1,66 @@
+"""Blank lines of tables: in one column a missing sample, which must not shorten the time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdtool.formats.csv import Csv
+from cdtool.formats.pieces import joined
+from cdtool.formats.reading import read_recording
+
+RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
+
+
+def told(source, severity: str) -> list[str]:
+    return [str(finding) for finding in source.findings if finding.severity == severity]
+
+
+def test_a_blank_line_in_one_column_keeps_its_place_on_the_clock(log, machine):
+    recording = read_recording(log("x\n1.5\n2.5\n\n3.5\n4.5\n"), machine(RATE))
+    assert recording["speed"].time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
+    assert np.isnan(recording["speed"].values[:, 0]).tolist() == [False, False, True, False, False]
+    assert "line 4 blank: taken as missing samples" in told(recording, "warning")
+    assert told(recording, "loss") == []
+
+
+def test_where_every_other_line_is_blank_it_is_the_spacing_of_the_rows(log):
+    source = Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9))))
+    assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
+    assert told(source, "note") == ["8 lines (3, 5, 7, ...) skipped: blank"]
+
+
+def test_in_several_columns_a_blank_line_is_no_row(log):
+    source = Csv().columns(log("t;x\n0;1.5\n\n1;2.5\n"))
+    assert source.columns["x"].values.tolist() == [1.5, 2.5] and told(source, "note") == ["line 3 skipped: blank"]
+
+
+def test_a_time_in_one_column_has_no_stamp_in_a_blank_line(log):
+    source = Csv().columns(log("t\n12:00:01\n\n12:00:03\n12:00:04\n"))
+    assert np.array_equal(source.columns["t"].values, [43201, np.nan, 43203, 43204], equal_nan=True)
+
+
+@pytest.mark.parametrize("end", ["\n", "\n\n", "\n\n\n", "\n \t\n", "", "\n  "], ids=repr)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_blank_lines_at_the_end_are_no_samples(log, end, encoding):
+    source = Csv().columns(log(("x\n1.25\n\n2.25\n3.25" + end).encode(encoding)))
+    assert np.array_equal(source.columns["x"].values, [1.25, np.nan, 2.25, 3.25], equal_nan=True)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    lines=st.lists(st.sampled_from(["", " ", "\t"]) | st.integers(-99, 99).map(lambda x: f"{x}.5"), max_size=60),
+    end=st.sampled_from(["\n", "\r\n", "\r"]),
+    blocks=st.sampled_from([16, 64, 1 << 20]),
+)
+def test_every_line_between_the_first_and_the_last_number_is_a_sample(tmp_path, monkeypatch, lines, end, blocks):
+    lines = ["0.5", "1.5", *lines, *(["2.5"] * (len(lines) + 2))]  # fewer than half of them are blank
+    path = tmp_path / "log.csv"
+    path.write_bytes(end.join(["x", *lines, ""]).encode())
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", blocks)
+    truth = [float(line) if line.strip() else np.nan for line in lines]
+    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
+        assert np.array_equal(source.columns["x"].values, truth, equal_nan=True)
+        assert source.first_row == 2

@@ -1,0 +1,76 @@
+"""LabVIEW's measurement files: text with a head of keys, channels side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.errors import RecordingError
+from cdtool.formats.reading import choose_format, survey
+
+HEAD = """LabVIEW Measurement\t
+Writer_Version\t2
+Reader_Version\t2
+Separator\tTab
+Decimal_Separator\t.
+Multi_Headings\t{headings}
+X_Columns\tOne
+Time_Pref\tRelative
+Operator\tlab
+Date\t2024/03/05
+Time\t12:00:00.1234567
+***End_of_Header***\t
+"""
+SEGMENT = """\t
+Channels\t2\t\t
+Samples\t40\t40\t
+Date\t2024/03/05\t2024/03/05\t
+Time\t12:00:00.1234567\t12:00:00.1234567\t
+Y_Unit_Label\tN\tA\t
+X_Dimension\tTime\tTime\t
+X0\t0.0000000000000000E+0\t0.0000000000000000E+0\t
+Delta_X\t0.001000\t0.001000\t
+***End_of_Header***\t\t\t
+X_Value\tForce\tTorque\tComment
+"""
+ROWS = "".join(f"{i / 1000:.6f}\t{1.5 * i:.6f}\t{-0.5 * i:.6f}\n" for i in range(40))
+MEASUREMENT = HEAD.format(headings="No") + SEGMENT + ROWS
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])
+@pytest.mark.parametrize("decimal", [".", ","], ids=["point", "comma"])
+def test_a_measurement_file_is_read_by_its_suffix_with_names_units_and_times(log, decimal, end):
+    rows = ROWS.replace(".", decimal)
+    text = MEASUREMENT.replace("Decimal_Separator\t.", f"Decimal_Separator\t{decimal}").replace(ROWS, rows)
+    path = log(text.replace("\n", end), "gate.lvm")
+    assert ".lvm" in choose_format(path).suffixes
+    source = survey(path)
+    assert {key: column.unit for key, column in source.columns.items()} == {
+        "X_Value": None,
+        "Force": "N",
+        "Torque": "A",
+    }
+    assert source.columns["X_Value"].values.tolist() == [i / 1000 for i in range(40)]
+    assert source.columns["Force"].values.tolist() == [1.5 * i for i in range(40)]
+    assert np.array_equal(source.columns["Torque"].values, [-0.5 * i for i in range(40)])
+    assert "above the rows skipped" in str(source.findings[0])
+
+
+def test_a_comment_behind_a_row_is_named_and_left_out(log):
+    rows = [f"{row}\t{'gate closed' if i == 3 else ''}\n" for i, row in enumerate(ROWS.splitlines())]
+    source = survey(log(MEASUREMENT.replace(ROWS, "".join(rows))))
+    assert list(source.columns) == ["X_Value", "Force", "Torque"]
+    assert "column 'Comment' is not numeric (line 27 holds 'gate closed'): left out" in map(str, source.findings)
+
+
+def test_a_second_heading_is_refused_with_its_line_rather_than_read_on(log):
+    path = log(HEAD.format(headings="Yes") + SEGMENT + ROWS + SEGMENT + ROWS, "two.lvm")
+    with pytest.raises(RecordingError, match="line 64 has 2 cells, the header has 3"):
+        survey(path)
+
+
+def test_info_takes_its_first_column_for_the_clock(log):
+    info = cdtool.info(log(MEASUREMENT, "gate.lvm"))
+    assert info.format == "csv"
+    assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 3)

@@ -1,0 +1,168 @@
+"""Tables with a clock beside each channel: no channel is read on another one's clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdtool.errors import RecordingError
+from cdtool.formats.csv import Csv
+from cdtool.formats.pieces import joined
+from cdtool.formats.reading import read_recording
+
+OWN = """[channels]
+time = { column = "time", unit = "s" }
+torque = { column = "torque", unit = "N m" }
+force = { column = "force", unit = "N" }
+speed = { column = "speed", unit = "rad/s" }
+"""
+HEADERS = [
+    "time1,force,time2,torque,speed",
+    "time,force,time,torque,speed",
+    "time,force,time2,torque,speed",
+    "X_Value,force,X_Value,torque,speed",
+]
+
+
+def named(clock: str) -> str:
+    return OWN.replace('"time", unit', f'"{clock}", unit')
+
+
+def table(header: str, first, second, mark: str = ",") -> str:
+    """Two clocks, the shorter one ending in empty cells; force is its row, torque 10 times, speed 100 times its row."""
+    lines = [header.replace(",", mark)]
+    for i in range(max(len(first), len(second))):
+        a = f"{first[i]:.9f},{i}" if i < len(first) else ","
+        b = f"{second[i]:.9f},{10 * i},{100 * i}" if i < len(second) else ",,"
+        lines.append(f"{a},{b}".replace(",", mark))
+    return "\n".join(lines) + "\n"
+
+
+CELL, DRIVE = np.arange(50) / 2000.0, np.arange(40) / 1000.0
+
+
+def said(source) -> list[str]:
+    return [str(found) for found in source.findings if "another clock" in found.message]
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_each_channel_gets_the_clock_before_it(log, machine, header):
+    recording = read_recording(log(table(header, CELL, DRIVE)), machine(OWN))
+    assert recording["force"].time.tolist() == CELL.tolist()
+    assert recording["force"].values[:, 0].tolist() == list(range(50))
+    for channel in ("torque", "speed"):
+        assert recording[channel].time.tolist() == DRIVE.tolist()
+    assert not [found for found in recording.findings if found.severity != "note"]
+    assert "each channel is on the clock beside it: " in " ".join(map(str, recording.findings))
+
+
+def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, machine):
+    path = log(table("time,force,time2,torque,speed", 1e3 * CELL, 1e3 * DRIVE))
+    with pytest.raises(RecordingError, match="stands beside the clock 'time2'") as fault:
+        read_recording(path, machine(OWN.replace('unit = "s"', 'unit = "ms"')))
+    assert "in the unit of its header ('time2 [ms]')" in fault.value.hint
+    path = log(table("time [ms],force,time2 [ms],torque,speed", 1e3 * CELL, 1e3 * DRIVE))
+    recording = read_recording(path, machine(OWN))
+    assert recording["force"].time == pytest.approx(CELL) and recording["torque"].time == pytest.approx(DRIVE)
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "why"),
+    [
+        (0.0, 0.001, r"their steps are 0\.001 and 0\.0005"),
+        (0.0, 0.00051, r"their steps are 0\.00051 and 0\.0005"),
+        (0.0, 0.0005002, r"they drift apart by 0\.0008"),
+        (0.0071, 0.0005, r"it starts at 0\.0071, not 0"),
+    ],
+    ids=["other rate", "2 % slower", "drifting", "later"],
+)
+@pytest.mark.parametrize("clock", ["time1", "time2"])
+def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start, step, why, clock):
+    count = np.arange(4000)
+    path = log(table(HEADERS[0], 0.0005 * count, start + step * count))
+    wrong, other = ("torque", "time2") if clock == "time1" else ("force", "time1")
+    text = rf"column '{wrong}' stands beside the clock '{other}', the machine file says '{clock}': "
+    if clock == "time1":
+        text += why
+    with pytest.raises(RecordingError, match=text) as fault:
+        read_recording(path, machine(named(clock)))
+    assert 'time = { column = "time", unit = "s" }' in fault.value.hint
+    only = "\n".join(line for line in named(clock).splitlines() if wrong not in line and "speed" not in line)
+    kept = "force" if clock == "time1" else "torque"
+    assert len(read_recording(path, machine(only))[kept]) == 4000
+    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
+        (told,) = said(source)
+        assert told.startswith("time2: another clock than 'time1' (") and "beside it torque, speed" in told
+
+
+@pytest.mark.parametrize(
+    ("header", "second"),
+    [
+        ("time1,force,time2,torque,speed", CELL),
+        ("time1,force,time_ms,torque,speed", 1e3 * CELL),
+        ("time1,force,timestamp,torque,speed", 1.7e9 + CELL),
+        ("time1,force,timestamp [us],torque,speed", 1e6 * CELL),
+        ("time1,force,t_motor,torque,speed", 20.0 + 5.0 * np.sin(300.0 * CELL)),
+    ],
+    ids=["same", "in ms", "since 1970", "in us", "a temperature"],
+)
+def test_a_second_clock_of_the_same_rows_is_no_other_clock(log, machine, header, second):
+    path = log(table(header, CELL, second))
+    recording = read_recording(path, machine(named("time1")))
+    assert recording["torque"].time.tolist() == CELL.tolist()
+    assert not said(Csv().columns(path))
+
+
+def test_clocks_side_by_side_are_of_the_same_rows(log, machine):
+    rows = "".join(f"{i / 100},{i / 100 + (i % 7) * 0.002},{i},{10 * i},{100 * i}\n" for i in range(60))
+    path = log("time,stamp_s,force,torque,speed\n".replace("stamp_s", "timestamp") + rows)
+    assert read_recording(path, machine(named("time")))["torque"].time[-1] == 0.59
+    assert not said(Csv().columns(path))
+
+
+def test_clocks_behind_their_channels_are_known_by_the_last_column(log, machine):
+    rows = "".join(f"{i},{i / 2000},{10 * i},{100 * i},{i / 1000}\n" for i in range(50))
+    recording = read_recording(log("force,time1,torque,speed,time2\n" + rows), machine(OWN))
+    assert recording["force"].time[-1] == 49 / 2000 and recording["torque"].time[-1] == 49 / 1000
+
+
+def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
+    header = "time1 [ms],force,time2 [s],torque,speed"
+    path = log(table(header, 1.7e12 + 1e3 * CELL, 1.7e9 + 0.125 + DRIVE))
+    recording = read_recording(path, machine(OWN))
+    assert recording.origin == 1.7e9
+    assert recording["force"].time == pytest.approx(CELL, abs=1e-6)
+    assert recording["torque"].time == pytest.approx(0.125 + DRIVE, abs=1e-6)
+
+
+def test_a_channel_that_no_clock_is_beside_is_refused(log, machine):
+    rows = "".join(f"{i},{i / 2000},{10 * i},{i / 1000},{100 * i}\n" for i in range(50))
+    with pytest.raises(RecordingError, match="no clock stands before column 'force'"):
+        read_recording(log("force,time1,torque,time2,speed\n" + rows), machine(OWN))
+
+
+def test_values_without_a_time_are_a_loss(log, machine):
+    rows = "".join(f"{i / 2000},{i},{'' if i == 7 else i / 1000},{10 * i},{100 * i}\n" for i in range(50))
+    recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
+    assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
+    lost = [str(found) for found in recording.findings if found.severity == "loss"]
+    text = "1 values stand in rows in which its clock is empty: left out"
+    assert lost == [f"torque: {text}", f"speed: {text}"]
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    rates=st.lists(st.sampled_from([50, 100, 250, 1000]), min_size=2, max_size=2, unique=True),
+    counts=st.lists(st.integers(8, 60), min_size=2, max_size=2),
+    mark=st.sampled_from([",", "\t", ";"]),
+)
+def test_no_channel_is_ever_on_another_ones_clock(log, machine, rates, counts, mark):
+    first, second = (np.arange(count) / rate for count, rate in zip(counts, rates, strict=True))
+    path = log(table(HEADERS[0], first, second, mark))
+    recording = read_recording(path, machine(OWN))
+    assert recording["force"].time.tolist() == first.tolist()
+    assert recording["torque"].time.tolist() == second.tolist()
+    with pytest.raises(RecordingError, match="stands beside the clock"):
+        read_recording(path, machine(named("time1")))
