@@ -88,6 +88,8 @@ def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
         "info": ["info", "LOG"],
         "convert to .parquet": ["convert", "LOG", str(folder / "out.parquet"), "--force"],
         "convert to .mcap": ["convert", "LOG", str(folder / "out.mcap"), "--force"],
+        "convert --machine to .parquet": ["convert", "LOG", str(folder / "out.parquet"), *machine, "--force"],
+        "convert --machine to .mcap": ["convert", "LOG", str(folder / "out.mcap"), *machine, "--force"],
         "recover": ["recover", "LOG", "-o", str(folder / "recovered.mcap"), "--unverified", "--force"],
     }
     held, rows = True, []

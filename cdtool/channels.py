@@ -247,4 +247,5 @@ def _column(table: Table, value: object, key: str) -> str | int:
         return value
     if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
-    raise table.fault(key, "is missing" if value is None else f"is {value!r}", "a column's name, or its number, from 0")
+    problem = "is missing" if value is None else f"is {value!r}"
+    raise table.fault(key, problem, "a column's name, or its number counted from 0")

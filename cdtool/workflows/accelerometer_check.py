@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from cdtool.errors import RecordingError
@@ -69,11 +71,11 @@ def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
     if np.count_nonzero(known) < 2:
         return np.empty(0), np.empty(0)
     gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / _WINDOW
-    bins = np.digitize(acceleration.time, edges) - 1
+    bounds = np.searchsorted(acceleration.time, edges).tolist()
     means = np.full(len(edges) - 1, np.nan)
-    values = acceleration.values[:, joint]
-    for i in range(len(means)):
-        part = values[(bins == i) & np.isfinite(values)]
+    for i, (start, end) in enumerate(pairwise(bounds)):
+        part = acceleration.values[start:end, joint]
+        part = part[np.isfinite(part)]
         if len(part):
             means[i] = part.mean()
     good = np.isfinite(means) & np.isfinite(gained)

@@ -7,7 +7,7 @@ import pytest
 
 import cdtool
 from cdtool.errors import RecordingError
-from cdtool.formats.reading import choose_format, survey
+from cdtool.formats.reading import choose_format, read_recording, survey
 
 HEAD = """LabVIEW Measurement\t
 Writer_Version\t2
@@ -68,6 +68,25 @@ def test_a_second_heading_is_refused_with_its_line_rather_than_read_on(log):
     path = log(HEAD.format(headings="Yes") + SEGMENT + ROWS + SEGMENT + ROWS, "two.lvm")
     with pytest.raises(RecordingError, match="line 64 has 2 cells, the header has 3"):
         survey(path)
+
+
+def test_a_clock_for_each_channel_is_kept(log, machine):
+    """`X_Columns Multi`: the keys of a channel stand above its values, between them the times."""
+    lines = []
+    for line in SEGMENT.splitlines():
+        key, *values = line.split("\t")
+        lines.append("\t".join([key, *(f"{value}\t" for value in values[:2])]))
+    lines[-1] = "X_Value\tforce\tX_Value\tspeed\tComment"
+    rows = [f"{i / 1000:.6f}\t{1.5 * i:.6f}\t{i / 250:.6f}\t{-0.5 * i:.6f}" for i in range(40)]
+    path = log(HEAD.format(headings="No") + "\n".join([*lines, *rows]) + "\n", "multi.lvm")
+    channels = '[channels]\ntime = { column = "time", unit = "s" }\nforce = { column = "force", unit = "N" }\n'
+    recording = read_recording(path, machine(channels + 'speed = { column = "speed", unit = "rad/s" }\n'))
+    assert recording["force"].time.tolist() == [i / 1000 for i in range(40)]
+    assert recording["speed"].time.tolist() == [i / 250 for i in range(40)]
+    with pytest.raises(RecordingError, match="column 'speed' stands beside the clock 'X_Value#2'"):
+        read_recording(
+            path, machine(channels.replace('"time"', "0") + 'speed = { column = "speed", unit = "rad/s" }\n')
+        )
 
 
 def test_info_takes_its_first_column_for_the_clock(log):

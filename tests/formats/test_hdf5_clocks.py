@@ -164,6 +164,14 @@ def test_a_packed_clock_with_missing_stamps_is_one_too(saved):
     assert np.allclose(times, [2.01, 2.02, np.nan, 2.04], rtol=1e-15, equal_nan=True)
 
 
+def test_an_epoch_is_taken_off_before_a_clock_is_scaled(saved):
+    """Ticks of 100 ns since 1970: scaled first, float64 would hold them to 240 ns."""
+    ticks = 17_000_000_001_234_567 + np.cumsum(np.random.default_rng(7).integers(9_001, 11_000, 200))
+    source = survey(saved(time=(ticks, {"units": "s", "scale_factor": 1e-7}), q=(np.arange(200.0), {})))
+    assert np.allclose(source.columns["q"].time, (ticks - ticks[0]) / 1e7, rtol=4e-16, atol=0.0)
+    assert source.origin == ticks[0] / 1e7
+
+
 def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     path = saved(
         drive__t=(np.arange(10.0) * 10.0, {"unit": "ms"}),

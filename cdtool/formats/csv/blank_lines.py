@@ -5,10 +5,9 @@ Where every other line is blank it is the spacing of the rows, and none of them 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from cdtool.formats.csv.lines import Line
 from cdtool.formats.csv.row_kernel import Integers
 from cdtool.formats.csv.text import AFTER, UNIT_BYTES, Text
 
-_EMPTY_CELL = b'""'
+_EMPTY_CELL, _BLANK = b'""', b" \t\r\n"
 
 
 def are_missing(lines: Sequence[Line], first: int, width: int) -> bool:
@@ -32,7 +31,7 @@ def without_blank_end(text: Text) -> Text:
     """The text up to the end of its last line that is not blank."""
     while True:
         end = text.line_end.join(text.tail())
-        blank = end[len(end.rstrip(b" \t\r\n")) :]
+        blank = end[len(end.rstrip(_BLANK)) :]
         more = len(blank) - (blank.find(text.line_end) + 1)
         if not more or not blank.strip(b" \t"):
             return text
@@ -41,22 +40,19 @@ def without_blank_end(text: Text) -> Text:
 
 def filled(block: bytearray, size: int, line_end: bytes) -> tuple[bytearray, int, Integers]:
     """A block of `size` bytes with an empty cell in each blank line, its new size, and these lines (from 0)."""
-    lines: list[int] = []
-    parts: list[bytes] = []
-    at = number = 0
-    for blank in _blank(line_end).finditer(block, 0, size):
-        number += block.count(line_end, at, blank.start())
-        lines.append(number)
-        parts += [bytes(block[at : blank.start()]), _EMPTY_CELL]
-        at = blank.start()
-    if not lines:
+    begins = (line_end + bytes((letter,)) for letter in _BLANK)
+    if block[0] not in _BLANK and all(block.find(begin, 0, size) < 0 for begin in begins):  # nearly always, and soon
         return block, size, np.empty(0, dtype=np.int64)
-    made = b"".join([*parts, bytes(block[at:size])])
-    return bytearray(made + line_end * AFTER), len(made), np.array(lines, dtype=np.int64)
-
-
-@cache
-def _blank(line_end: bytes) -> re.Pattern[bytes]:
-    """What a blank line holds, before its line end."""
-    others = rb"[ \t\r]*" if line_end == b"\n" else rb"[ \t\n]*"
-    return re.compile(rb"(?:^|(?<=" + line_end + rb"))" + others + rb"(?=" + line_end + rb")")
+    data = np.frombuffer(block, dtype=np.uint8, count=size)
+    ends = np.flatnonzero(data == line_end[0])
+    if not len(ends):
+        return block, size, np.empty(0, dtype=np.int64)
+    data = data[: ends[-1] + 1]
+    starts = np.concatenate(([0], ends[:-1] + 1))
+    shown = np.logical_and.reduce([data != letter for letter in _BLANK])
+    lines = np.flatnonzero(np.add.reduceat(shown, starts, dtype=np.int64) == 0)
+    if not len(lines):
+        return block, size, lines
+    cuts = [0, *starts[lines].tolist(), size]
+    made = _EMPTY_CELL.join(bytes(memoryview(block)[start:end]) for start, end in pairwise(cuts))
+    return bytearray(made + line_end * AFTER), len(made), lines

@@ -73,8 +73,8 @@ def other_clock(
 ) -> str:
     """The first wanted column beside another clock than the one that is said to be its, and in what they differ.
 
-    Empty where there is none. `clock` is the column that the machine file names, `keys` are all that it asks for, `values`
-    theirs and the clocks'.
+    Empty where there is none. `clock` is the column that the machine file names, `keys` are all that it asks for,
+    `values` theirs and the clocks'.
     """
     names = dialect.names
     said = clocks.group(names.index(clock))
