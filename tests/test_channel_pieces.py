@@ -183,8 +183,8 @@ def test_a_coarse_clock_is_held_in_memory_which_its_straight_line_needs(tmp_path
         [Stream("/speed", "std_msgs/msg/Float64", time, {"data": np.arange(200.0)})],
         start_ns=START_NS,
     )
-    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels.mcap]\nspeed = { topic = "/speed", field = "data" }\n'
-    (tmp_path / "machine.toml").write_text(text)
+    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels.mcap]\n'
+    (tmp_path / "machine.toml").write_text(text + 'speed = { topic = "/speed", field = "data" }\n')
     rows = channel_rows(tmp_path / "log.mcap", read_machine_file(tmp_path / "machine.toml"))
     assert isinstance(rows, ChannelRows) and "a coarse clock" in " ".join(map(str, rows.findings))
 

@@ -173,7 +173,7 @@ def test_a_write_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("cdtool.formats.csv_writing.write_csv_table", fail)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(RecordingError, match=r"out\.csv: cannot be written: No space left on device"):
         convert(log, tmp_path / "out.csv", machine=machine)
     assert sorted(tmp_path.iterdir()) == before
 

@@ -21,7 +21,7 @@ _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
 # A clock that counts from 1970 in one of these stands there between the years 2001 and 2100.
 _EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))
 # Days since 1899-12-30, as Excel counts them, of the years 2000 to 2100; a clock in seconds would step by more.
-_EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 2e-6
+_EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
 _DAY = 86400.0
 # A clock goes forward at this share of its steps at least, and most steps are about as long as the median.
 _FORWARD, _REGULAR = 0.95, 0.8

@@ -74,6 +74,8 @@ def convert(
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
     rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
+    if not rows.groups:
+        raise RecordingError(f"{log}: holds none of the mapped channels", "see cdtool info for what it holds")
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []

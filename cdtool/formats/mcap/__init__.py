@@ -22,7 +22,6 @@ from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.decoders import Decoders
 from cdtool.formats.mcap.fields import parse_field
 from cdtool.formats.mcap.gathering import Gathering
-from cdtool.formats.mcap.refused_chunks import refused_chunks
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.taken import Bound
 from cdtool.formats.mcap.topic_survey import TopicSurvey
@@ -165,5 +164,4 @@ def _origin(path: Path, log: Log) -> int:
 
 def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
     details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    told = (*findings, *refused_chunks(log))
-    return Source(path, Mcap.name, columns, origin / 1e9, told, details, tuple(columns))
+    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))

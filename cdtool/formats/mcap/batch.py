@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,21 +31,23 @@ class Batch:
     @property
     def publish_time(self) -> npt.NDArray[np.uint64]:
         """(n,) in ns, read from the messages' headers."""
-        return self._before(_PUBLISH_TIME, 8).view("<u8")[:, 0].astype(np.uint64)
+        return self._before(_PUBLISH_TIME, "<u8").astype(np.uint64)
 
     @property
     def sequence(self) -> npt.NDArray[np.uint32]:
         """(n,), read from the messages' headers."""
-        return self._before(_SEQUENCE, 4).view("<u4")[:, 0].astype(np.uint32)
+        return self._before(_SEQUENCE, "<u4").astype(np.uint32)
 
     def first(self, count: int) -> Batch:
         """The first messages of them."""
         cut = slice(count)
         return Batch(self.data, self.start[cut], self.length[cut], self.log_time[cut])
 
-    def _before(self, distance: int, size: int) -> npt.NDArray[np.uint8]:
-        places = (self.start - distance)[:, np.newaxis] + np.arange(size)
-        return np.ascontiguousarray(self.data[places])
+    def _before(self, distance: int, dtype: str) -> npt.NDArray[Any]:
+        """The number that stands so many bytes before each payload; the numbers at all bytes overlap."""
+        count = len(self.data) + 1 - np.dtype(dtype).itemsize
+        every: npt.NDArray[Any] = np.ndarray((max(0, count),), dtype, self.data, strides=(1,))
+        return every[self.start - distance]
 
 
 NO_BATCH = Batch(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.uint64))

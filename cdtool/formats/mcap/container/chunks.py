@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.formats.mcap.container.checksums import crc32
-from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX
 from cdtool.formats.mcap.container.walk_kernel import Bytes
@@ -64,7 +64,7 @@ class ChunkHeader:
                 f"a chunk claims {max(self.size, self.uncompressed_size)} bytes, more than {LARGEST >> 20} MiB"
             )
         if self.uncompressed_size > max(_SMALL, LARGEST_SHARE * self.size):
-            raise DamageError(f"{self.size} bytes claim to become {self.uncompressed_size}: not decompressed")
+            raise RefusedError(f"{self.size} bytes claim to become {self.uncompressed_size}: not decompressed")
 
 
 HEADER_LENGTH = _FIXED.size + 64 + 8
@@ -95,7 +95,7 @@ class Claims:
         packed, unpacked = self.packed + header.size, self.unpacked + header.uncompressed_size
         share = LARGEST_SHARE if unpacked <= _LONG else _LONG_SHARE
         if unpacked > LARGEST + share * packed:
-            raise DamageError(f"chunks of {packed} bytes in all claim to become {unpacked}: not decompressed")
+            raise RefusedError(f"chunks of {packed} bytes in all claim to become {unpacked}: not decompressed")
         self.packed, self.unpacked = packed, unpacked
 
 

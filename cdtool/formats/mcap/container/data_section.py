@@ -21,7 +21,7 @@ from cdtool.formats.mcap.container.chunks import (
     chunk_header,
 )
 from cdtool.formats.mcap.container.chunks_ahead import ChunksAhead
-from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss, Losses
@@ -155,7 +155,8 @@ class DataSection:
             if taken is None and not self._ahead.holds(header, content):
                 self._decompressor.read(self._file, header, content)
         except DamageError as fault:
-            self._lost = self.losses.add(Loss.of_chunk(header, self._summary, str(fault)))
+            loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
+            self._lost = self.losses.add(loss)
             return
         self._resync.proven = header.at + header.length
         if taken is not None:

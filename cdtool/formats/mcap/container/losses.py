@@ -16,7 +16,8 @@ _LISTED = 10
 class Loss:
     """A place of the file that is lost: `size` bytes from byte `at`.
 
-    `messages`: how many of them its indexes name (None: nothing tells). `time`: their log times' span [ns].
+    `messages`: how many of them its indexes name (None: nothing tells). `time`: their log times' span [ns]. `refused`:
+    it may be whole, but would grow as only a bomb does.
     """
 
     at: int
@@ -25,15 +26,16 @@ class Loss:
     chunks: int = 0
     messages: int | None = None
     time: tuple[int, int] | None = None
+    refused: bool = False
 
     @classmethod
-    def of_chunk(cls, header: ChunkHeader, summary: Summary, reason: str) -> Loss:
+    def of_chunk(cls, header: ChunkHeader, summary: Summary, reason: str, refused: bool = False) -> Loss:
         """A whole chunk. Its header may be what is damaged: the summary's figures count where its CRC fits."""
         known = summary.chunks.get(header.at) if summary.verified else None
         told = known or header
         span = (told.message_start_time, told.message_end_time)
         usable = known is not None or span[0] <= span[1] < 1 << 63
-        return cls(header.at, header.length, reason, 1, None, span if usable else None)
+        return cls(header.at, header.length, reason, 1, None, span if usable else None, refused)
 
     def described(self, origin: int) -> str:
         """What is lost, in words; times in seconds after `origin` [ns]."""
@@ -77,7 +79,17 @@ class Losses:
                 found.append(self._finding(last, True, count, origin))
         for reason, lost in self.messages.items():
             found.append(Finding(f"{reason}: {lost} messages lost", severity="loss"))
-        return found
+        return found + self._refused()
+
+    def _refused(self) -> list[Finding]:
+        """The way out for an honest log: images of a dark camera shrink as no messages of joints and sensors do."""
+        count = sum(loss.refused for loss in self.places)
+        if not count:
+            return []
+        what = "1 chunk is" if count == 1 else f"{count} chunks are"
+        text = f"{what} not damaged but refused: they would grow as only a bomb or images of nothing do"
+        way = "If the log is yours, `mcap decompress LOG -o PLAIN` (mcap.dev) makes one that is read whole"
+        return [Finding(f"{text}. {way}")]
 
     def _finding(self, loss: Loss, final: bool, count: int, origin: int) -> Finding:
         where = f"damaged at byte {loss.at} ({' '.join(loss.reason.split())[:200]})"

@@ -1,0 +1,19 @@
+"""`cdtool info` without a machine file: which column is the clock, and in which unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.formats.csv.excel_days import DAY_S
+from cdtool.workflows.information import info
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 10.0, 1000.0])
+def test_days_as_excel_counts_them_are_told_from_seconds_at_any_rate(tmp_path, rate_hz):
+    days = 45231.5 + np.arange(2000) / rate_hz / DAY_S
+    path = tmp_path / "log.csv"
+    path.write_text("time,torque\n" + "".join(f"{day:.12f},{i % 7}\n" for i, day in enumerate(days)))
+    shown = info(path)
+    assert any("in days (as Excel counts them" in str(finding) for finding in shown.findings)
+    assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(rate_hz, rel=1e-3)] * 2
