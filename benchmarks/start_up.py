@@ -21,6 +21,7 @@ from cdtool.simulation.gate_recordings import write_gate_recordings
 
 HELP_ROUNDS = 25
 DETECT_ROUNDS = 5
+COLD_ROUNDS = 3
 HELP_AT_MOST = 1.3
 DETECT_AT_MOST_S = 2.0
 COLD_AT_MOST_S = 20.0
@@ -45,7 +46,7 @@ def measure() -> bool:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = _environment(folder)
-        return all([_help(folder, environment), _cold(environment), _detect(folder, environment)])
+        return all([_help(folder, environment), _cold(folder, environment), _detect(folder, environment)])
 
 
 def _help(folder: Path, environment: dict[str, str]) -> bool:
@@ -66,10 +67,16 @@ def _help(folder: Path, environment: dict[str, str]) -> bool:
     return held
 
 
-def _cold(environment: dict[str, str]) -> bool:
-    """Compiles into the empty cache folder that `_detect` then uses."""
-    count, seconds = _run(["-c", _COMPILE_ALL], environment).split()
-    held = verdict(f"cold compilation of {count} kernels, s", Spread.of([float(seconds)]), COLD_AT_MOST_S, at_most=True)
+def _cold(folder: Path, environment: dict[str, str]) -> bool:
+    """Compiles into an empty cache each time; the last one is that which `_detect` then uses."""
+    seconds = []
+    for i in range(1 + COLD_ROUNDS):
+        cache = environment["NUMBA_CACHE_DIR"] if i == COLD_ROUNDS else str(folder / f"kernels_{i}")
+        count, each = _run(["-c", _COMPILE_ALL], environment | {"NUMBA_CACHE_DIR": cache}).split()
+        seconds.append(float(each))
+    # The first one finds no byte code of numba either, which an installation leaves behind.
+    spread = Spread.of(seconds[1:])
+    held = verdict(f"cold compilation of {count} kernels, s", spread, COLD_AT_MOST_S, at_most=True)
     print()
     return held
 

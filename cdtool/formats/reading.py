@@ -116,7 +116,7 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
     """
     found = choose_format(path)
     channels = _map(found, machine_file, path)
-    source, held = _held(found.columns(path, channels), channels)
+    source, held = only_held(found.columns(path, channels), channels)
     if found.name == "mcap":
         from cdtool.formats.mcap_writing import with_exact_times
 
@@ -155,7 +155,7 @@ def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
     return channels
 
 
-def _held(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+def only_held(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
     """The map without the ground truth that a file does not hold, which is noted."""
     names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
     absent = [

@@ -55,16 +55,22 @@ JOINT_PARAMETER_ORDER = (
 # fmt: on
 """The attributes of `ArmParameters` that the kernel takes, in the order in which it unpacks them; the second, pairs."""
 
+# What is kept of each joint beside its state: rows of `held`.
+_DRIVE, _COUNTED, _ONCE, _SPEED, _INTEGRATOR, _COMMAND, HELD = range(7)
+
 
 @kernel(
-    "float64(UniTuple(float64, 28), UniTuple(UniTuple(float64, 2), 8), float64[:, ::1], float64[:, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[::1], float64, int64, int64, int64, float64[:, :, ::1], "
-    "float64[::1])"
+    f"float64(UniTuple(float64, 28), UniTuple(UniTuple(float64, 2), 8), {', '.join(8 * ['float64[:, ::1]'])}, "
+    "float64[::1], float64, int64, int64, int64, float64[:, :, ::1], float64[::1])"
 )
 def integrate_arm(
     parameters: tuple[float, ...],
     joint_parameters: tuple[tuple[float, float], ...],
-    initial_state: Array,
+    state: Array,
+    trial_state: Array,
+    slope: Array,
+    total: Array,
+    held: Array,
     reference_position: Array,
     reference_speed: Array,
     disturbance: Array,
@@ -78,8 +84,10 @@ def integrate_arm(
 ) -> float:
     """Fill `log` (row of `ROWS`, joint, sample) and `contact_force` [N]; return the first contact's instant [s] or NaN.
 
-    `initial_state` (6, 2). `reference_position` [rad], `reference_speed` [rad/s] and `disturbance` [N m] are (2, n)
-    and held over each sample; `friction_factor` (2,) scales each joint's Coulomb and static friction. `obstacle` is
+    `state` (6, 2) is the initial one, and overwritten, as are the scratch arrays `trial_state`, `slope`, `total` (6, 2)
+    and `held` (HELD, 2): arrays made in here would double the time to compile. `reference_position` [rad],
+    `reference_speed` [rad/s] and `disturbance` [N m] are (2, n) and held over each sample; `friction_factor` (2,)
+    scales each joint's Coulomb and static friction. `obstacle` is
     the arm's angle at the touch [rad] in trial 1, the plate's height [m] in trial 2.
     """
     (
@@ -125,16 +133,8 @@ def integrate_arm(
     step = sample_period / substeps
     keep = math.exp(-2.0 * math.pi * speed_filter_frequency * sample_period)
 
-    state = initial_state.copy()
-    trial_state = np.empty((6, 2))
-    slope = np.zeros((6, 2))
-    total = np.empty((6, 2))
-    drive = np.empty(2)
-    counted_before = np.zeros(2)
-    once_filtered = np.zeros(2)
-    measured_speed = np.zeros(2)
-    integrator = initial_state[5].copy()
-    command = np.zeros(2)
+    for joint in range(2):
+        held[_INTEGRATOR, joint] = state[5, joint]
     first_contact = math.nan
     penetration_before = -math.inf
 
@@ -145,21 +145,21 @@ def integrate_arm(
             if encoder_step[joint] > 0.0:
                 counted = math.floor(counted / encoder_step[joint]) * encoder_step[joint]
             if sample == 0:
-                counted_before[joint] = counted
-            difference = (counted - counted_before[joint]) / sample_period
-            once_filtered[joint] = keep * once_filtered[joint] + (1.0 - keep) * difference
-            measured_speed[joint] = keep * measured_speed[joint] + (1.0 - keep) * once_filtered[joint]
-            counted_before[joint] = counted
+                held[_COUNTED, joint] = counted
+            difference = (counted - held[_COUNTED, joint]) / sample_period
+            held[_ONCE, joint] = keep * held[_ONCE, joint] + (1.0 - keep) * difference
+            held[_SPEED, joint] = keep * held[_SPEED, joint] + (1.0 - keep) * held[_ONCE, joint]
+            held[_COUNTED, joint] = counted
             lag_error = reference_position[joint, sample] - counted
-            error = reference_speed[joint, sample] + position_gain * lag_error - measured_speed[joint]
-            wanted = speed_gain * error + integrator[joint]
-            command[joint] = min(max(wanted, -torque_limit), torque_limit)
+            error = reference_speed[joint, sample] + position_gain * lag_error - held[_SPEED, joint]
+            wanted = speed_gain * error + held[_INTEGRATOR, joint]
+            held[_COMMAND, joint] = min(max(wanted, -torque_limit), torque_limit)
             # Back-calculation: a comparison "is it limited?" would make the result jump with the step size.
-            excess = command[joint] - wanted
-            integrator[joint] += (integral_gain * error + anti_windup_rate * excess) * sample_period
+            excess = held[_COMMAND, joint] - wanted
+            held[_INTEGRATOR, joint] += (integral_gain * error + anti_windup_rate * excess) * sample_period
             log[7, joint, sample] = counted
-            log[8, joint, sample] = measured_speed[joint]
-            log[9, joint, sample] = command[joint]
+            log[8, joint, sample] = held[_SPEED, joint]
+            log[9, joint, sample] = held[_COMMAND, joint]
 
         for substep in range(substeps):
             for stage in range(4):
@@ -176,7 +176,7 @@ def integrate_arm(
                     # Elastic drive: soft up to its travel, then stiff, the same in both directions.
                     beyond = max(abs(wind_up) - soft_travel, 0.0)
                     elastic = soft_stiffness * (abs(wind_up) - beyond) + drive_stiffness * beyond
-                    drive[joint] = math.copysign(elastic, wind_up) + drive_damping * (w - trial_state[3, joint])
+                    held[_DRIVE, joint] = math.copysign(elastic, wind_up) + drive_damping * (w - trial_state[3, joint])
 
                     coulomb = friction_factor[joint] * coulomb_friction[joint]
                     static = friction_factor[joint] * static_friction[joint]
@@ -192,10 +192,10 @@ def integrate_arm(
                     ripple = torque_ripple * math.sin(angle)
                     torque = trial_state[5, joint]
                     slope[0, joint] = w
-                    slope[1, joint] = (torque + ripple - drive[joint] - friction) / reflected_inertia[joint]
+                    slope[1, joint] = (torque + ripple - held[_DRIVE, joint] - friction) / reflected_inertia[joint]
                     slope[2, joint] = trial_state[3, joint]
                     slope[4, joint] = bristle_speed
-                    slope[5, joint] = (command[joint] - torque) / torque_lag
+                    slope[5, joint] = (held[_COMMAND, joint] - torque) / torque_lag
 
                 q1, q2 = trial_state[2, 0], trial_state[2, 1]
                 qd1, qd2 = trial_state[3, 0], trial_state[3, 1]
@@ -217,8 +217,8 @@ def integrate_arm(
                         force *= max(1.0 + bumper_damping * penetration_speed, 0.0)
 
                 sine, coupling = math.sin(q2 - q1), coupling_inertia * math.cos(q2 - q1)
-                pull_1 = drive[0] + disturbance[0, sample] - gravity_torque[0] * math.cos(q1) - lever_1 * force
-                pull_2 = drive[1] + disturbance[1, sample] - gravity_torque[1] * math.cos(q2) - lever_2 * force
+                pull_1 = held[_DRIVE, 0] + disturbance[0, sample] - gravity_torque[0] * math.cos(q1) - lever_1 * force
+                pull_2 = held[_DRIVE, 1] + disturbance[1, sample] - gravity_torque[1] * math.cos(q2) - lever_2 * force
                 pull_1 += coupling_inertia * sine * qd2 * qd2
                 pull_2 -= coupling_inertia * sine * qd1 * qd1
                 determinant = arm_inertia * forearm_inertia - coupling * coupling

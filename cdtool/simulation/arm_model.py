@@ -98,8 +98,9 @@ def integrate_arm(
     numbers = tuple(float(getattr(parameters, name)) for name in arm_kernel.PARAMETER_ORDER)
     pairs = tuple(tuple(map(float, getattr(parameters, name))) for name in arm_kernel.JOINT_PARAMETER_ORDER)
     kind = arm_kernel.CONTACT_KINDS[impact]
+    scratch = (*np.zeros((3, 6, 2)), np.zeros((arm_kernel.HELD, 2)))
     first_contact = arm_kernel.integrate_arm(
-        *(numbers, pairs, initial_state, *reference, disturbance, friction),
+        *(numbers, pairs, initial_state.copy(), *scratch, *reference, disturbance, friction),
         *(obstacle, trial, kind, substeps, log, contact_force),
     )
     return {**dict(zip(arm_kernel.ROWS, log, strict=True)), "contact_force": contact_force}, first_contact

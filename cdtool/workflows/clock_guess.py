@@ -25,11 +25,8 @@ _EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
 _DAY = 86400.0
 # A clock goes forward at this share of its steps at least, and most steps are about as long as the median.
 _FORWARD, _REGULAR = 0.95, 0.8
-
-
 # Stamps of a clock that are kept rather than read again: 32 MiB.
 _KEPT = 1 << 22
-
 # The pieces of a column's values, from the first again with each call.
 Reread = Callable[[str], Iterable[FloatArray]]
 

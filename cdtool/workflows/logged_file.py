@@ -23,7 +23,7 @@ from cdtool.formats.channel_assembly import (
 from cdtool.formats.distribution import Distribution
 from cdtool.formats.mcap.mapped_pieces import MappedLog
 from cdtool.formats.pieces import Piece, Run
-from cdtool.formats.reading import _held
+from cdtool.formats.reading import only_held
 from cdtool.formats.source import Column, Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.machine_file import MachineFile
@@ -113,7 +113,7 @@ class LoggedFile:
         self._columns: Mapping[str, list[Column]] = {name: [column] for name, column in source.columns.items()}
         if not (self._is_sorted and self._log.settled):
             self._survey_in_order()
-        source, held = _held(source, machine_file.topics)
+        source, held = only_held(source, machine_file.topics)
         self.channels = {item.channel: self.channels[item.channel] for item in held.sources}
         self.origin, self._told = source.origin, source.findings
         for channel in self.channels.values():

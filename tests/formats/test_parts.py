@@ -212,3 +212,19 @@ def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
     assert source.details["/speed"] == "std_msgs/msg/Float64, 100 messages"
     np.testing.assert_array_equal(source.columns["/speed data"].values, np.arange(100.0))
     assert losses(source.findings) == ["part bag_2.db3 of metadata.yaml is not in the folder"]
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.01, 5.0])
+def test_a_pause_between_two_parts_is_told(tmp_path, pause):
+    folder = tmp_path / "log"
+    folder.mkdir()
+    for number in range(3):
+        time = number + np.arange(100) / 100 + pause * (number == 2)
+        write_part(folder / f"bag_{number}.mcap", time, time)
+    findings = read_recording(folder, machine(tmp_path)).findings
+    told = [str(finding) for finding in findings if "nothing is logged between" in str(finding)]
+    if pause < 5.0:
+        assert not told
+    else:
+        (only,) = told
+        assert "bag_2.mcap: begins 5.01 s after the part before it ends: nothing" in only
