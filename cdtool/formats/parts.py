@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.formats.part_gaps import gaps_between
+from cdtool.formats.part_gaps import PartSpan, gaps_between
 from cdtool.formats.source import Column, Source
 from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
 
@@ -109,7 +109,7 @@ def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
         time = np.concatenate([piece.time for piece in pieces])
         joined[channel] = Series(time, np.concatenate([piece.values for piece in pieces]), pieces[0].unit)
     findings = tuple(found for part in parts for found in of_part(Path(part.source), part.findings))
-    findings += tuple(gaps_between(parts))
+    findings += tuple(gaps_between([PartSpan.of(part) for part in parts]))
     source = ", ".join(part.source for part in parts)
     digest = joined_digest([part.digest for part in parts])
     return Recording(name, source, first.joints, joined, first.origin, findings, digest)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.formats.groups import Group, Part
+from cdtool.formats.part_gaps import gaps_between
 from cdtool.formats.part_pieces import FoundParts
 from cdtool.formats.parts import not_alike, of_part, overlapping
 from cdtool.formats.pieces import Piece
@@ -45,7 +46,8 @@ class ChannelPieces:
         if self._folder is None:
             return self._files[0].findings
         of_parts = (item for file in self._files for item in of_part(file.path, file.findings))
-        return (*self._folder.findings, *of_parts)
+        gaps = gaps_between([file.spanned for file in self._files])
+        return (*self._folder.findings, *of_parts, *gaps)
 
     def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
         """The rows of these groups, from the first on."""

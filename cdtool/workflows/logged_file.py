@@ -22,6 +22,7 @@ from cdtool.formats.channel_assembly import (
 )
 from cdtool.formats.distribution import Distribution
 from cdtool.formats.mcap.mapped_pieces import MappedLog
+from cdtool.formats.part_gaps import PartSpan
 from cdtool.formats.pieces import Piece, Run
 from cdtool.formats.reading import only_held
 from cdtool.formats.source import Column, Source
@@ -132,6 +133,14 @@ class LoggedFile:
     def end(self) -> float:
         """Time of the last sample of any channel [s]."""
         return max((channel.span[1] for channel in self.channels.values()), default=-np.inf)
+
+    @property
+    def spanned(self) -> PartSpan:
+        """What its channels span."""
+        steps = {name: each.steps.median if each.steps.count else np.inf for name, each in self.channels.items()}
+        return PartSpan(
+            self.path, self.origin, {name: (*each.span, steps[name]) for name, each in self.channels.items()}
+        )
 
     @property
     def is_coarse(self) -> bool:
