@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
+from cdtool.formats.large_integers import rounding_finding
 from cdtool.formats.mcap.columns import UndecodableError
 from cdtool.formats.mcap.columns.uniform import UniformTaker
 from cdtool.formats.mcap.container.ahead import ahead
@@ -132,9 +132,10 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     columns: dict[str, Column] = {}
     for source in wanted.sources:
         if f"{source.topic} {source.field}" not in columns:
-            column, found = topics[source.topic].column(texts[source.topic].index(source.field), origin)
+            topic, index = topics[source.topic], texts[source.topic].index(source.field)
+            column, found = topic.column(index, origin)
             columns[column.name] = column
-            findings += [*found, *rounding_finding(column.name, rounded_integers(column.values))]
+            findings += [*found, *rounding_finding(column.name, topic.rounded(index))]
     return _source(path, log, columns, findings, origin)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
+from cdtool.formats.large_integers import rounded_integers
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError
 from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
@@ -31,6 +32,7 @@ class _Field:
         self.elsewhere: Rows | None = None
         self.widths: Counter[int] = Counter()
         self.names: list[str] = []
+        self.exact = False  # its numbers' type is one that float64 holds
 
     def add(self, picked: Picked, whole: npt.NDArray[np.bool_], all_whole: bool) -> None:
         if picked.alike and all_whole and self.elsewhere is None:
@@ -55,6 +57,7 @@ class _Field:
     def share(self, numbers: Numbers) -> FloatArray | None:
         """The column, for more messages that all have these numbers; None where others came before."""
         table = self.rows.share(() if numbers.single else (len(numbers.at),))
+        self.exact = numbers.dtype not in ("i8", "u8")
         return None if self.elsewhere is not None else table
 
     def confirm(self, table: FloatArray, rows: slice) -> None:
@@ -170,6 +173,11 @@ class Gathering:
         if self._clock is None:
             self._clock = in_order(time, origin)
         return column_of(name, values, *self._clock), findings
+
+    def rounded(self, index: int) -> int:
+        """How many values of the field of that number may be integers that float64 has rounded."""
+        field = self._fields[index]
+        return 0 if field.exact else rounded_integers(field.rows.values)
 
     def _stamps_of(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> Stamps:
         if self.clock == "log":
