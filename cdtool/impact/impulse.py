@@ -159,7 +159,9 @@ class _Course:
         self.sticks = abs(needed) <= friction
         self.after = -needed if self.sticks else -math.copysign(friction, coupling)
         slowing = coupling + float(mobility[0, 0]) * self.before
-        self.stop = 0.0 if slide == 0.0 else -slide / slowing if slide * slowing < 0.0 else math.inf
+        # Signs, not a product: that of a slide of next to nothing would be 0.
+        slows = slide < 0.0 < slowing or slowing < 0.0 < slide
+        self.stop = 0.0 if slide == 0.0 else -slide / slowing if slows else math.inf
 
     def impulse(self, normal: float) -> FloatArray:
         """(p_t, p_n) when the normal impulse has that size."""

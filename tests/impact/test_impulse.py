@@ -141,6 +141,16 @@ def test_an_impact_never_makes_energy_and_keeps_both_momenta(hypothesis, first, 
     assert momenta(done.body_1, done.body_2) == pytest.approx(momenta(first, second), abs=1e-9)
 
 
+@pytest.mark.parametrize("hypothesis", HYPOTHESES)
+@pytest.mark.parametrize("angle", [5e-324, -5e-324, 1e-310])
+def test_a_slide_of_next_to_nothing_stops_at_once(hypothesis, angle):
+    moving, resting = (RigidBody(2.0, 2.0, (0.0, 0.0), (speed, 0.0), 0.0) for speed in (1.0, 0.0))
+    done = strike(moving, resting, ORIGIN, (1.0, angle), 1.0, 0.5, hypothesis)
+    assert done.body_1.velocity == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert done.body_2.velocity == pytest.approx((1.0, 0.0), abs=1e-12)
+    assert done.slip == "slides, then sticks"
+
+
 def momenta(*bodies: RigidBody) -> list[float]:
     """Both linear momenta and the angular one about the contact."""
     total = np.zeros(3)
