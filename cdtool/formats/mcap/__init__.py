@@ -119,13 +119,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     findings = log.findings()
     wanted = with_topics(path, wanted, [topic.name for topic in log.topics.values() if topic.count])
     for name in dict.fromkeys(source.topic for source in wanted.sources):
-        decoders = topics[name].decoders
-        if not decoders.decoded:
-            raise RecordingError(
-                f"{path}: no message of {name} can be decoded: {decoders.reason}",
-                "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
-            )
-        findings += decoders.failure(name) + topics[name].orders.findings()
+        findings += topics[name].decoders.told(f"{path}", name) + topics[name].orders.findings()
     # A header's clock may be another one (simulated time): its own first stamp is its origin.
     stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
     origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.errors import RecordingError
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns import Decoder, Gathered, UndecodableError, decoder_for
 from cdtool.formats.mcap.columns.gathered import DECODED
 from cdtool.formats.mcap.container.definitions import Stream
-from cdtool.formats.mcap.fields import Field
+from cdtool.formats.mcap.fields import Field, FieldMissingError, missing
+from cdtool.formats.mcap.stamp_order import Stamps
 from cdtool.formats.mcap.taken import Recipe
 from cdtool.recording import Finding
 
@@ -46,6 +48,25 @@ class Decoders:
         made = self._made.get(channel)
         return None if made is None or isinstance(made, UndecodableError) else made.recipe(wanted, joints, stamps)
 
+    def gather(
+        self, where: str, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], clock: str
+    ) -> tuple[Decoder, Gathered, Stamps] | None:
+        """The fields of a batch and its stamps [ns] by the clock; None, and counted, where it cannot be decoded.
+
+        Raises RecordingError, which `where` begins, where a field or the header's stamp is not there.
+        """
+        decoder = self.of(stream, batch)
+        if decoder is None:
+            return None
+        try:
+            gathered = decoder.gather(batch, wanted, joints, stamps=clock == "header")
+        except FieldMissingError as fault:
+            raise missing(where, _absent(decoder, batch, wanted, joints), fault) from fault
+        except UndecodableError as fault:
+            self.give_up(stream, batch, fault)
+            return None
+        return decoder, gathered, _stamps(where, batch, gathered, clock)
+
     def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
         """What only the wanted places show: a channel's messages cannot be decoded; they are counted."""
         self._made[stream.channel.id] = fault
@@ -70,3 +91,33 @@ class Decoders:
             return []
         text = f"{self.failed} of {self.failed + self.decoded} messages cannot be decoded: {self.reason}"
         return [Finding(text, topic, "warning" if severity == "warning" else "loss")]
+
+    def told(self, path: str, topic: str) -> list[Finding]:
+        """The finding about messages that could not be decoded; raises RecordingError where none could."""
+        if not self.decoded:
+            raise RecordingError(
+                f"{path}: no message of {topic} can be decoded: {self.reason}",
+                "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
+            )
+        return self.failure(topic)
+
+
+def _stamps(where: str, batch: Batch, gathered: Gathered, clock: str) -> Stamps:
+    if clock != "header":
+        return batch.log_time if clock == "log" else batch.publish_time
+    whole = gathered.status == DECODED
+    if gathered.stamps is None or gathered.has_stamp is None or not gathered.has_stamp[whole].all():
+        raise RecordingError(
+            f"{where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
+        )
+    return gathered.stamps
+
+
+def _absent(decoder: Decoder, batch: Batch, wanted: Sequence[Field], joints: Sequence[str]) -> str:
+    """The field that the schema does not have."""
+    for field in wanted:
+        try:
+            decoder.gather(batch.first(1), [field], joints)
+        except FieldMissingError:
+            return field.text
+    return wanted[0].text

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from cdtool.errors import RecordingError
 from cdtool.formats.large_integers import rounded_integers
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError
+from cdtool.formats.mcap.columns import Picked
 from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
 from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.decoders import Decoders
@@ -101,19 +101,12 @@ class Gathering:
 
     def add(self, stream: Stream, batch: Batch) -> None:
         """Take a batch; raises RecordingError where a field or the header's stamp is not there."""
-        decoder = self.decoders.of(stream, batch)
-        if decoder is None:
+        found = self.decoders.gather(self.where, stream, batch, self._wanted, self.joints, self.clock)
+        if found is None:
             return
-        try:
-            gathered = decoder.gather(batch, self._wanted, self.joints, stamps=self.clock == "header")
-        except FieldMissingError as fault:
-            raise missing(self.where, self._absent(decoder, batch), fault) from fault
-        except UndecodableError as fault:
-            self.decoders.give_up(stream, batch, fault)
-            return
+        decoder, gathered, stamps = found
         whole = self.decoders.keep(gathered)
         all_whole = bool(whole.all())
-        stamps = self._stamps_of(batch, gathered, whole)
         stamps = stamps if all_whole else stamps[whole]
         self._stamps.append(stamps)
         self.orders.add(stream.channel.id, stamps)
@@ -178,29 +171,6 @@ class Gathering:
         """How many values of the field of that number may be integers that float64 has rounded."""
         field = self._fields[index]
         return 0 if field.exact else rounded_integers(field.rows.values)
-
-    def _stamps_of(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> Stamps:
-        if self.clock == "log":
-            return batch.log_time
-        if self.clock == "publish":
-            return batch.publish_time
-        if gathered.stamps is None or gathered.has_stamp is None or not gathered.has_stamp[whole].all():
-            raise self._no_stamp()
-        return gathered.stamps
-
-    def _no_stamp(self) -> RecordingError:
-        return RecordingError(
-            f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
-        )
-
-    def _absent(self, decoder: Decoder, batch: Batch) -> str:
-        """The field that the schema does not have."""
-        for field in self._wanted:
-            try:
-                decoder.gather(batch.first(1), [field], self.joints)
-            except FieldMissingError:
-                return field.text
-        return self._wanted[0].text
 
 
 def _joined(parts: Sequence[Part]) -> list[Part]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns import Decoder, Gathered, Picked, UndecodableError
+from cdtool.formats.mcap.columns import Picked
 from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.definitions import Stream
@@ -81,13 +81,7 @@ class MappedLog:
         findings = log.findings()
         held = with_topics(self.path, self.wanted, [topic.name for topic in log.topics.values() if topic.count])
         for name in dict.fromkeys(source.topic for source in held.sources):
-            decoders = topics[name].decoders
-            if not decoders.decoded:
-                raise RecordingError(
-                    f"{self.path}: no message of {name} can be decoded: {decoders.reason}",
-                    "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
-                )
-            findings += decoders.failure(name) + topics[name].orders.findings()
+            findings += topics[name].decoders.told(f"{self.path}", name) + topics[name].orders.findings()
         stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
         self.origin = log.origin if self.wanted.time.clock == "log" else min(stamps, default=log.origin)
         columns: dict[str, Column] = {}
@@ -146,18 +140,11 @@ class _Topic:
 
     def take(self, stream: Stream, batch: Batch) -> Iterator[_Taken]:
         """Each field of a batch; raises RecordingError where a field or the header's stamp is not there."""
-        decoder = self.decoders.of(stream, batch)
-        if decoder is None:
+        found = self.decoders.gather(self.where, stream, batch, self._wanted, self.joints, self.clock)
+        if found is None:
             return
-        try:
-            gathered = decoder.gather(batch, self._wanted, self.joints, stamps=self.clock == "header")
-        except FieldMissingError as fault:
-            raise missing(self.where, self._absent(decoder, batch), fault) from fault
-        except UndecodableError as fault:
-            self.decoders.give_up(stream, batch, fault)
-            return
+        decoder, gathered, stamps = found
         whole = self.decoders.keep(gathered)
-        stamps = self._stamps(batch, gathered, whole)
         if self.first_stamp is None and whole.any():
             self.first_stamp = int(stamps[whole][0])
         self.orders.add(stream.channel.id, stamps[whole])
@@ -193,21 +180,3 @@ class _Topic:
             findings.append(Finding(f"{empty} messages hold an empty array: NaN", name))
         shape = (0, course.width or 1) if course.width is not None or empty else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings
-
-    def _stamps(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> Stamps:
-        if self.clock != "header":
-            return batch.log_time if self.clock == "log" else batch.publish_time
-        if gathered.stamps is None or gathered.has_stamp is None or not bool(np.all(gathered.has_stamp[whole])):
-            raise RecordingError(
-                f"{self.where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
-            )
-        return gathered.stamps
-
-    def _absent(self, decoder: Decoder, batch: Batch) -> str:
-        """The field that the schema does not have."""
-        for item in self._wanted:
-            try:
-                decoder.gather(batch.first(1), [item], self.joints)
-            except FieldMissingError:
-                return item.text
-        return self._wanted[0].text
