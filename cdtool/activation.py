@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.clock.coarse import recent_medians
 from cdtool.detection import Alarm, Band, Signal, StatusArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
@@ -71,19 +73,34 @@ class Activation:
         return replace(self, **given)
 
     def samples(self, period: float) -> int:
-        """The debounce in samples for a signal of that period [s]."""
+        """Return the debounce in samples for a signal of that period [s]: to name it, see `needed` for what counts."""
         if self.debounce is not None:
             return self.debounce
         return max(1, round(DEBOUNCE_TIME / period)) if period > 0.0 else 1
 
+    def needed(self, time: FloatArray) -> npt.NDArray[np.int64]:
+        """Return the debounce in samples (n,) at each time [s] of a signal, from the sample period so far.
+
+        At the first sample, before which there is no period, one more than a single sample is needed.
+        """
+        if self.debounce is not None:
+            return np.full(len(time), self.debounce, dtype=np.int64)
+        needed = np.full(len(time), 2, dtype=np.int64)
+        if len(time) > 1:
+            steps = np.diff(time)
+            needed[1:] = np.maximum(np.rint(DEBOUNCE_TIME / recent_medians(steps, float(steps[0]))), 1.0)
+        return needed
+
     def alarms(
-        self, statistic: Signal, band: Band, inner: Band | None = None
+        self, statistic: Signal, band: Band, inner: Band | None = None, begins: Sequence[float] = ()
     ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints.
 
-        `inner`: the band within which an alarm is armed again, where there is hysteresis.
+        `inner`: the band within which an alarm is armed again, where there is hysteresis; `begins` [s]: where an
+        operation begins, armed whatever was before.
         """
-        period = statistic.period
+        needed = self.needed(statistic.time)
+        fresh = begins_at(statistic.time, begins)
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
         for joint in range(statistic.values.shape[1]):
@@ -95,7 +112,7 @@ class Activation:
             calm = ~outside
             if inner is not None:
                 calm &= ~((value > inner.upper[:, joint]) | (value < inner.lower[:, joint]))
-            at, armed = crossings_of(statistic.time, outside, calm, status, self.samples(period), self.wait)
+            at, armed = crossings_of(statistic.time, outside, calm, status, needed, self.wait, fresh)
             for k, was_armed in zip(at, armed, strict=True):
                 above = bool(value[k] > upper[k])
                 limit = float(upper[k] if above else lower[k])
@@ -107,53 +124,74 @@ class Activation:
         return _in_order(alarms), _in_order(crossings)
 
 
+def begins_at(time: FloatArray, begins: Sequence[float]) -> BoolArray:
+    """Return (n,) True at the first sample of each operation that begins at `begins` [s]."""
+    fresh = np.zeros(len(time), dtype=bool)
+    at = np.searchsorted(time, begins, side="left") if len(begins) else np.empty(0, dtype=np.intp)
+    fresh[at[at < len(time)]] = True
+    return fresh
+
+
 def _in_order(alarms: list[Alarm]) -> tuple[Alarm, ...]:
     return tuple(sorted(alarms, key=lambda alarm: (alarm.time, alarm.joint)))
 
 
 def crossings_of(
-    time: FloatArray, outside: BoolArray, calm: BoolArray, status: StatusArray, debounce: int, rearm: float
+    time: FloatArray,
+    outside: BoolArray,
+    calm: BoolArray,
+    status: StatusArray,
+    needed: npt.NDArray[np.int64],
+    rearm: float,
+    fresh: BoolArray,
 ) -> tuple[npt.NDArray[np.int64], BoolArray]:
     """The samples at which one joint's debounced exits from the band are raised, and whether each was armed.
 
-    `calm`: where the value is far enough inside to count towards the `rearm` seconds.
+    `calm`: where the value is far enough inside to count towards the `rearm` seconds; `needed` (n,): the debounce in
+    samples; `fresh`: where an operation begins.
     """
     at = np.empty(len(time) if outside.any() else 0, dtype=np.int64)
     armed = np.empty(len(at), dtype=np.bool_)
     clock = np.ascontiguousarray(time)
-    count = _activate(clock, outside, calm, status, debounce, rearm, at, armed) if len(at) else 0
+    count = _activate(clock, outside, calm, status, needed, rearm, fresh, at, armed) if len(at) else 0
     return at[:count], armed[:count]
 
 
-@kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64, float64, int64[::1], b1[::1])")
+@kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64[::1], float64, b1[::1], int64[::1], b1[::1])")
 def _activate(
     time: FloatArray,
     outside: BoolArray,
     calm: BoolArray,
     status: StatusArray,
-    debounce: int,
+    needed: npt.NDArray[np.int64],
     rearm: float,
+    fresh: BoolArray,
     at: npt.NDArray[np.int64],
     armed_at: BoolArray,
 ) -> int:
     crossings = 0
     count = 0
+    raised = False
     armed = True
     inside = False
     inside_since = 0.0
     for k in range(len(time)):
+        if fresh[k]:
+            armed = True
         if status[k] == 3:
             continue
         if outside[k] and status[k] == 0:
             inside = False
             count += 1
-            if count == debounce:
+            if count >= needed[k] and not raised:
+                raised = True
                 at[crossings] = k
                 armed_at[crossings] = armed
                 crossings += 1
                 armed = False
             continue
         count = 0
+        raised = False
         # Where the value cannot be judged it is not known to be outside: that time counts as before.
         if status[k] == 0 and not calm[k]:
             inside = False

@@ -28,6 +28,7 @@ class Status(IntEnum):
     NOT_APPLICABLE = 2
     GAP = 3
     NO_LIMIT = 4
+    OTHER_SPEED = 5
 
 
 REASONS: Mapping[int, str] = {
@@ -35,6 +36,7 @@ REASONS: Mapping[int, str] = {
     Status.NOT_APPLICABLE: "not applicable",
     Status.GAP: "missing samples",
     Status.NO_LIMIT: "no limit known here",
+    Status.OTHER_SPEED: "other speed",
 }
 
 
@@ -85,6 +87,15 @@ class Signal:
             joints=tuple(self.joints[i] for i in columns),
         )
 
+    def rows(self, start: float, end: float) -> slice:
+        """Return the rows with start <= time <= end [s]."""
+        first, last = np.searchsorted(self.time, start, side="left"), np.searchsorted(self.time, end, side="right")
+        return slice(int(first), int(last))
+
+    def part(self, rows: slice) -> Signal:
+        """Return these rows of the signal."""
+        return replace(self, time=self.time[rows], values=self.values[rows], status=self.status[rows])
+
     def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
         """Share of the samples for each reason not to judge, over all joints, from `start` to `end` [s]."""
         status = self.status[(self.time >= start) & (self.time <= end)]
@@ -103,6 +114,10 @@ class Band:
 
     lower: FloatArray
     upper: FloatArray
+
+    def part(self, rows: slice) -> Band:
+        """Return these rows of the band."""
+        return Band(self.lower[rows], self.upper[rows])
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Cutting a recording into operations (strokes), by motion or by a trigger, classed by direction and speed.
 
-An operation keeps the recording's own time. Cutting and classing look at the whole recording: they say which signature
-belongs to a stroke, and nothing before an alarm depends on them.
+An operation keeps the recording's own time. Cutting and classing look at the whole recording: they serve to learn, to
+score and to name. No verdict depends on them: a detector runs over the whole log, and where a stroke begins for its
+thresholds is decided by what was logged so far (`motion.strokes`).
 """
 
 from __future__ import annotations
@@ -27,11 +28,21 @@ _MARGIN = 0.5
 
 @dataclass(frozen=True)
 class Operation:
-    """One stroke: its part of the recording (named recording#n where cut), its class and n (0: the whole recording)."""
+    """One stroke: its part of the recording (named recording#n where cut), its class and n (0: the whole recording).
+
+    `log` is the recording that it was cut from, by `cut`; None: it is the whole one.
+    """
 
     recording: Recording
     motion: MotionClass
     number: int = 0
+    log: Recording | None = None
+    cut: str = "whole"
+
+    @property
+    def whole(self) -> Recording:
+        """The recording that it was cut from."""
+        return self.log or self.recording
 
     @property
     def name(self) -> str:
@@ -56,7 +67,7 @@ def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
     operations = []
     for number, (start, end) in enumerate(spans, 1):
         part = replace(recording.between(start, end), name=f"{recording.name}#{number}")
-        operations.append(Operation(part, motion_class(part), number))
+        operations.append(Operation(part, motion_class(part), number, recording, how))
     return operations
 
 

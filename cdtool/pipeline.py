@@ -1,23 +1,23 @@
-"""One operation through detector, threshold and activation. No files, no printing."""
+"""One log through detector, threshold and activation, and what that says of each of its operations."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from cdtool.activation import Activation
 from cdtool.clock import previous_value
-from cdtool.detection import REASONS, Band, Signal, Status, Verdict
+from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
+from cdtool.judgement import Judgement, judged
+from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import FloatArray
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.thresholds.common_class import SPEED_TOLERANCE
-from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Stretch:
 class Detection:
     """What a detector and its threshold say of one operation, with all that led there.
 
-    `threshold` is None where none applies.
+    `threshold` is None where none applies. `judgement` is that of the whole log, of which the operation is `rows`.
     """
 
     operation: Operation
@@ -45,13 +45,19 @@ class Detection:
     verdict: Verdict
     signal: Signal | None = None
     threshold: FittedThreshold | None = None
+    judgement: Judgement | None = None
+    rows: slice = field(default_factory=lambda: slice(None))
 
     def exceedance(self) -> FloatArray:
         """For each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""
-        if self.threshold is None or self.signal is None:
+        if self.judgement is None:
             return np.full(self.statistic.values.shape, -np.inf)
-        recording = self.operation.recording.without_ground_truth()
-        return checked_exceedance(self.threshold, recording, self.signal)[1]
+        return self.judgement.met_at[self.rows]
+
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """Where strokes of the log begin for thresholds and activation [s], the first one apart."""
+        return tuple(item.applies for item in self.judgement.strokes[1:]) if self.judgement else ()
 
     @property
     def leading(self) -> int:
@@ -89,10 +95,41 @@ class Detection:
 def run_detector(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str] = ()) -> Signal:
     """The detector's signal of an operation, of the watched joints (none named: all of them).
 
-    Ground truth is taken away before it looks. Raises RecordingError, or ConfigurationError for an unknown joint.
+    It runs over the whole log that the operation was cut from, and ground truth is taken away before it looks. Raises
+    RecordingError, or ConfigurationError for an unknown joint.
     """
-    signal = checked_signal(detector, operation.recording.without_ground_truth(), machine)
-    return replace(signal, joints=signal.joints or operation.recording.joints).watching(watched)
+    signal = _signal_of_log(operation, machine, detector, watched)
+    return signal if operation.log is None else signal.part(_rows(signal, operation))
+
+
+def run_detector_on_each(
+    operations: Sequence[Operation], machine: Any, detector: Detector, watched: Sequence[str] = ()
+) -> list[Signal]:
+    """The detector's signal of each operation of one log, over which it runs once; raises as `run_detector` does."""
+    if not operations:
+        return []
+    whole = _signal_of_log(operations[0], machine, detector, watched)
+    return [whole if item.log is None else whole.part(_rows(whole, item)) for item in operations]
+
+
+def detect_operations(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Detector,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+    watched: Sequence[str] = (),
+    hold: float = HOLD,
+) -> list[Detection]:
+    """Run the detector over a log and hold it against thresholds, for each of the log's operations.
+
+    Of several signatures those of the motion so far serve, see `motion.applicable`; where none does, a sample is not
+    assessable. Raises RecordingError where the recording lacks a channel that the detector needs.
+    """
+    if not operations:
+        return []
+    signal = _signal_of_log(operations[0], machine, detector, watched)
+    return _judge_log(operations, detector.name, signal, thresholds, activation, hold)
 
 
 def detect_operation(
@@ -103,13 +140,8 @@ def detect_operation(
     activation: Activation,
     watched: Sequence[str] = (),
 ) -> Detection:
-    """Run the detector and hold it against the threshold of the operation's class, joint by watched joint.
-
-    Of several signatures the one of the operation's direction and speed serves; where none does, the verdict is "not
-    assessable". Raises RecordingError where the recording lacks a channel that the detector needs.
-    """
-    signal = run_detector(operation, machine, detector, watched)
-    return judge(operation, detector.name, signal, thresholds, activation)
+    """What `detect_operations` says of one operation of a log."""
+    return detect_operations([operation], machine, detector, thresholds, activation, watched)[0]
 
 
 def judge(
@@ -119,47 +151,80 @@ def judge(
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
 ) -> Detection:
-    """Hold a detector's signal of an operation against the threshold of its class."""
-    threshold, refused = choose_threshold(operation, thresholds)
-    if threshold is None:
-        nothing = np.full(signal.values.shape, np.nan)
-        status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
-        statistic = replace(signal, status=status)
-        unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
-        verdict = Verdict("not assessable", reason=refused or unlearned)
-        return Detection(operation, detector, statistic, Band(nothing, nothing), verdict, signal)
-    recording = operation.recording.without_ground_truth()
-    statistic, band = checked_evaluation(threshold, recording, signal)
-    alarms, crossings = activation.alarms(statistic, band, _inner_band(activation, threshold, recording, signal))
-    if alarms:
-        verdict = Verdict("alarm", alarms, crossings=crossings)
-    elif not statistic.valid.any():
-        verdict = Verdict("not assessable", reason=statistic.why_not())
-    else:
-        verdict = Verdict("no alarm")
-    return Detection(operation, detector, statistic, band, verdict, signal, threshold)
+    """Hold a detector's signal of an operation against thresholds; what is around the operation plays no part."""
+    alone = replace(operation, log=None, cut="whole")
+    (detection,) = _judge_log([alone], detector, signal, thresholds, activation, HOLD)
+    return replace(detection, operation=operation)
 
 
-def _inner_band(
-    activation: Activation, threshold: FittedThreshold, recording: Recording, signal: Signal
-) -> Band | None:
-    """The band within which an alarm is armed again; None without hysteresis."""
-    if not activation.hysteresis:
-        return None
-    narrower = checked_factor(threshold, (1.0 - activation.hysteresis) * threshold.safety_factor)
-    return checked_evaluation(narrower, recording, signal)[1]
+def _signal_of_log(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str]) -> Signal:
+    recording = operation.whole
+    signal = checked_signal(detector, recording.without_ground_truth(), machine)
+    return replace(signal, joints=signal.joints or recording.joints).watching(watched)
 
 
-def choose_threshold(operation: Operation, thresholds: Sequence[FittedThreshold]) -> tuple[FittedThreshold | None, str]:
-    """The threshold that applies to an operation, or None and why; nothing to say where nothing was learned at all.
+def _rows(signal: Signal, operation: Operation) -> slice:
+    part = operation.recording
+    return slice(None) if operation.log is None else signal.rows(part.start, part.end)
 
-    One with a class of motion (`motion`) serves that class alone, one without serves all.
-    """
+
+def _judge_log(
+    operations: Sequence[Operation],
+    detector: str,
+    signal: Signal,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+    hold: float,
+) -> list[Detection]:
     if not thresholds:
-        return None, ""
-    learned = [(getattr(item, "motion", None), item) for item in thresholds]
-    for motion, item in learned:
-        if motion is None or motion.matches(operation.motion, SPEED_TOLERANCE):
-            return item, ""
-    known = " and ".join(motion.described for motion, _ in learned if motion is not None)
-    return None, f"no signature for its class: runs {operation.motion.described}, learned {known}"
+        return [_nothing_learned(item, detector, signal.part(_rows(signal, item))) for item in operations]
+    judgement = judged(operations[0].whole, signal, thresholds, operations[0].cut, hold)
+    statistic, band = judgement.evaluated
+    inner = judgement.narrower(1.0 - activation.hysteresis) if activation.hysteresis else None
+    begins = [stroke.applies for stroke in judgement.strokes[1:]]
+    alarms, crossings = activation.alarms(statistic, band, inner, begins)
+    found = []
+    for item in operations:
+        rows = _rows(signal, item)
+        part = statistic.part(rows)
+        own = [tuple(alarm for alarm in of_log if _within(alarm, part)) for of_log in (alarms, crossings)]
+        verdict = _verdict(part, own[0], own[1], judgement)
+        found.append(
+            Detection(
+                item,
+                detector,
+                part,
+                band.part(rows),
+                verdict,
+                signal.part(rows),
+                judgement.thresholds[0],
+                judgement,
+                rows,
+            )
+        )
+    return found
+
+
+def _within(alarm: Alarm, part: Signal) -> bool:
+    return bool(len(part.time)) and part.time[0] <= alarm.time <= part.time[-1]
+
+
+def _verdict(
+    statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alarm, ...], judgement: Judgement
+) -> Verdict:
+    if alarms:
+        return Verdict("alarm", alarms, crossings=crossings)
+    if statistic.valid.any():
+        return Verdict("no alarm", crossings=crossings)
+    reason = statistic.why_not()
+    if np.any(statistic.status == Status.OTHER_SPEED):
+        reason += f"; learned {' and '.join(motion.described for motion in judgement.classes)}"
+    return Verdict("not assessable", reason=reason)
+
+
+def _nothing_learned(operation: Operation, detector: str, signal: Signal) -> Detection:
+    nothing = np.full(signal.values.shape, np.nan)
+    status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
+    unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
+    verdict = Verdict("not assessable", reason=unlearned)
+    return Detection(operation, detector, replace(signal, status=status), Band(nothing, nothing), verdict, signal)

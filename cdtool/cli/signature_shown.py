@@ -13,6 +13,7 @@ from cdtool.cli.console import number, plain, table
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
     from cdtool.evaluation.upkeep.coverage import Coverage
+    from cdtool.evaluation.upkeep.summary import SignatureSummary
     from cdtool.signature_file import SignatureFile
     from cdtool.workflows.upkeep import Checked, CheckedClass
 
@@ -79,11 +80,15 @@ def file_as_json(stored: SignatureFile) -> dict[str, Any]:
         "activation": asdict(stored.activation),
         "runs": [asdict(run) for run in stored.runs],
         "classes": [
-            asdict(summarise_signature(current, first))
+            _summary_as_json(summarise_signature(current, first))
             for current, first in pairs
             if isinstance(current, FittedSignature) and isinstance(first, FittedSignature)
         ],
     }
+
+
+def _summary_as_json(summary: SignatureSummary) -> dict[str, Any]:
+    return {**asdict(summary), "motion": summary.motion.to_dict()}
 
 
 def show_class(item: CheckedClass) -> None:
@@ -146,7 +151,7 @@ def checked_as_json(checked: Checked) -> dict[str, Any]:
         "detector": checked.file.detector,
         "classes": [
             {
-                "motion": asdict(item.signature.motion),
+                "motion": item.signature.motion.to_dict(),
                 "safety_factor": item.signature.safety_factor,
                 "coverage": _coverage_as_json(item.coverage) if item.coverage else None,
                 "drift": _drift_as_json(item.drift) if item.drift else None,

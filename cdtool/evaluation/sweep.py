@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.activation import Activation, crossings_of
+from cdtool.activation import Activation, begins_at, crossings_of
 from cdtool.detection import Status
 from cdtool.evaluation.truth.matching import belongs, one_an_event, windows
 from cdtool.pipeline import Detection
@@ -41,7 +41,8 @@ def sweep(
     order = np.argsort([contact.start for contact in contacts], kind="stable")
     alone: list[list[float]] = [[] for _ in factors]
     latency = np.full((len(factors), len(contacts)), np.nan)
-    debounce = activation.samples(statistic.period)
+    needed = activation.needed(statistic.time)
+    fresh = begins_at(statistic.time, detection.begins)
     for joint in range(met_at.shape[1]):
         met = np.ascontiguousarray(met_at[:, joint])
         status = np.ascontiguousarray(statistic.status[:, joint])
@@ -49,7 +50,7 @@ def sweep(
         highest = float(judged.max()) if len(judged) else -np.inf
         for i in np.flatnonzero(factors < highest):
             calm = met <= (1.0 - activation.hysteresis) * factors[i]
-            at, armed = crossings_of(statistic.time, met > factors[i], calm, status, debounce, activation.wait)
+            at, armed = crossings_of(statistic.time, met > factors[i], calm, status, needed, activation.wait, fresh)
             times = statistic.time[at]
             alone[i] += [float(time) for time in times[armed] if not belongs(time, spans)]
             for column, (contact, opens, closes) in zip(order, spans, strict=True):
@@ -67,13 +68,15 @@ def critical_factor(detection: Detection, activation: Activation) -> float:
     -inf where no run of judged samples is as long as the debounce.
     """
     statistic, met_at = detection.statistic, detection.exceedance()
-    debounce = activation.samples(statistic.period)
+    needed = activation.needed(statistic.time)
     highest = -np.inf
     for joint in range(met_at.shape[1]):
         status = statistic.status[:, joint]
         present = status != Status.GAP  # a missing sample is skipped, as by the activation
         met = np.where(status == Status.VALID, met_at[:, joint], -np.inf)[present]
-        if len(met) >= debounce:
-            held = np.lib.stride_tricks.sliding_window_view(met, debounce).min(axis=1)
-            highest = max(highest, float(held.max()))
+        for debounce in np.unique(needed[present]):
+            if len(met) >= debounce:
+                held = np.lib.stride_tricks.sliding_window_view(met, debounce).min(axis=1)
+                there = needed[present][debounce - 1 :] == debounce
+                highest = max(highest, float(held[there].max(initial=-np.inf)))
     return highest

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cdtool.errors import SignatureError
-from cdtool.motion import MotionClass, motion_class
+from cdtool.motion import MotionClass, measured_class
+from cdtool.motion.speed_course import learn_course
 from cdtool.recording import Recording
 
-# Speeds of one class differ by at most this share.
-SPEED_TOLERANCE = 0.05
+# Nominal speeds of one class differ by at most this share.
+SPEED_TOLERANCE = 0.1
 
 
-def common_class(recordings: Sequence[Recording]) -> MotionClass:
-    """Direction, leading joint and median speed of the runs; raises SignatureError where one is of another class."""
-    classes = [motion_class(recording) for recording in recordings]
+def common_class(recordings: Sequence[Recording], alignment: str = "time_then_position") -> MotionClass:
+    """Return direction, leading joint, median speed and speed course of runs of one class.
+
+    Raises SignatureError where one is of another class: `workflows.fitting` groups the runs before.
+    """
+    classes = [measured_class(recording) for recording in recordings]
     nominal = float(np.median([item.nominal_speed for item in classes]))
     common = MotionClass(classes[0].direction, nominal, classes[0].joint)
     if common.direction == 0:
@@ -27,4 +32,6 @@ def common_class(recordings: Sequence[Recording]) -> MotionClass:
                 f"{recording.name}: runs {item.described}, the others {common.described}",
                 "a signature belongs to one direction and speed; leave the run out",
             )
-    return common
+    if any("speed" not in recording for recording in recordings):
+        return common
+    return replace(common, course=learn_course(recordings, common.direction, nominal, common.joint, alignment))

@@ -11,16 +11,14 @@ import numpy as np
 from cdtool.detection import Band, Signal
 from cdtool.errors import SignatureError, UsageError, nearest
 from cdtool.motion import MotionClass
+from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.signature_curve import Curve, resample
 
 RULES = ("pooled", "thesis")
 SIDES = ("one", "two")
-# Shares of the nominal speed at which the stroke has begun, and at which it runs.
-START_SHARE = 0.1
-RUNNING_SHARE = 0.95
 
 
 @dataclass(frozen=True)
@@ -135,6 +133,7 @@ class FittedSignature:
             "direction": self.motion.direction,
             "nominal_speed": self.motion.nominal_speed,
             "leading_joint": self.motion.joint,
+            "speed_course": self.motion.course.to_dict() if self.motion.course else None,
             "alignment": self.alignment,
             "rule": self.rule,
             "sides": self.sides,
@@ -149,7 +148,12 @@ class FittedSignature:
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`."""
         return cls(
-            motion=MotionClass(int(values["direction"]), float(values["nominal_speed"]), int(values["leading_joint"])),
+            motion=MotionClass(
+                int(values["direction"]),
+                float(values["nominal_speed"]),
+                int(values["leading_joint"]),
+                SpeedCourse.from_dict(values["speed_course"]) if values.get("speed_course") else None,
+            ),
             alignment=known("alignment", values["alignment"], ALIGNMENTS),
             rule=known("rule", values["rule"], RULES),
             sides=known("sides", values["sides"], SIDES),

@@ -8,8 +8,8 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.errors import SignatureError, UsageError
+from cdtool.motion.progress import Progress
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.alignment import Progress
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve
 

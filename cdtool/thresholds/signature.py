@@ -10,14 +10,12 @@ import numpy as np
 
 from cdtool.detection import Signal
 from cdtool.errors import NothingValidError, SignatureError, UsageError
+from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.alignment import ALIGNMENTS, Progress, progress
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     RULES,
-    RUNNING_SHARE,
     SIDES,
-    START_SHARE,
     FittedSignature,
     axes_of,
     known,
@@ -76,7 +74,7 @@ class Signature:
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
         self._check_number(len(pairs))
-        motion = common_class([recording for recording, _ in pairs])
+        motion = common_class([recording for recording, _ in pairs], self.alignment)
         wheres = [
             progress(
                 recording,

@@ -10,8 +10,9 @@ from typing import Any, Self
 import numpy as np
 
 from cdtool.detection import Signal
+from cdtool.motion.progress import Progress
+from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import FloatArray
-from cdtool.thresholds.alignment import Progress
 
 # A grid point has a limit once this share of the runs has been there.
 COVERAGE = 0.8
@@ -102,8 +103,8 @@ class Curve:
         mean, variance = self.mean, self._variance()
         if pooled:
             reach = round(self.window / self.step)
-            mean = _moving_mean(self.mean, known, reach)
-            variance = _moving_mean(variance + (self.mean - mean) ** 2, known, reach)
+            mean = moving_mean(self.mean, known, reach)
+            variance = moving_mean(variance + (self.mean - mean) ** 2, known, reach)
         spread = np.sqrt(variance)
         for j in range(spread.shape[1]):
             if known[:, j].any():
@@ -164,15 +165,3 @@ def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) ->
         near = reached[along[at[reached]] - grid[reached] <= 2.0 * curve.step]
         result[near, j] = values[at[near]]
     return result
-
-
-def _moving_mean(values: FloatArray, known: Any, reach: int) -> FloatArray:
-    """Mean over the known neighbours within `reach` grid points to either side."""
-    weights = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(known, axis=0)))
-    totals = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(np.where(known, values, 0.0), axis=0)))
-    points = np.arange(len(values))
-    first, last = np.maximum(points - reach, 0), np.minimum(points + reach + 1, len(values))
-    number = weights[last] - weights[first]
-    total = totals[last] - totals[first]
-    mean: FloatArray = np.divide(total, number, out=np.zeros_like(total), where=number > 0)
-    return mean

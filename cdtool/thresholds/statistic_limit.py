@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
@@ -69,7 +69,7 @@ class FittedStatisticLimit:
             **rule_to_dict(self.rule),
             "limit": self.limit.to_dict(),
             "period": self.period,
-            "motion": asdict(self.motion) if self.motion else None,
+            "motion": self.motion.to_dict() if self.motion else None,
         }
 
     @classmethod
@@ -79,7 +79,7 @@ class FittedStatisticLimit:
             rule=rule_from_dict(values),
             limit=FittedLimit.from_dict(values["limit"]),
             period=float(values["period"]),
-            motion=MotionClass(**values["motion"]) if values["motion"] else None,
+            motion=MotionClass.from_dict(values["motion"]) if values["motion"] else None,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -66,7 +66,7 @@ class FittedTrendTable:
             "falling": self.falling.tolist(),
             "limits": [item.to_dict() for item in self.limits],
             "time_constant": self.time_constant,
-            "motion": asdict(self.motion) if self.motion else None,
+            "motion": self.motion.to_dict() if self.motion else None,
         }
 
     @classmethod
@@ -77,7 +77,7 @@ class FittedTrendTable:
             falling=np.array(values["falling"], dtype=np.float64),
             limits=tuple(FittedLimit.from_dict(item) for item in values["limits"]),
             time_constant=float(values["time_constant"]),
-            motion=MotionClass(**values["motion"]) if values["motion"] else None,
+            motion=MotionClass.from_dict(values["motion"]) if values["motion"] else None,
         )
 
 

@@ -9,8 +9,8 @@ from cdtool.activation import Activation
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.motion.progress import ALIGNMENTS
 from cdtool.tables import Table
-from cdtool.thresholds.alignment import ALIGNMENTS
 from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.signature import Signature
 

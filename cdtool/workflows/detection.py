@@ -14,8 +14,9 @@ from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
-from cdtool.pipeline import Detection, detect_operation
+from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
@@ -94,7 +95,7 @@ def detect(
         described += ", with another activation than that of the file"
     recording, parts = load_operations(Path(log), machine_file, operations)
     detections = tuple(
-        detect_operation(part, machine_file.machine, instance, thresholds, raised_by, joints) for part in parts
+        detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, max(HOLD, window))
     )
     contacts = _contacts(recording, onset or OnsetRule())
     matchings = tuple(

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 from cdtool.detection import Signal
 from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import Skipped
 from cdtool.operations import Operation
-from cdtool.pipeline import run_detector
+from cdtool.pipeline import run_detector_on_each
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.contract import checked_fit
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.grouping import by_class
 
 Pair = tuple[Operation, Signal]
 
@@ -70,17 +71,21 @@ def signals_of(
     refused: list[CdtoolError] = []
     pairs: list[Pair] = []
     seen: dict[tuple[str, int], str] = {}
+    once: list[Operation] = []
     for operation in operations:
         run = (operation.recording.digest, operation.number)
         if run[0] and run in seen:
             skipped.append(Skipped(operation.name, f"holds the same bytes as {seen[run]}: counts once"))
             continue
         seen[run] = operation.name
+        once.append(operation)
+    for _, of_log in groupby(once, key=lambda operation: id(operation.whole)):
+        cut = list(of_log)
         try:
-            pairs.append((operation, run_detector(operation, machine, detector, watched)))
+            pairs += zip(cut, run_detector_on_each(cut, machine, detector, watched), strict=True)
         except CdtoolError as fault:
             refused.append(fault)
-            skipped.append(Skipped(operation.name, str(fault)))
+            skipped += [Skipped(operation.name, str(fault)) for operation in cut]
     if not pairs:
         reasons = [*(fault.message for fault in refused), *(item.reason for item in unread)]
         raise NoUsableRunError(detector.name, reasons[0] if reasons else "")
@@ -107,19 +112,6 @@ def for_machine(rule: Any, machine: Any) -> Any:
     return with_context(rule, sides, Signature(sides=sides))
 
 
-def by_class(pairs: Sequence[Pair]) -> list[list[Pair]]:
-    """The runs by their class of motion, in order of the first of each."""
-    classes: list[list[Pair]] = []
-    for pair in pairs:
-        for members in classes:
-            if pair[0].motion.matches(members[0][0].motion, 2.0 * SPEED_TOLERANCE):
-                members.append(pair)
-                break
-        else:
-            classes.append([pair])
-    return classes
-
-
 def _fit_all(rule: Any, pairs: Sequence[Pair]) -> Fitted:
     return Fitted((_fit(rule, pairs),), (tuple(operation for operation, _ in pairs),), ())
 
@@ -129,7 +121,11 @@ def _fit_classes(rule: Any, pairs: Sequence[Pair]) -> Fitted:
     used: list[tuple[Operation, ...]] = []
     skipped: list[Skipped] = []
     refused: list[CdtoolError] = []
-    for members in by_class(pairs):
+    classes, odd = by_class([operation for operation, _ in pairs])
+    skipped += odd
+    signals = {id(operation): signal for operation, signal in pairs}
+    for operations in classes:
+        members = [(operation, signals[id(operation)]) for operation in operations]
         try:
             fitted.append(_fit(rule, members))
             used.append(tuple(operation for operation, _ in members))

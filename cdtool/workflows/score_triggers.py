@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -66,7 +66,10 @@ def score(
     gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
     gathered.findings += _unlisted(given, said, known, listed_only)
 
-    def detect(operation: Operation, _: Scored) -> list[Detection]:
+    def detect(operations: Sequence[Operation], _: Scored) -> list[list[Detection]]:
+        return [detect_one(operation) for operation in operations]
+
+    def detect_one(operation: Operation) -> list[Detection]:
         log = operation.name.removesuffix(f"#{operation.number}")
         shift = operation.recording.origin if clock == "source" else 0.0
         asked = [name for name in names if log in said[name] or not listed_only]

@@ -15,8 +15,9 @@ from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
 from cdtool.evaluation.truth.matching import match
+from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
-from cdtool.pipeline import Detection, detect_operation
+from cdtool.pipeline import Detection, detect_operations
 from cdtool.recording import Contact, Finding, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
@@ -47,8 +48,8 @@ class Scored:
     detecting: float = 0.0
 
 
-# What gives the detections of an operation; it names what failed in the log's `Scored`.
-Detect = Callable[[Operation, Scored], list[Detection]]
+# What gives the detections of each operation of a log; it names what failed in the log's `Scored`.
+Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
 
 
 def detect_with(
@@ -56,28 +57,31 @@ def detect_with(
     detectors: Sequence[Any],
     thresholds: Mapping[str, tuple[FittedThreshold, ...]],
     lacking: Mapping[str, str],
+    hold: float = HOLD,
 ) -> Detect:
-    """Detectors with their thresholds; one that fails on an operation is left out there and named.
+    """Detectors with their thresholds; one that fails on a log is left out there and named.
 
-    Those that are `lacking` what they need, for the reason given, can judge nothing.
+    Those that are `lacking` what they need, for the reason given, can judge nothing. `hold` [s]: the matching window.
     """
+    machine = setup.machine_file.machine
 
-    def detect(operation: Operation, scored: Scored) -> list[Detection]:
-        found = []
+    def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
+        found: list[list[Detection]] = [[] for _ in operations]
         for detector in detectors:
             if detector.name in lacking:
-                unit, why = detector.unit(setup.machine_file.machine), lacking[detector.name]
-                found.append(not_assessable(operation, detector.name, unit, why, setup.watched))
-                continue
-            known = thresholds[detector.name]
-            try:
-                found.append(
-                    detect_operation(
-                        operation, setup.machine_file.machine, detector, known, setup.activation, setup.watched
+                unit, why = detector.unit(machine), lacking[detector.name]
+                made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
+            else:
+                known = thresholds[detector.name]
+                try:
+                    made = detect_operations(
+                        operations, machine, detector, known, setup.activation, setup.watched, hold
                     )
-                )
-            except CdtoolError as fault:
-                scored.skipped.append(Skipped(operation.name, str(fault)))
+                except CdtoolError as fault:
+                    scored.skipped += [Skipped(item.name, str(fault)) for item in operations]
+                    continue
+            for of_operation, detection in zip(found, made, strict=True):
+                of_operation.append(detection)
         return found
 
     return detect
@@ -124,7 +128,7 @@ def score_log(
         if unseen:
             text = f"{', '.join(unseen)}: no load-cell force to hold against {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
-    found = [detect(operation, scored) for operation in operations]
+    found = detect(operations, scored)
     crossings = _pooled(found)
     for operation, own, detections in zip(operations, inside, found, strict=True):
         judged = _judge(setup, group, operation, own, detections, factors, contacts, crossings)

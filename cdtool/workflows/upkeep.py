@@ -234,6 +234,9 @@ def _with_operation(
     if detection.verdict.outcome == "not assessable":
         raise SignatureError(f"not assessable: {detection.verdict.reason}")
     pairs = signatures_in(file)
+    if not any(item.motion.matches(operation.motion, SPEED_TOLERANCE) for item, _ in pairs):
+        known = " and ".join(item.motion.described for item, _ in pairs)
+        raise SignatureError(f"no signature for its class: runs {operation.motion.described}, learned {known}")
     index = next(i for i, (item, _) in enumerate(pairs) if item.motion.matches(operation.motion, SPEED_TOLERANCE))
     current, first = pairs[index]
     recording = operation.recording.without_ground_truth()

@@ -120,7 +120,7 @@ def check_coverage(
             refused.append(operation.name)
     prediction = _prediction(left_out)
     return Coverage(
-        motion=fitted.motion,
+        motion=fitted.motion.without_course,
         safety_factor=fitted.safety_factor,
         target=target,
         runs=tuple(left_out),

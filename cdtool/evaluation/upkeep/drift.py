@@ -52,7 +52,7 @@ def audit_drift(
     unit = "s" if found.axis == "time" else detections[0].operation.recording["position"].unit
     audited = [_Joint(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]
     return DriftAudit(
-        signature.motion,
+        signature.motion.without_course,
         signature.safety_factor,
         found.axis,
         unit,

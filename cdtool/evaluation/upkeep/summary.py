@@ -48,7 +48,7 @@ def summarise_signature(current: FittedSignature, first: FittedSignature) -> Sig
     limited = np.isfinite(current.by_position.band(current.pooled)[0]).any(axis=1)
     grid = current.by_position.grid[limited]
     return SignatureSummary(
-        motion=current.motion,
+        motion=current.motion.without_course,
         runs=current.runs,
         first_runs=first.runs,
         safety_factor=current.safety_factor,

@@ -10,7 +10,10 @@ from cdtool.clock import previous_value
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 ALIGNMENTS = ("time_then_position", "time", "position")
-# The motion has started once this many speed samples in succession exceed the start speed.
+# Shares of the nominal speed at which the stroke has begun, and at which it runs.
+START_SHARE = 0.1
+RUNNING_SHARE = 0.95
+# The motion has started once this many consecutive speed samples exceed the start speed.
 _CONFIRM = 3
 
 
@@ -37,10 +40,7 @@ def progress(
     """Progress from measured speed and position of the leading joint; everything at or before each sample."""
     speed = recording["speed"]
     forward = direction * speed.values[:, joint]
-    moving = forward >= start_speed
-    for lag in range(1, _CONFIRM):
-        moving[lag:] &= forward[:-lag] >= start_speed
-    moving[: _CONFIRM - 1] = False
+    moving = confirmed(forward >= start_speed)
     elapsed = np.full(len(clock), np.nan)
     travel = np.full(len(clock), np.nan)
     running = np.zeros(len(clock), dtype=bool)
@@ -60,3 +60,12 @@ def progress(
         reached = np.fmax.accumulate(np.where(np.isnan(along), -np.inf, along))
         travel = np.where(begun & np.isfinite(reached), reached - along[known[0]], np.nan)
     return Progress(elapsed, travel, running)
+
+
+def confirmed(there: BoolArray) -> BoolArray:
+    """Return (n,) True where the condition holds at the sample and at the two before it."""
+    sure = there.copy()
+    for lag in range(1, _CONFIRM):
+        sure[lag:] &= there[:-lag]
+    sure[: _CONFIRM - 1] = False
+    return sure

@@ -1,0 +1,140 @@
+"""Thresholds held against a detector's signal over a whole log: statistic, band and what would widen it.
+
+Which class of motion a threshold of several judges is decided sample by sample, from what came before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cdtool.detection import Band, Signal, Status
+from cdtool.motion import MotionClass
+from cdtool.motion.applicable import HOLD, judging_classes
+from cdtool.motion.strokes import Stroke, strokes_so_far
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
+
+
+@dataclass(frozen=True)
+class _Share:
+    """The rows of a log that a threshold is evaluated on, and those among them that it judges, (rows,)."""
+
+    threshold: FittedThreshold
+    recording: Recording
+    signal: Signal
+    rows: slice
+    judges: BoolArray
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A signal against its thresholds over a whole log; `recording` is without ground truth.
+
+    Where several classes of motion judge, a sample is outside only where it is outside all of their bands. `strokes`
+    are those of a log that is cut, as they showed while it ran.
+    """
+
+    recording: Recording
+    signal: Signal
+    thresholds: tuple[FittedThreshold, ...]
+    strokes: tuple[Stroke, ...]
+    hold: float = HOLD
+
+    @property
+    def classes(self) -> tuple[MotionClass, ...]:
+        """The classes of motion that were learned."""
+        return classes_of(self.thresholds)
+
+    @cached_property
+    def evaluated(self) -> tuple[Signal, Band]:
+        """The statistic and its band; raises RecordingError where a threshold fails."""
+        return self._with(lambda threshold: threshold)
+
+    def narrower(self, share: float) -> Band:
+        """Return the band at that share of the safety factor."""
+        return self._with(lambda threshold: checked_factor(threshold, share * threshold.safety_factor))[1]
+
+    @cached_property
+    def met_at(self) -> FloatArray:
+        """(n, J) the safety factor at which each sample's limit would be met; -inf where nothing is limited."""
+        met = np.full(self.signal.values.shape, np.inf)
+        judged = np.zeros(met.shape, dtype=bool)
+        for share in self._shares:
+            statistic, exceeded = checked_exceedance(share.threshold, share.recording, share.signal)
+            use = statistic.valid & share.judges[:, np.newaxis]
+            met[share.rows] = np.where(use, np.minimum(met[share.rows], exceeded), met[share.rows])
+            judged[share.rows] |= use
+        return np.where(judged, met, -np.inf)
+
+    @cached_property
+    def _shares(self) -> tuple[_Share, ...]:
+        if not self.classes:
+            everywhere = np.ones(len(self.signal.time), dtype=bool)
+            rows = slice(0, len(self.signal.time))
+            return tuple(_Share(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1])
+        judging = judging_classes(self.recording, self.classes, self.strokes, self.signal.time, self.hold)
+        return tuple(self._share(self.thresholds[item.motion], item.stroke, item.where) for item in judging)
+
+    def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
+        """A class in a stroke: its signal is that of no other motion, so that a filter starts anew behind such."""
+        stroke = self.strokes[number]
+        after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
+        whole = len(self.strokes) == 1
+        rows = slice(0, len(self.signal.time)) if whole else self.signal.rows(stroke.start, after)
+        recording = self.recording if whole else self.recording.between(stroke.start, after)
+        part = self.signal.part(rows)
+        elsewhere = ~judges[rows, np.newaxis] & part.valid
+        status = np.where(elsewhere, Status.OTHER_SPEED, part.status).astype(np.uint8)
+        return _Share(threshold, recording, replace(part, status=status), rows, judges[rows])
+
+    def _with(self, changed: Callable[[FittedThreshold], FittedThreshold]) -> tuple[Signal, Band]:
+        """Of several classes the one whose band a sample is least outside, so that it is outside where it is of all."""
+        shares = self._shares
+        if len(shares) == 1 and shares[0].judges.all():
+            return checked_evaluation(changed(shares[0].threshold), shares[0].recording, shares[0].signal)
+        shape = self.signal.values.shape
+        values, unit = self.signal.values.copy(), self.signal.unit
+        status = np.where(self.signal.valid, Status.OTHER_SPEED, self.signal.status).astype(np.uint8)
+        lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
+        open_below, open_above, limited = (np.zeros(shape, dtype=bool) for _ in range(3))
+        for share in shares:
+            statistic, band = checked_evaluation(changed(share.threshold), share.recording, share.signal)
+            rows, judges, unit = share.rows, share.judges[:, np.newaxis], statistic.unit
+            valid = statistic.valid & judges
+            outside = np.where(valid, np.fmax(statistic.values - band.upper, band.lower - statistic.values), np.inf)
+            taken = valid & ((outside < least[rows]) | (status[rows] != Status.VALID))
+            unknown = judges & ~statistic.valid & (status[rows] == Status.OTHER_SPEED)
+            sources = ((values, statistic.values), (lower, band.lower), (upper, band.upper), (least, outside))
+            for target, source in sources:
+                target[rows] = np.where(taken, source, target[rows])
+            status[rows] = np.where(taken, Status.VALID, np.where(unknown, statistic.status, status[rows]))
+            open_below[rows] |= valid & np.isneginf(band.lower)
+            open_above[rows] |= valid & np.isposinf(band.upper)
+            limited[rows] |= valid & (np.isfinite(band.lower) | np.isfinite(band.upper))
+        # Where each class watches a side of its own, together they watch none.
+        status[open_below & open_above & limited] = Status.NO_LIMIT
+        return replace(self.signal, values=values, status=status, unit=unit), Band(lower, upper)
+
+
+def judged(
+    recording: Recording,
+    signal: Signal,
+    thresholds: Sequence[FittedThreshold],
+    cut: str = "whole",
+    hold: float = HOLD,
+) -> Judgement:
+    """Return the judgement of a whole log that is cut into strokes by `cut`; `hold` [s]: see `motion.applicable`."""
+    seen = recording.without_ground_truth()
+    strokes = strokes_so_far(seen, cut, classes_of(thresholds))
+    return Judgement(seen, signal, tuple(thresholds), tuple(strokes), hold)
+
+
+def classes_of(thresholds: Sequence[FittedThreshold]) -> tuple[MotionClass, ...]:
+    """Return the classes of motion that thresholds were learned for; a threshold without one serves any motion."""
+    classes = (getattr(item, "motion", None) for item in thresholds)
+    return tuple(item for item in classes if item is not None)

@@ -1,0 +1,165 @@
+"""Which classes of motion judge a log, sample by sample, from its speed so far and nothing later.
+
+A class that fits judges. One whose speed departs goes on judging for a while, since a contact slows the axis and must
+not excuse itself. Motion that fits no class is not judged until a class fits again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.motion.motion_class import MotionClass
+from cdtool.motion.speed_course import fitting_samples
+from cdtool.motion.strokes import Stroke
+from cdtool.recording import BoolArray, FloatArray, Recording
+
+# A departure that begins while a class fits is judged by that class for so long [s]: the matching window.
+HOLD = 1.0
+
+
+@dataclass(frozen=True)
+class Judging:
+    """One class in one stroke: `stroke` is its number, `motion` that of the class, and where it judges (n,)."""
+
+    stroke: int
+    motion: int
+    where: BoolArray
+
+
+def judging_classes(
+    recording: Recording,
+    classes: Sequence[MotionClass],
+    strokes: Sequence[Stroke],
+    clock: FloatArray,
+    hold: float = HOLD,
+) -> list[Judging]:
+    """Return where on `clock` (n,) [s] each class judges in each stroke; a class that judges nowhere is left out.
+
+    Until a class has begun its stroke all of them judge. Then those judge that have fitted since they began; one that
+    has departed judges for `hold` [s] more, also beyond the end of its stroke. It judges again once it fits and no
+    other class does, or has fitted for `hold`. Where no speed has come for `hold`, none judges.
+    """
+    speed = recording["speed"]
+    n, count = len(speed.time), len(classes)
+    begun = np.zeros((n, count), dtype=np.bool_)
+    fits = np.zeros((n, count), dtype=np.bool_)
+    fresh = np.zeros(n, dtype=np.bool_)
+    firsts = [int(np.searchsorted(speed.time, item.applies, side="left")) for item in strokes]
+    for item, first, last in zip(strokes, firsts, [*firsts[1:], n], strict=True):
+        if first >= last:
+            continue
+        part = recording if len(strokes) == 1 else recording.between(item.start, float(speed.time[last - 1]))
+        for j, motion in enumerate(classes):
+            started, agrees = fitting_samples(part, motion.direction, motion.nominal_speed, motion.joint, motion.course)
+            begun[first:last, j] = started[-(last - first) :]
+            fits[first:last, j] = agrees[-(last - first) :]
+        fresh[first] = True
+    known: BoolArray = np.all(np.isfinite(speed.values[:, [motion.joint for motion in classes]]), axis=1)
+    now = np.zeros((n, count), dtype=np.bool_)
+    before = np.zeros((n, count), dtype=np.bool_)
+    _judge(speed.time, begun, fits, known, fresh, hold, now, before)
+    return _on_clock(speed.time, known, now, before, firsts, clock, hold)
+
+
+def _on_clock(
+    time: FloatArray,
+    known: BoolArray,
+    now: BoolArray,
+    before: BoolArray,
+    firsts: Sequence[int],
+    clock: FloatArray,
+    hold: float,
+) -> list[Judging]:
+    """The decision at the last speed sample at or before each time of `clock`."""
+    at = np.searchsorted(time, clock, side="right") - 1
+    there = at >= 0
+    at = np.maximum(at, 0)
+    last_known = np.maximum.accumulate(np.where(known, np.arange(len(time)), -1))[at]
+    recent = there & (last_known >= 0) & (clock - time[np.maximum(last_known, 0)] <= hold)
+    stroke = np.searchsorted(firsts, at, side="right") - 1
+    found = []
+    for j in range(now.shape[1]):
+        # What departed in an earlier stroke: the last one in which it judged.
+        judged_in = np.where(now[:, j], np.searchsorted(firsts, np.arange(len(time)), side="right") - 1, -1)
+        held_from = np.maximum.accumulate(judged_in)
+        for number in range(len(firsts)):
+            own = now[at, j] & (stroke == number)
+            held = before[at, j] & (held_from[at] == number) & (stroke > number)
+            where = (own | held) & recent
+            if where.any():
+                found.append(Judging(number, j, where))
+    return found
+
+
+@kernel(f"void({READ_ONLY}, b1[:,::1], b1[:,::1], b1[::1], b1[::1], float64, b1[:,::1], b1[:,::1])")
+def _judge(
+    time: FloatArray,
+    begun: BoolArray,
+    fits: BoolArray,
+    known: BoolArray,
+    fresh: BoolArray,
+    hold: float,
+    now: BoolArray,
+    before: BoolArray,
+) -> None:
+    """`now`: classes that judge their current stroke; `before`: those that departed in an earlier one."""
+    count = begun.shape[1]
+    member = np.zeros(count, dtype=np.bool_)
+    held = np.zeros(count, dtype=np.bool_)
+    started = np.zeros(count, dtype=np.bool_)
+    fitting = np.zeros(count, dtype=np.bool_)
+    last_fit = np.zeros(count)
+    held_fit = np.zeros(count)
+    fitting_since = np.zeros(count)
+    for k in range(len(time)):
+        if fresh[k]:
+            for j in range(count):
+                # A class that fits at the end of its stroke has completed it; one that has departed is held.
+                if member[j] and started[j] and not fitting[j]:
+                    held[j] = True
+                    held_fit[j] = last_fit[j]
+                member[j] = not begun[k, j]
+                last_fit[j] = time[k]
+                started[j] = False
+                fitting[j] = False
+        if not known[k]:
+            for j in range(count):
+                now[k, j] = member[j]
+                before[k, j] = held[j]
+            continue
+        any_held = False
+        for j in range(count):
+            if held[j] and time[k] - held_fit[j] > hold:
+                held[j] = False
+            any_held = any_held or held[j]
+        any_member = False
+        for j in range(count):
+            if fits[k, j]:
+                if not fitting[j]:
+                    fitting_since[j] = time[k]
+                last_fit[j] = time[k]
+            fitting[j] = fits[k, j]
+            if member[j] and time[k] - last_fit[j] > hold:
+                member[j] = False
+            if begun[k, j] and not started[j]:
+                # At its begin: it judges if it fits, beside others.
+                started[j] = True
+                member[j] = fits[k, j] and not any_held
+                fitting_since[j] = time[k]
+            any_member = any_member or (member[j] and started[j])
+        for j in range(count):
+            if not member[j] and fits[k, j]:
+                alone = not any_member and not any_held
+                if alone or (started[j] and time[k] - fitting_since[j] >= hold):
+                    member[j] = True
+        any_started = False
+        for j in range(count):
+            any_started = any_started or (member[j] and started[j])
+        for j in range(count):
+            # A class that has not begun judges only while none has.
+            now[k, j] = member[j] and (started[j] or not any_started)
+            before[k, j] = held[j]

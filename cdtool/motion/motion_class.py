@@ -1,0 +1,125 @@
+"""The class of a motion: direction, nominal speed, the joint that leads it and, once learned, its speed course."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+
+from cdtool.motion.speed_course import SpeedCourse
+from cdtool.recording import FloatArray, Recording, Series
+
+# The speed is averaged over this long [s], and over this many samples at least, before its peak is looked for.
+_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
+# ... but over no more than this share of the time in motion.
+_AVERAGED_SHARE = 0.2
+# Shares of the highest averaged speed above which the axis moves, and of the peak above which it runs.
+_MOVING, _FAST = 0.1, 0.8
+# The peak is this percentile of the averaged speeds in motion.
+_PEAK_PERCENTILE = 95.0
+
+
+@dataclass(frozen=True)
+class MotionClass:
+    """Direction of travel (+1, -1; 0 = no motion), nominal speed [load unit/s] and the joint that leads the motion.
+
+    `course`: speed along the stroke, learned from impact-free runs; None where nothing was learned.
+    """
+
+    direction: int
+    nominal_speed: float
+    joint: int = 0
+    course: SpeedCourse | None = field(default=None, compare=False, repr=False)
+
+    def matches(self, other: MotionClass, tolerance: float) -> bool:
+        """Same joint and direction, and speeds that differ by at most the share `tolerance`."""
+        if self.joint != other.joint or self.direction != other.direction:
+            return False
+        return abs(self.nominal_speed - other.nominal_speed) <= tolerance * max(self.nominal_speed, other.nominal_speed)
+
+    @property
+    def without_course(self) -> MotionClass:
+        """The class by its name alone: joint, direction and nominal speed."""
+        return replace(self, course=None)
+
+    @property
+    def described(self) -> str:
+        """For messages: direction and speed."""
+        word = {1: "forward", -1: "backward", 0: "at rest"}[self.direction]
+        return f"{word} at {self.nominal_speed:.3g}/s" if self.direction else word
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the class as JSON values."""
+        course = {"course": self.course.to_dict()} if self.course else {}
+        return {"direction": self.direction, "nominal_speed": self.nominal_speed, "joint": self.joint, **course}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the class that `to_dict` has written; without a course where the file holds none."""
+        course = SpeedCourse.from_dict(values["course"]) if values.get("course") else None
+        return cls(int(values["direction"]), float(values["nominal_speed"]), int(values["joint"]), course)
+
+
+def motion_class(recording: Recording) -> MotionClass:
+    """Return direction, nominal speed and leading joint of a whole recording: at rest where no speed is logged.
+
+    The nominal speed is the median of the averaged speeds above 80 % of their peak. Averaged over time, a speed that
+    was derived from jittering stamps, or is noisy, is not overestimated. The reference speed decides where it is
+    logged: an early contact does not change it. It looks at the whole recording: it serves to name, never to judge.
+    """
+    return _class_by(recording, ("reference_speed", "speed"))
+
+
+def measured_class(recording: Recording) -> MotionClass:
+    """Return the same by the measured speed alone: what impact-free runs are learned by, with and without reference."""
+    return _class_by(recording, ("speed",))
+
+
+def _class_by(recording: Recording, channels: Sequence[str]) -> MotionClass:
+    for channel in channels:
+        if channel in recording:
+            series = recording[channel]
+            joint = leading_joint(series)
+            present = np.isfinite(series.values[:, joint])
+            if present.any():
+                return _class_of(series.time[present], series.values[present, joint], joint)
+    return MotionClass(0, 0.0)
+
+
+def leading_joint(series: Series) -> int:
+    """Return the joint that moves most: largest mean absolute speed."""
+    if series.joint_count == 1:
+        return 0
+    means = np.nanmean(np.abs(np.nan_to_num(series.values)), axis=0)
+    return int(np.argmax(means))
+
+
+def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
+    """Return the mean speed (n,) over `seconds` about each sample: travel by time, so that jitter of stamps cancels."""
+    if len(time) < 2:
+        return speed
+    steps = np.diff(time)
+    # The first step is unknown: taken as the second, so that the first sample counts too.
+    ends = np.concatenate(([time[0] - steps[0]], time))
+    travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
+    before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
+    mean: FloatArray = (np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before)
+    return mean
+
+
+def _class_of(time: FloatArray, speed: FloatArray, joint: int) -> MotionClass:
+    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    seconds = max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * period)
+    smooth = averaged(time, speed, seconds)
+    in_motion = period * float(np.count_nonzero(np.abs(smooth) > _MOVING * np.abs(smooth).max()))
+    if in_motion * _AVERAGED_SHARE < seconds:
+        smooth = averaged(time, speed, max(in_motion * _AVERAGED_SHARE, period)) if period else speed
+    size = np.abs(smooth)
+    moving = size > _MOVING * size.max()
+    if not moving.any():
+        return MotionClass(0, 0.0, joint)
+    fast = smooth[size >= _FAST * float(np.percentile(size[moving], _PEAK_PERCENTILE))]
+    direction = 1 if float(np.sum(fast)) > 0.0 else -1
+    return MotionClass(direction, float(np.median(np.abs(fast))), joint)

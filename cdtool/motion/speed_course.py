@@ -1,0 +1,178 @@
+"""The speed of a class of motion along its stroke, learned from impact-free runs: what a log must run like to fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from cdtool.clock import integrate
+from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, confirmed, progress
+from cdtool.motion.smoothing import moving_mean
+from cdtool.recording import BoolArray, FloatArray, Recording
+
+# Grid points along the stroke, and how many neighbours to either side are pooled.
+_POINTS, _REACH = 400, 4
+# The time curve reaches this much beyond the slowest run's acceleration.
+_TIME_RESERVE = 1.5
+# A grid point is known where this share of the runs has been.
+_COVERAGE = 0.8
+# A speed fits within this many spreads of the mean, and within this share of the nominal speed in any case.
+_SPREADS, TOLERANCE = 5.5, 0.05
+
+
+@dataclass(frozen=True)
+class SpeedCurve:
+    """Mean and spread (g,) of the forward speed [load unit/s] on the grid 0, step, 2 step ...
+
+    Both are constant beyond the grid's ends.
+    """
+
+    step: float
+    mean: FloatArray
+    spread: FloatArray
+
+    def at(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean and spread (n,) at the places of `axis`; those of the first point where it is NaN."""
+        grid = self.step * np.arange(len(self.mean))
+        places = np.nan_to_num(axis)
+        return np.interp(places, grid, self.mean), np.interp(places, grid, self.spread)
+
+
+@dataclass(frozen=True)
+class SpeedCourse:
+    """Speed over the time since motion start, which counts while accelerating, and over travel, which counts then.
+
+    `alignment` is the signature's: with "time" or "position" that one alone counts.
+    """
+
+    alignment: str
+    by_time: SpeedCurve
+    by_travel: SpeedCurve
+
+    def expected(self, where: Progress) -> tuple[FloatArray, FloatArray]:
+        """Return mean and spread (n,) of the forward speed of impact-free runs at each sample of a stroke."""
+        by_time, by_travel = self.by_time.at(where.elapsed), self.by_travel.at(where.travel)
+        if self.alignment == "time":
+            return by_time
+        if self.alignment == "position":
+            return by_travel
+        mean, spread = (np.where(where.running, late, early) for early, late in zip(by_time, by_travel, strict=True))
+        return mean, spread
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the course as JSON values."""
+        curves = {
+            name: {"step": curve.step, "mean": curve.mean.tolist(), "spread": curve.spread.tolist()}
+            for name, curve in (("by_time", self.by_time), ("by_travel", self.by_travel))
+        }
+        return {"alignment": self.alignment, **curves}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the course that `to_dict` has written; raises ValueError where it is damaged."""
+        if values["alignment"] not in ALIGNMENTS:
+            raise ValueError(f"a speed course aligned by {values['alignment']}")
+        return cls(values["alignment"], _curve_from(values["by_time"]), _curve_from(values["by_travel"]))
+
+
+def learn_course(
+    recordings: Sequence[Recording], direction: int, nominal_speed: float, joint: int, alignment: str
+) -> SpeedCourse:
+    """Return mean and spread of the measured speed over impact-free runs of one class of motion.
+
+    The spread is that of single samples, noise of the speed included, pooled over neighbours together with what the
+    mean departs from its smoothed course.
+    """
+    courses = []
+    for recording in recordings:
+        where = stroke_progress(recording, direction, nominal_speed, joint)
+        series = recording["speed"]
+        use = np.isfinite(where.elapsed) & np.isfinite(series.values[:, joint])
+        courses.append((where, direction * series.values[:, joint], use))
+    whole = alignment == "time"
+    lasting = [float(np.max(where.elapsed[use & (whole | ~where.running)], initial=0.0)) for where, _, use in courses]
+    longest = max(lasting, default=0.0) * (1.0 if whole else _TIME_RESERVE)
+    furthest = max((float(np.nanmax(where.travel[use], initial=0.0)) for where, _, use in courses), default=0.0)
+    return SpeedCourse(
+        alignment,
+        _learned([(where.elapsed[use], speed[use]) for where, speed, use in courses], longest),
+        _learned([(where.travel[use], speed[use]) for where, speed, use in courses], furthest),
+    )
+
+
+def stroke_progress(recording: Recording, direction: int, nominal_speed: float, joint: int) -> Progress:
+    """Return where in a stroke of that class a recording is, on the clock of its speed.
+
+    Without a position the travel is the integral of the speed.
+    """
+    speed = recording["speed"]
+    if "position" not in recording:
+        channels = {**recording.channels, "position": integrate(speed, "")}
+        recording = Recording(recording.name, recording.source, recording.joints, channels)
+    start, running = START_SHARE * nominal_speed, RUNNING_SHARE * nominal_speed
+    return progress(recording, speed.time, direction, start, running, joint)
+
+
+def fitting_samples(
+    recording: Recording, direction: int, nominal_speed: float, joint: int, course: SpeedCourse | None
+) -> tuple[BoolArray, BoolArray]:
+    """Return for each speed sample (n,) whether a stroke of the class has begun, and whether the speed fits it so far.
+
+    Before it has begun everything fits but a confirmed motion backward. Without a course (a class that was not
+    learned) every speed up to the nominal one fits while accelerating, and the nominal one alone from there on. Causal.
+    """
+    forward = direction * recording["speed"].values[:, joint]
+    where = stroke_progress(recording, direction, nominal_speed, joint)
+    begun = np.isfinite(where.elapsed)
+    least = TOLERANCE * nominal_speed
+    if course is None:
+        lowest = np.where(where.running, nominal_speed - least, -least)
+        highest = np.full(len(forward), nominal_speed + least)
+    else:
+        mean, spread = course.expected(where)
+        reach = np.maximum(_SPREADS * spread, least)
+        lowest, highest = mean - reach, mean + reach
+    fits = (forward >= lowest) & (forward <= highest)
+    backward = confirmed(forward <= -START_SHARE * nominal_speed)
+    return begun, np.where(begun, fits, ~backward)
+
+
+def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> SpeedCurve:
+    """The runs' speeds (axis, speed) at each grid point: the first sample that reaches it."""
+    step = end / _POINTS if end > 0.0 else 1.0
+    grid = step * np.arange(_POINTS + 1)
+    samples = np.full((len(runs), len(grid)), np.nan)
+    for row, (axis, speed) in zip(samples, runs, strict=True):
+        reached = np.fmax.accumulate(axis) if len(axis) else axis
+        at = np.searchsorted(reached, grid, side="left")
+        there = at < len(axis)
+        row[there] = speed[at[there]]
+    present = np.isfinite(samples)
+    count = present.sum(axis=0)
+    known = count >= max(1.0, _COVERAGE * len(runs))
+    mean = np.where(present, samples, 0.0).sum(axis=0) / np.maximum(count, 1)
+    squares = np.where(present, (samples - mean) ** 2, 0.0).sum(axis=0)
+    variance = squares / np.maximum(count - 1, 1)
+    smooth = moving_mean(mean[:, np.newaxis], known[:, np.newaxis], _REACH)[:, 0]
+    spread = np.sqrt(moving_mean((variance + (mean - smooth) ** 2)[:, np.newaxis], known[:, np.newaxis], _REACH)[:, 0])
+    last = int(np.flatnonzero(known)[-1]) + 1 if known.any() else 1
+    points = np.arange(last)
+    inside = known[:last] if known.any() else np.ones(1, dtype=bool)
+    return SpeedCurve(
+        step,
+        np.interp(points, points[inside], smooth[:last][inside]),
+        np.interp(points, points[inside], spread[:last][inside]),
+    )
+
+
+def _curve_from(values: Mapping[str, Any]) -> SpeedCurve:
+    mean, spread = (np.array(values[name], dtype=np.float64) for name in ("mean", "spread"))
+    step = float(values["step"])
+    alike = mean.ndim == 1 and len(mean) and mean.shape == spread.shape
+    if not (alike and np.isfinite((mean, spread)).all() and spread.min() >= 0.0 and 0.0 < step < math.inf):
+        raise ValueError(f"a speed curve of means {mean.shape}, spreads {spread.shape} and step {step}")
+    return SpeedCurve(step, mean, spread)

@@ -1,0 +1,119 @@
+"""Impact-free runs by class of motion: those that run alike, and the odd ones by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cdtool.evaluation.results import Skipped
+from cdtool.motion import MotionClass, measured_class
+from cdtool.motion.motion_class import averaged
+from cdtool.motion.speed_course import stroke_progress
+from cdtool.operations import Operation
+from cdtool.recording import FloatArray
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
+
+# Nominal speeds that differ by more than this share from the next one are those of two classes.
+_STEP = 0.05
+# A run is odd where its speed is off by this share of the nominal one over this share of the stroke.
+_OFF, _OFF_SHARE = 0.1, 0.1
+# Fewer runs show no common speed along the stroke.
+_ENOUGH = 3
+_POINTS = 100
+_AVERAGED_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class _Run:
+    """An impact-free operation and its class by the measured speed."""
+
+    operation: Operation
+    motion: MotionClass
+
+
+def by_class(operations: Sequence[Operation]) -> tuple[list[list[Operation]], list[Skipped]]:
+    """Return the runs by class of motion, in order of the first of each, and those that are odd in theirs, left out.
+
+    A class: one leading joint and direction, nominal speeds close together and at most 10 % from their median.
+    """
+    kinds: dict[tuple[int, int], list[_Run]] = {}
+    for operation in operations:
+        motion = measured_class(operation.recording)
+        kinds.setdefault((motion.joint, motion.direction), []).append(_Run(operation, motion))
+    classes: list[list[Operation]] = []
+    odd: list[Skipped] = []
+    for members in (group for kind in kinds.values() for group in _by_speed(kind)):
+        usual, others = _alike(members)
+        classes.append(usual)
+        odd += others
+    place = {id(operation): i for i, operation in enumerate(operations)}
+    for group in classes:
+        group.sort(key=lambda operation: place[id(operation)])
+    return sorted(classes, key=lambda group: place[id(group[0])]), odd
+
+
+def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
+    ordered = sorted(operations, key=lambda run: run.motion.nominal_speed)
+    groups: list[list[_Run]] = [[ordered[0]]]
+    for before, run in pairwise(ordered):
+        if run.motion.nominal_speed > (1.0 + _STEP) * before.motion.nominal_speed:
+            groups.append([])
+        groups[-1].append(run)
+    made: list[list[_Run]] = []
+    for group in groups:
+        median = float(np.median([run.motion.nominal_speed for run in group]))
+        common = MotionClass(group[0].motion.direction, median, group[0].motion.joint)
+        near = [run for run in group if run.motion.matches(common, SPEED_TOLERANCE)]
+        far = [run for run in group if not run.motion.matches(common, SPEED_TOLERANCE)]
+        made += [near, *(_by_speed(far) if far and near else [])]
+    return [group for group in made if group]
+
+
+def _alike(runs: list[_Run]) -> tuple[list[Operation], list[Skipped]]:
+    """The runs of a class whose speed along the stroke is that of the others, and the others by name."""
+    everyone = [run.operation for run in runs]
+    if len(runs) < _ENOUGH or runs[0].motion.direction == 0:
+        return everyone, []
+    nominal = float(np.median([run.motion.nominal_speed for run in runs]))
+    courses = [_course(run, nominal) for run in runs]
+    furthest = float(np.median([travel[-1] if len(travel) else 0.0 for travel, _ in courses]))
+    grid, nowhere = np.linspace(0.0, furthest, _POINTS), np.full(_POINTS, np.nan)
+    speeds = np.array([np.interp(grid, *course, right=np.nan) if len(course[0]) else nowhere for course in courses])
+    # The ends apart: each stroke begins and stops where it does.
+    inner = slice(1, -max(1, _POINTS // 20))
+    known = np.isfinite(speeds[:, inner])
+    usual = np.array(
+        [np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in speeds.T]
+    )
+    off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > _OFF * nominal)
+    share = off.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    alike = [run.operation for run, part in zip(runs, share, strict=True) if part <= _OFF_SHARE]
+    if len(alike) < max(_ENOUGH, len(runs) // 2):
+        return everyone, []
+    odd = []
+    for run, where, speed, part in zip(runs, off, speeds, share, strict=True):
+        if part > _OFF_SHARE:
+            first = 1 + int(np.flatnonzero(where)[0])
+            odd.append(
+                Skipped(
+                    run.operation.name,
+                    f"left out: its speed differs from that of {len(alike)} other runs over {100.0 * part:.0f} % of the "
+                    f"stroke, first after {grid[first]:.3g} of travel: {speed[first]:.3g}/s, not {usual[first]:.3g}/s",
+                )
+            )
+    return alike, odd
+
+
+def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
+    """Averaged forward speed over rising travel."""
+    motion, recording = run.motion, run.operation.recording
+    series = recording["speed"]
+    where = stroke_progress(recording, motion.direction, nominal, motion.joint)
+    speed = motion.direction * series.values[:, motion.joint]
+    use = np.isfinite(where.travel) & np.isfinite(speed)
+    travel, smooth = where.travel[use], averaged(series.time[use], speed[use], _AVERAGED_SECONDS)
+    rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)
+    return travel[rising], smooth[rising]
