@@ -29,6 +29,9 @@ StiffOption = Annotated[int, typer.Option("--stiff", min=0, help="Impacts on the
 SoftOption = Annotated[int, typer.Option("--soft", min=0, help="Impacts with a rubber bumper.")]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")]
 FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")]
+ReferenceOption = Annotated[
+    bool, typer.Option("--reference/--no-reference", help="Log the references too: speed, and torque or position.")
+]
 OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")]
 
 
@@ -41,6 +44,7 @@ def gate(
     soft: SoftOption = 30,
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
+    reference: ReferenceOption = True,
     as_json: JsonOption = False,
 ) -> None:
     """The heavy sliding gate of the thesis's chapter 5: recordings, machine.toml and benchmark.toml.
@@ -52,7 +56,7 @@ def gate(
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     with progress("simulating") as advance:
-        written = write_gate_recordings(output, counts, seed, file_format, advance)
+        written = write_gate_recordings(output, counts, seed, file_format, advance, references=reference)
     _report(output, written, seed, as_json)
 
 
@@ -66,6 +70,7 @@ def arm(
     soft: SoftOption = 30,
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
+    reference: ReferenceOption = True,
     as_json: JsonOption = False,
 ) -> None:
     """The light robot arm of the thesis's chapter 6: recordings, machine.toml and benchmark.toml.
@@ -77,7 +82,9 @@ def arm(
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     with progress("simulating") as advance:
-        written = write_arm_recordings(output, counts, seed, 1 if trial == 1 else 2, file_format, advance)
+        written = write_arm_recordings(
+            output, counts, seed, 1 if trial == 1 else 2, file_format, advance, references=reference
+        )
     _report(output, written, seed, as_json)
 
 

@@ -11,14 +11,12 @@ import numpy as np
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import FloatArray, Recording, Series
 
-# The speed is averaged over this long [s], and over this many samples at least, before its peak is looked for.
+# The speed is averaged over this long [s], and over this many samples at least, before the usual one is looked for.
 _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
 # ... but over no more than this share of the time in motion.
 _AVERAGED_SHARE = 0.2
-# Shares of the highest averaged speed above which the axis moves, and of the peak above which it runs.
+# Shares of the highest averaged speed above which the axis moves, and of the usual one above which it runs.
 _MOVING, _FAST = 0.1, 0.8
-# The peak is this percentile of the averaged speeds in motion.
-_PEAK_PERCENTILE = 95.0
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,10 @@ class MotionClass:
 def motion_class(recording: Recording) -> MotionClass:
     """Return direction, nominal speed and leading joint of a whole recording: at rest where no speed is logged.
 
-    The nominal speed is the median of the averaged speeds above 80 % of their peak. Averaged over time, a speed that
-    was derived from jittering stamps, or is noisy, is not overestimated. The reference speed decides where it is
-    logged: an early contact does not change it. It looks at the whole recording: it serves to name, never to judge.
+    The nominal speed is the median of the averaged speeds above 80 % of the usual one in motion, so that an overshoot
+    does not count. Averaged over time, a speed that is noisy, or derived from jittering stamps, is not overestimated.
+    The reference speed decides where it is logged: an early contact does not change it. It looks at the whole
+    recording: it serves to name, never to judge.
     """
     return _class_by(recording, ("reference_speed", "speed"))
 
@@ -120,6 +119,9 @@ def _class_of(time: FloatArray, speed: FloatArray, joint: int) -> MotionClass:
     moving = size > _MOVING * size.max()
     if not moving.any():
         return MotionClass(0, 0.0, joint)
-    fast = smooth[size >= _FAST * float(np.percentile(size[moving], _PEAK_PERCENTILE))]
+    usual = float(np.median(size[moving]))
+    for _ in range(2):
+        fast = smooth[size >= _FAST * usual]
+        usual = float(np.median(np.abs(fast)))
     direction = 1 if float(np.sum(fast)) > 0.0 else -1
-    return MotionClass(direction, float(np.median(np.abs(fast))), joint)
+    return MotionClass(direction, usual, joint)

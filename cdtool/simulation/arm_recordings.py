@@ -13,7 +13,7 @@ from cdtool.errors import UsageError
 from cdtool.recording import Recording, Series
 from cdtool.simulation.arm_model import ArmRun, Array, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial, require_trial
-from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, write_folder
+from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, without_references, write_folder
 from cdtool.units import UNITS
 
 _JOINTS = ("arm", "forearm")
@@ -83,12 +83,14 @@ def write_arm_recordings(
     file_format: str = "csv",
     progress: Callable[[int, int], None] | None = None,
     parameters: ArmParameters | None = None,
+    references: bool = True,
 ) -> int:
     """Write `counts` recordings of each group below `folder`; returns how many. Same seed, same bytes.
 
     Groups: free, holdout, stiff, soft. A run depends on seed, trial, group and number alone, not on how many are
     written. `file_format` "mixed": the first two of each group as MCAP, the others as CSV. Raises UsageError where
     nothing is to be written, the folder is not empty, the trial is unknown, or the encoders are ideal.
+    Without `references` neither logs nor machine file have a reference channel.
     """
     require_trial(trial)
     arm = parameters or ArmParameters()
@@ -106,12 +108,14 @@ def write_arm_recordings(
         f'joints = ["{_WATCHED[trial]}"]                 # the link that is hit',
     )
     count = 2.0 * math.pi / arm.encoder_counts
-    log_csv = partial(_write_csv, count=count)
-    bench = Bench(simulate, log_csv, _write_mcap, _machine_toml(arm, count), settings, _BENCHMARK_RULES)
+    log_csv = partial(_write_csv, count=count, references=references)
+    log_mcap = partial(_write_mcap, references=references)
+    text = _machine_toml(arm, count) if references else without_references(_machine_toml(arm, count))
+    bench = Bench(simulate, log_csv, log_mcap, text, settings, _BENCHMARK_RULES)
     return write_folder(folder, counts, file_format, bench, progress)
 
 
-def _write_csv(path: Path, run: ArmRun, count: float) -> None:
+def _write_csv(path: Path, run: ArmRun, count: float, references: bool) -> None:
     from cdtool.formats.csv import write_csv
 
     rpm, milli = UNITS["rpm"].factor, UNITS["mN m"].factor
@@ -121,8 +125,8 @@ def _write_csv(path: Path, run: ArmRun, count: float) -> None:
         "phi": run.motor_position / count,
         "az": run.imu,
     }
-    references = {"n_ref": run.reference_speed / rpm, "phi_ref": run.reference_position / count}
-    columns = {"t": run.time * 1e3, **_split(by_joint), "load_cell": run.load_cell, **_split(references)}
+    wanted = {"n_ref": run.reference_speed / rpm, "phi_ref": run.reference_position / count} if references else {}
+    columns = {"t": run.time * 1e3, **_split(by_joint), "load_cell": run.load_cell, **_split(wanted)}
     write_csv(path, columns, _DECIMALS)
 
 
@@ -130,18 +134,19 @@ def _split(by_joint: Mapping[str, Array]) -> dict[str, Array]:
     return {f"{name}_{joint + 1}": values[:, joint] for name, values in by_joint.items() for joint in (0, 1)}
 
 
-def _write_mcap(path: Path, run: ArmRun) -> None:
+def _write_mcap(path: Path, run: ArmRun, references: bool) -> None:
     from cdtool.formats.mcap.write import Stream, write_mcap
 
     measured = {"position": run.motor_position, "velocity": run.motor_speed, "effort": run.motor_torque}
-    references = {"position": run.reference_position, "velocity": run.reference_speed}
+    wanted = {"position": run.reference_position, "velocity": run.reference_speed}
     imu, force = _on_bus("acceleration", run.imu), _on_bus("force", run.load_cell)
     streams = [
         Stream("/joint_states", "sensor_msgs/msg/JointState", run.time, _all_on_bus(measured), _JOINTS),
         Stream("/imu", "std_msgs/msg/Float64MultiArray", run.time, {"data": imu}),
         Stream("/load_cell", "geometry_msgs/msg/WrenchStamped", run.time, {"wrench.force.x": force}),
-        Stream("/reference", "sensor_msgs/msg/JointState", run.time, _all_on_bus(references), _JOINTS),
     ]
+    if references:
+        streams.append(Stream("/reference", "sensor_msgs/msg/JointState", run.time, _all_on_bus(wanted), _JOINTS))
     write_mcap(path, streams, start_ns=EPOCH_NS)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
-from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, write_folder
+from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, without_references, write_folder
 from cdtool.units import UNITS
 
 __all__ = ["GROUPS", "as_recording", "gate_bench", "write_gate_recordings"]
@@ -57,11 +58,13 @@ def write_gate_recordings(
     file_format: str = "csv",
     progress: Callable[[int, int], None] | None = None,
     parameters: GateParameters | None = None,
+    references: bool = True,
 ) -> int:
     """Write `counts` recordings of each group of GROUPS below `folder`; returns how many. Same seed, same bytes.
 
     A run depends on seed, group and number alone, not on how many are written. `file_format` "mixed": the first two of
     each group as MCAP, the others as CSV. Raises UsageError where nothing is to be written or the folder is not empty.
+    Without `references` neither logs nor machine file have a reference channel.
     """
     gate = parameters or GateParameters()
 
@@ -69,15 +72,19 @@ def write_gate_recordings(
         rng = np.random.default_rng([seed, GROUPS.index(group), number])
         return simulate_gate_run(gate, rng, IMPACT_OF[group])
 
-    return write_folder(folder, counts, file_format, gate_bench(gate, simulate), progress)
+    return write_folder(folder, counts, file_format, gate_bench(gate, simulate, references), progress)
 
 
-def gate_bench(gate: GateParameters, simulate: Callable[[str, int], GateRun]) -> Bench[GateRun]:
+def gate_bench(
+    gate: GateParameters, simulate: Callable[[str, int], GateRun], references: bool = True
+) -> Bench[GateRun]:
     """How runs of the gate are logged, whatever `simulate` makes of a group and a number."""
-    return Bench(simulate, _write_csv, _write_mcap, _machine_toml(gate), _BENCHMARK_SETTINGS, _BENCHMARK_RULES)
+    log_csv, log_mcap = partial(_write_csv, references=references), partial(_write_mcap, references=references)
+    text = _machine_toml(gate) if references else without_references(_machine_toml(gate))
+    return Bench(simulate, log_csv, log_mcap, text, _BENCHMARK_SETTINGS, _BENCHMARK_RULES)
 
 
-def _write_csv(path: Path, run: GateRun) -> None:
+def _write_csv(path: Path, run: GateRun, references: bool) -> None:
     from cdtool.formats.csv import write_csv
 
     rpm, gravity = UNITS["rpm"].factor, UNITS["g"].factor
@@ -88,13 +95,13 @@ def _write_csv(path: Path, run: GateRun) -> None:
         "phi": run.motor_position,
         "acc_x": -run.acceleration / gravity,
         "load_cell": run.load_cell * 1e-3,
-        "n_ref": run.reference_speed / rpm,
-        "i_ref": run.reference_torque / _TORQUE_CONSTANT,
     }
+    if references:
+        columns |= {"n_ref": run.reference_speed / rpm, "i_ref": run.reference_torque / _TORQUE_CONSTANT}
     write_csv(path, columns, _DECIMALS)
 
 
-def _write_mcap(path: Path, run: GateRun) -> None:
+def _write_mcap(path: Path, run: GateRun, references: bool) -> None:
     from cdtool.formats.mcap.write import Stream, write_mcap
 
     streams = [
@@ -106,13 +113,10 @@ def _write_mcap(path: Path, run: GateRun) -> None:
         ),
         Stream("/imu", "sensor_msgs/msg/Imu", run.time, {"linear_acceleration.x": -run.acceleration}),
         Stream("/load_cell", "geometry_msgs/msg/WrenchStamped", run.time, {"wrench.force.x": run.load_cell}),
-        Stream(
-            "/reference",
-            "std_msgs/msg/Float64MultiArray",
-            run.time,
-            {"data[0]": run.reference_speed, "data[1]": run.reference_torque},
-        ),
     ]
+    if references:
+        fields = {"data[0]": run.reference_speed, "data[1]": run.reference_torque}
+        streams.append(Stream("/reference", "std_msgs/msg/Float64MultiArray", run.time, fields))
     write_mcap(path, streams, start_ns=EPOCH_NS)
 
 

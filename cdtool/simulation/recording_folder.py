@@ -52,6 +52,11 @@ class Bench(Generic[AnyRun]):
     rules: tuple[str, ...]
 
 
+def without_references(machine_toml: str) -> str:
+    """Return a machine file that maps no reference channel."""
+    return "".join(line for line in machine_toml.splitlines(keepends=True) if not line.startswith("reference_"))
+
+
 def write_folder(
     folder: Path,
     counts: Mapping[str, int],

@@ -100,8 +100,9 @@ def _alike(runs: list[_Run]) -> tuple[list[Operation], list[Skipped]]:
             odd.append(
                 Skipped(
                     run.operation.name,
-                    f"left out: its speed differs from that of {len(alike)} other runs over {100.0 * part:.0f} % of the "
-                    f"stroke, first after {grid[first]:.3g} of travel: {speed[first]:.3g}/s, not {usual[first]:.3g}/s",
+                    f"left out: its speed differs from that of {len(alike)} other runs over {100.0 * part:.0f} % of "
+                    f"the stroke, first after {grid[first]:.3g} of travel: {speed[first]:.3g}/s, not "
+                    f"{usual[first]:.3g}/s",
                 )
             )
     return alike, odd

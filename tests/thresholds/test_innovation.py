@@ -124,7 +124,7 @@ def test_the_change_from_time_to_position_is_no_innovation():
     pairs = [(stroke(), signal(bend + 0.01 * coloured(rng))) for _ in range(30)]
     fitted = Innovation(order=2).fit(pairs[1:])
     statistic, _ = fitted.evaluate(*pairs[0])
-    change = int(np.flatnonzero(stroke()["speed"].values[:, 0] >= 0.95 * 0.2)[0])
+    change = int(np.flatnonzero(stroke()["speed"].values[:, 0] >= 0.95 * fitted.motion.nominal_speed)[0])
     assert (statistic.status[change : change + 3] == Status.START_UP).all() and statistic.valid[change + 3]
     assert np.max(np.abs(statistic.values[statistic.valid])) < 20.0
 
