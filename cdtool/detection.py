@@ -29,6 +29,7 @@ class Status(IntEnum):
     GAP = 3
     NO_LIMIT = 4
     OTHER_SPEED = 5
+    OTHER_RATE = 6
 
 
 REASONS: Mapping[int, str] = {
@@ -37,6 +38,7 @@ REASONS: Mapping[int, str] = {
     Status.GAP: "missing samples",
     Status.NO_LIMIT: "no limit known here",
     Status.OTHER_SPEED: "other speed",
+    Status.OTHER_RATE: "other sample rate",
 }
 
 

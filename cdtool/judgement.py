@@ -86,7 +86,7 @@ class Judgement:
         after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
         whole = len(self.strokes) == 1
         rows = slice(0, len(self.signal.time)) if whole else self.signal.rows(stroke.start, after)
-        recording = self.recording if whole else self.recording.between(stroke.start, after)
+        recording = self.recording if whole else self.recording.section(stroke.start, after)
         part = self.signal.part(rows)
         elsewhere = ~judges[rows, np.newaxis] & part.valid
         status = np.where(elsewhere, Status.OTHER_SPEED, part.status).astype(np.uint8)

@@ -141,6 +141,10 @@ class Recording:
         parts = {name: series.between(start, end) for name, series in self.channels.items()}
         return replace(self, channels={name: series for name, series in parts.items() if len(series)})
 
+    def section(self, start: float, end: float) -> Recording:
+        """Return the recording cut to start <= time <= end [s] with all its channels, those without a sample too."""
+        return replace(self, channels={name: series.between(start, end) for name, series in self.channels.items()})
+
     def without_ground_truth(self) -> Recording:
         """What a detector or threshold may see: no load cell, no label."""
         seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}

@@ -36,6 +36,8 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     """(m, J): at each time of `clock` [s] the last sample at or before it; NaN where there is none or it is too old."""
     if series.time is clock or (len(series.time) == len(clock) and np.array_equal(series.time, clock)):
         return series.values
+    if not len(series.time):
+        return np.full((len(clock), series.joint_count), np.nan)
     at = np.searchsorted(series.time, clock, side="right") - 1
     held = series.values[np.maximum(at, 0)]
     age = clock - series.time[np.maximum(at, 0)]

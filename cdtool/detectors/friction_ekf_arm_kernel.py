@@ -203,6 +203,12 @@ def run_arm_filter(
             last_speed_time = time[k]
         held = k
         friction[k] = d
+        if not math.isfinite(d + a + v + q):
+            # Steps too long for the speed: the linearised model has run away, and begins anew.
+            started = False
+            friction[k] = viscous
+            status[k] = 1
+            continue
         if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
             status[k] = 3
         elif not applicable:

@@ -232,6 +232,12 @@ def run_filter(
         if varies:
             inverse_inertia = 1.0 / inertia[k]
         friction[k] = d
+        if not math.isfinite(d + a + v):
+            # Steps too long for the speed: the linearised model has run away, and begins anew.
+            started = False
+            friction[k] = viscous
+            status[k] = 1
+            continue
         if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
             status[k] = 3
         elif not applicable:

@@ -52,7 +52,7 @@ def judging_classes(
     for item, first, last in zip(strokes, firsts, [*firsts[1:], n], strict=True):
         if first >= last:
             continue
-        part = recording if len(strokes) == 1 else recording.between(item.start, float(speed.time[last - 1]))
+        part = recording if len(strokes) == 1 else recording.section(item.start, float(speed.time[last - 1]))
         for j, motion in enumerate(classes):
             started, agrees = fitting_samples(part, motion.direction, motion.nominal_speed, motion.joint, motion.course)
             begun[first:last, j] = started[-(last - first) :]

@@ -10,19 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.detection import Signal, Status
-from cdtool.errors import NothingValidError, SignatureError
+from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.autoregression import burg, forecast_spread
 from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.sample_rate import at_learned_rate
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
 from cdtool.thresholds.stretches import filtered, stretch_bounds, stretches
 
 # A forecast over more missing samples than this says nothing: the model starts anew.
 LONGEST_GAP = 20
-# Sample periods differ from that learned from by at most this share: the model counts in samples.
-_PERIOD_TOLERANCE = 0.2
 
 
 @dataclass(frozen=True)
@@ -60,15 +59,13 @@ class Whitening:
         """nu_k / sd(nu), in standard deviations, causal; NO_LIMIT where the signature knows none.
 
         A missing sample is forecast, and the sample behind it divided by the forecast's larger spread; a gap above 20
-        periods starts the model anew, with as many START_UP samples as its order. Raises SignatureError where the
-        recording is sampled at another rate than the runs.
+        periods starts the model anew, with as many START_UP samples as its order. OTHER_RATE where the log is sampled
+        at another rate than the runs so far: learn from runs of the same rate.
         """
-        if signal.period > 0.0 and abs(signal.period - self.period) > _PERIOD_TOLERANCE * self.period:
-            raise SignatureError(
-                f"{recording.name}: a sample every {signal.period * 1e3:.3g} ms, not {self.period * 1e3:.3g} ms",
-                "learn from runs of the same rate",
-            )
+        at_rate = at_learned_rate(signal.time, self.period)
         deviation = _deviation(self.signature, recording, signal)
+        off = deviation.valid & ~at_rate[:, np.newaxis]
+        deviation = replace(deviation, status=np.where(off, Status.OTHER_RATE, deviation.status).astype(np.uint8))
         order = len(self.coefficients)
         columns = [self._column(deviation, j, order) for j in range(len(self.spread))]
         return replace(

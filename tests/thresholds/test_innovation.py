@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from cdtool.detection import Status
-from cdtool.errors import NothingValidError, SignatureError, UsageError
+from cdtool.errors import NothingValidError, UsageError
 from cdtool.thresholds.autoregression import burg, forecast_spread
 from cdtool.thresholds.innovation import Innovation
 from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke
@@ -129,10 +129,11 @@ def test_the_change_from_time_to_position_is_no_innovation():
     assert np.max(np.abs(statistic.values[statistic.valid])) < 20.0
 
 
-def test_another_rate_is_refused(fitted):
+def test_another_rate_is_not_assessable(fitted):
     time = TIME[::2]
-    with pytest.raises(SignatureError, match="2 ms"):
-        fitted.evaluate(stroke(time=time), signal(np.full(len(time), 100.0), time))
+    statistic, _ = fitted.evaluate(stroke(time=time), signal(np.full(len(time), 100.0), time))
+    assert not statistic.valid[30:].any() and (statistic.status == Status.OTHER_RATE).any()
+    assert "other sample rate" in statistic.why_not()
 
 
 def test_a_signal_that_does_not_vary_is_refused():
