@@ -160,6 +160,6 @@ def _judge(
         for j in range(count):
             any_started = any_started or (member[j] and started[j])
         for j in range(count):
-            # A class that has not begun judges only while none has.
-            now[k, j] = member[j] and (started[j] or not any_started)
+            # Once a class has begun, one that has not judges only while the motion may still be its own.
+            now[k, j] = member[j] and (started[j] or not any_started or fits[k, j])
             before[k, j] = held[j]
