@@ -98,7 +98,7 @@ def early(seed: int, folder: Path) -> list[str]:
             text.replace("[impacts.stiff]", '[learn]\nlogs = ["free/*.csv"]\n\n[impacts.stiff]', 1), encoding="utf-8"
         )
         results = results_of(target)
-        counts = {outcome: 0 for outcome in ("detected", "missed", "not_assessable")}
+        counts = dict.fromkeys(("detected", "missed", "not_assessable"), 0)
         for item in results.contacts:
             counts[item.outcome] += 1
         faults += [f"gate at {place} m, seed {seed}: {text}" for text in other_speed(results)]

@@ -1,0 +1,59 @@
+"""Logs without reference channels, from the simulator to the verdict; all of it: benchmarks/without_reference.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import cdtool
+from cdtool.simulation.arm_recordings import write_arm_recordings
+from cdtool.simulation.gate_model import GateParameters
+from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.workflows.benchmark import benchmark
+from tests.command import cdtool as command
+
+DETECTORS = ["igm", "gm"]
+
+
+@pytest.mark.parametrize(("name", "more"), [("gate", ()), ("arm", ("--trial", 2))])
+@pytest.mark.parametrize("file_format", ["csv", "mcap"])
+def test_the_simulators_can_leave_the_references_out(name, more, file_format, tmp_path):
+    for folder, flag in (("with", ()), ("without", ("--no-reference",))):
+        counts = ("--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 4)
+        done = command("simulate", name, *more, *counts, "--format", file_format, *flag, "-o", tmp_path / folder)
+        assert done.status == 0
+    kinds = [
+        cdtool.read(tmp_path / folder / "stiff" / f"01.{file_format}", tmp_path / folder / "machine.toml")
+        for folder in ("with", "without")
+    ]
+    extra = {channel for channel in kinds[0].channels if channel.startswith("reference")}
+    assert extra and set(kinds[0].channels) - extra == set(kinds[1].channels)
+    assert "reference" not in (tmp_path / "without" / "machine.toml").read_text(encoding="utf-8")
+    assert not [item for item in kinds[1].findings if "reference" in str(item)]
+    for channel, series in kinds[1].channels.items():
+        assert (series.values == kinds[0][channel].values).all()
+
+
+def test_the_arm_without_references_shows_the_latencies_that_it_shows_with_them(tmp_path):
+    found = {}
+    for folder, references in (("with", True), ("without", False)):
+        counts = {"free": 10, "holdout": 0, "stiff": 1, "soft": 1}
+        write_arm_recordings(tmp_path / folder, counts, 3, trial=2, references=references)
+        results = benchmark(tmp_path / folder / "benchmark.toml", detectors=DETECTORS).results
+        found[folder] = [(row.recording, row.detector, row.outcome, row.latency_ms) for row in results.contacts]
+        assert not results.skipped
+    assert found["with"] == found["without"]
+    assert {outcome for _, _, outcome, _ in found["without"]} == {"detected"}
+
+
+def test_a_gate_that_is_hit_while_it_accelerates_is_assessable_without_references(tmp_path):
+    write_gate_recordings(tmp_path / "free", {"free": 10}, 8, references=False)
+    for place in (0.05, 0.3):
+        gate = replace(GateParameters(), obstacle_position=place, obstacle_scatter=0.002)
+        write_gate_recordings(tmp_path / f"{place}", {"stiff": 1}, 8, parameters=gate, references=False)
+        file = tmp_path / f"{place}" / "benchmark.toml"
+        learn = f'[learn]\nlogs = ["{(tmp_path / "free").as_posix()}/free/*.csv"]\n\n[impacts.stiff]'
+        file.write_text(file.read_text(encoding="utf-8").replace("[impacts.stiff]", learn), encoding="utf-8")
+        results = benchmark(file).results
+        assert [row.outcome for row in results.contacts] == ["detected"] * 5
