@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock.coarse import recent_medians
-from cdtool.detection import Alarm, Band, Signal, StatusArray
+from cdtool.detection import Alarm, Band, Signal, Status, StatusArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
@@ -122,6 +122,36 @@ class Activation:
                 if was_armed:
                     alarms.append(crossing)
         return _in_order(alarms), _in_order(crossings)
+
+    def rearmed(
+        self,
+        statistic: Signal,
+        band: Band,
+        alarms: Sequence[Alarm],
+        inner: Band | None = None,
+        begins: Sequence[float] = (),
+    ) -> tuple[float, ...]:
+        """When each of its alarms was armed again [s], by the rule of `alarms`; infinite where it never was."""
+        fresh = statistic.time[begins_at(statistic.time, begins)].tolist()
+        again = []
+        for alarm in alarms:
+            begun = next((time for time in fresh if time > alarm.time), math.inf)
+            again.append(min(self._calm_again(statistic, band, alarm, inner), begun))
+        return tuple(again)
+
+    def _calm_again(self, statistic: Signal, band: Band, alarm: Alarm, inner: Band | None) -> float:
+        joint, first = alarm.joint, int(np.searchsorted(statistic.time, alarm.time))
+        known = first + np.flatnonzero(statistic.status[first:, joint] != Status.GAP)
+        value, time = statistic.values[known, joint], statistic.time[known]
+        outside = (value > band.upper[known, joint]) | (value < band.lower[known, joint])
+        if inner is not None:
+            outside |= (value > inner.upper[known, joint]) | (value < inner.lower[known, joint])
+        outside &= statistic.status[known, joint] == Status.VALID
+        # Of each sample inside, the first one since the value was last outside.
+        places = np.arange(len(known))
+        since = np.minimum(np.maximum.accumulate(np.where(outside, places, -1)) + 1, len(known) - 1)
+        armed = np.flatnonzero(~outside & (places > since) & (time - time[since] >= self.wait))
+        return float(time[armed[0]]) if len(armed) else math.inf
 
 
 def begins_at(time: FloatArray, begins: Sequence[float]) -> BoolArray:

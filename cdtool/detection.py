@@ -142,9 +142,12 @@ class Verdict:
 
     `alarms` are what an operator would hear: raised, then armed again only after a while inside the band. `crossings`
     are all debounced exits from the band, the alarms among them: an alarm that is still latched hides no contact.
+    `rearmed`: for each alarm when it was armed again [s], infinite where it never was; for figures alone, since it
+    follows from what came after the alarm.
     """
 
     outcome: Literal["alarm", "no alarm", "not assessable"]
     alarms: tuple[Alarm, ...] = ()
     reason: str = ""
     crossings: tuple[Alarm, ...] = ()
+    rearmed: tuple[float, ...] = ()

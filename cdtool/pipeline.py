@@ -183,12 +183,13 @@ def _judge_log(
     inner = judgement.narrower(1.0 - activation.hysteresis) if activation.hysteresis else None
     begins = [stroke.applies for stroke in judgement.strokes[1:]]
     alarms, crossings = activation.alarms(statistic, band, inner, begins)
+    rearmed = dict(zip(alarms, activation.rearmed(statistic, band, alarms, inner, begins), strict=True))
     found = []
     for item in operations:
         rows = _rows(signal, item)
         part = statistic.part(rows)
         own = [tuple(alarm for alarm in of_log if _within(alarm, part)) for of_log in (alarms, crossings)]
-        verdict = _verdict(part, own[0], own[1], judgement)
+        verdict = replace(_verdict(part, own[0], own[1], judgement), rearmed=tuple(rearmed[alarm] for alarm in own[0]))
         found.append(
             Detection(
                 item,

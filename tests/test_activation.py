@@ -149,3 +149,53 @@ def test_the_alarms_are_those_of_a_plain_reading_of_the_rule(values, debounce):
         armed = armed or k - inside_since >= 10
     found = alarms(values, debounce=debounce, rearm=10.0, period=1.0)
     assert [round(alarm.time) for alarm in found] == expected
+
+
+def rearmed(values, status=None, debounce=3, rearm=0.5, period=1e-3):
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    codes = np.zeros(values.shape, dtype=np.uint8) if status is None else np.asarray(status, np.uint8).reshape(-1, 1)
+    band = Band(np.full(values.shape, -1.0), np.full(values.shape, 1.0))
+    signal, activation = Signal(np.arange(len(values)) * period, values, codes, "N"), Activation(debounce, rearm)
+    raised, _ = activation.alarms(signal, band)
+    return raised, activation.rearmed(signal, band, raised)
+
+
+def test_each_alarm_has_the_time_at_which_it_is_armed_again():
+    values = ([0.0] * 10 + [2.0] * 5 + [0.0] * 600) * 5
+    raised, again = rearmed(values)
+    assert len(raised) == 5
+    # Five samples outside, then 0.5 s inside: 2 more samples outside after the alarm.
+    assert again == pytest.approx([alarm.time + 3e-3 + 0.5 for alarm in raised], abs=2e-3)
+
+
+def test_an_alarm_that_is_never_calm_for_long_enough_is_never_armed_again():
+    raised, again = rearmed([0.0] * 10 + [2.0] * 5 + [0.0] * 100)
+    assert len(raised) == 1 and again == (np.inf,)
+    signal = Signal(
+        np.arange(2000) * 1e-3,
+        np.r_[np.full(10, 2.0), np.zeros(1990)].reshape(-1, 1),
+        np.zeros((2000, 1), dtype=np.uint8),
+        "N",
+    )
+    band = Band(np.full((2000, 1), -1.0), np.full((2000, 1), 1.0))
+    latched = Activation(3, latch=True)
+    assert latched.rearmed(signal, band, latched.alarms(signal, band)[0]) == (np.inf,)
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from([0.0, 2.0]), st.sampled_from([0, 0, 0, 2, 3])), min_size=1, max_size=60),
+    st.integers(1, 3),
+)
+def test_no_alarm_comes_before_the_one_before_it_is_armed_again(samples, debounce):
+    values, status = [value for value, _ in samples], [code for _, code in samples]
+    raised, again = rearmed(values, status, debounce, rearm=4e-3)
+    for i, alarm in enumerate(raised):
+        assert alarm.time < again[i]
+        assert i + 1 == len(raised) or again[i] < raised[i + 1].time
+    # Cut where the last one is armed again, nothing but that sample is missing for it.
+    if raised and np.isfinite(again[-1]):
+        k = round(again[-1] / 1e-3)
+        assert rearmed(values[:k], status[:k], debounce, rearm=4e-3)[1][-1:] in ((np.inf,), again[-2:-1])
+        more = [0.0] * 10 + [2.0] * debounce
+        whole = rearmed([*values[: k + 1], *more[10:]], [*status[: k + 1], *([0] * debounce)], debounce, rearm=4e-3)[0]
+        assert len(whole) == len(raised) + 1

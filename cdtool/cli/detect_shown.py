@@ -13,6 +13,7 @@ import typer
 from cdtool.cli.console import number, plain, say, table
 
 if TYPE_CHECKING:
+    from cdtool.detection import Alarm
     from cdtool.evaluation.truth.matching import Matching
     from cdtool.pipeline import Detection
     from cdtool.workflows.contact_force import ForceSummary
@@ -54,15 +55,13 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
 
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
-    from cdtool.workflows.detection import why_no_contact
-
     name, joints = detection.operation.name, detection.statistic.joints
     latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
     for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
         late = number(1e3 * latency[alarm], 3) if alarm in latency else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
-        why = "" if alarm in latency else why_no_contact(found, alarm)
+        why = "" if alarm in latency else _why_no_latency(found, alarm)
         rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, why))
     for item in matching.matches:
         if not item.alarm:
@@ -72,6 +71,14 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
     if not rows:
         rows.append((name, detection.verdict.outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
     return rows
+
+
+def _why_no_latency(found: Detected, alarm: Alarm) -> str:
+    """What an alarm that detected no contact is: one more of a contact, or one without any."""
+    from cdtool.workflows.detection import contact_of, same_contact, why_no_contact
+
+    contact = contact_of(found, alarm)
+    return why_no_contact(found, alarm) if contact is None else same_contact(found, contact, alarm)
 
 
 def _show_force(force: ForceSummary) -> None:
@@ -115,10 +122,11 @@ def _place(way: float) -> str:
 def _as_json(
     log: Path, found: Detected, detection: Detection, matching: Matching, force: ForceSummary | None
 ) -> dict[str, Any]:
-    from cdtool.workflows.detection import why_no_contact
+    from cdtool.workflows.detection import contact_of, why_no_contact
 
     joints = detection.statistic.joints
-    known = {item.alarm for item in matching.matches}
+    belonging = {alarm: contact_of(found, alarm) for alarm in detection.verdict.alarms}
+    belonging |= {item.alarm: item.contact for item in matching.matches if item.alarm}
     return {
         "log": str(log),
         "operation": detection.operation.name,
@@ -134,9 +142,10 @@ def _as_json(
                 "side": alarm.side,
                 "statistic": alarm.statistic,
                 "limit": alarm.limit,
-                "why_no_contact": None if alarm in known else why_no_contact(found, alarm),
+                "contact_onset_s": contact.start if contact else None,
+                "why_no_contact": None if contact else why_no_contact(found, alarm),
             }
-            for alarm in detection.verdict.alarms
+            for alarm, contact in ((alarm, belonging[alarm]) for alarm in detection.verdict.alarms)
         ],
         "contacts": [
             {

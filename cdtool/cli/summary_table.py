@@ -16,31 +16,37 @@ if TYPE_CHECKING:
     from cdtool.evaluation.results import CalibrationResult
     from cdtool.evaluation.statistics.interval import Interval
     from cdtool.evaluation.summary import Summary
+    from cdtool.report.few_contacts import LatencyColumn
 
 _SHOWN = 10
+_HEADINGS = {
+    "mean": "mean ms\n(95 %)",
+    "std": "std\nms",
+    "median": "median\nms",
+    "range": "range\nms",
+    "P95": "P95\nms",
+}
 
 
 def show_table(evaluated: Evaluated) -> None:
     """The thesis's table 5.1 for each group, with what its figures have to be read beside."""
+    from cdtool.report.few_contacts import explained, latency_columns
+
+    shown = latency_columns(evaluated.summaries)
+    bounded = any(item.few and not math.isnan(item.median.low) for item in evaluated.summaries)
+    headings = _HEADINGS | ({"median": "median ms\n(95 %)"} if bounded else {})
     columns = [("group", "left"), ("detector", "left")]
-    names = (
-        "mean ms\n(95 %)",
-        "std\nms",
-        "median\nms",
-        "P95\nms",
-        "n",
-        "missed",
-        "n.a.",
-        "false\nalarms",
-        "ops",
-    )
+    names = (*(headings[name] for name in shown), "n", "missed", "n.a.", "false\nalarms", "ops")
     columns += [(name, "right") for name in names]
-    table(columns, [_row(item) for item in evaluated.summaries])
+    table(columns, [_row(item, shown) for item in evaluated.summaries])
     provenance = evaluated.results.provenance
     say(
         "latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable; "
-        f"median and P95 count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
+        f"median, range and P95 count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
     )
+    few = explained(evaluated.summaries)
+    if few:
+        say(few)
     if provenance.get("watched_joints"):
         say(f"joints watched, of all: {provenance['watched_joints']}")
     for item in evaluated.results.calibration:
@@ -77,22 +83,40 @@ def finish(evaluated: Evaluated) -> None:
     leave(evaluated.results.skipped)
 
 
-def _row(item: Summary) -> tuple[Any, ...]:
+def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
     if not item.contacts:
-        return item.group, item.detector, *(("-",) * 7), _false_alarms(item), item.operations
+        return item.group, item.detector, *(("-",) * (len(shown) + 3)), _false_alarms(item), item.operations
     return (
         item.group,
         item.detector,
-        interval(item.mean),
-        number(item.std.value, 2),
-        quantile(item.median.value),
-        quantile(item.p95.value),
+        *(_latency(item, column) for column in shown),
         item.detected,
         item.missed if item.assessable else "-",
         item.not_assessable,
         _false_alarms(item),
         item.operations,
     )
+
+
+def _latency(item: Summary, column: LatencyColumn) -> str:
+    """A figure of the latency; the intervals of quantiles only where they stand for that of a mean."""
+    from cdtool.report.few_contacts import latency_figure
+
+    if column == "range":
+        return _range(item)
+    figure = latency_figure(item, column)
+    if figure is None:
+        return "-"
+    if column == "std":
+        return number(figure.value, 2)
+    bounded = column == "mean" or (column == "median" and item.few)
+    return interval(figure) if bounded else quantile(figure.value)
+
+
+def _range(item: Summary) -> str:
+    """Shortest and longest latency; a missed contact is later than all."""
+    ends = (quantile(item.min_ms), quantile(item.max_ms))
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _what(item: CalibrationResult) -> str:

@@ -15,15 +15,16 @@ import numpy as np
 from cdtool.evaluation.results import ContactResult, ExposureResult, ForceResult, Results
 from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
+from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
 
 
 @dataclass(frozen=True)
 class Summary:
     """Latency [ms] over the contacts, shares, rates, and the counts to read them with; intervals at 95 %.
 
-    `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. `missed_share`
+    `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. Where there
+    are too few contacts or recordings for an interval it is NaN, with its reason (see `small_sample`). `missed_share`
     is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
     `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
     alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
@@ -39,6 +40,7 @@ class Summary:
     std: Interval
     median: Interval
     p95: Interval
+    min_ms: float
     max_ms: float
     missed_share: Interval
     missed_at_most: float
@@ -59,6 +61,11 @@ class Summary:
     def watched(self) -> bool:
         """Whether anything could be judged: without it no false alarm means nothing."""
         return self.hours > 0.0
+
+    @property
+    def few(self) -> bool:
+        """Whether fewer than ten contacts were detected: tables then show median and range, no mean, std or P95."""
+        return self.detected < FEWEST
 
     @property
     def assessable(self) -> int:
@@ -92,6 +99,9 @@ class Summary:
             return "no contact was held against a force profile, or not all of them could be assessed"
         if "force" in figure:
             return "no load-cell force at an alarm"
+        interval = {"mean_ms_upper": self.mean, "median_ms_upper": self.median, "p95_ms_upper": self.p95}.get(figure)
+        if interval and interval.reason:
+            return interval.reason
         return f"{self.detected} of {self.contacts} contacts detected: too few for it"
 
 
@@ -179,6 +189,7 @@ def _summary(
     values = np.array([item.latency_ms for item in detected], dtype=np.float64)
     labels = [clusters.get(item.recording, item.recording) for item in detected]
     latency, censored = latencies(contacts)
+    seen = [clusters.get(item.recording, item.recording) for item in contacts if item.outcome != "not_assessable"]
     missed = int(censored.sum())
     operations, hours = (exposure.operations, exposure.hours) if exposure else (0, 0.0)
     judged = operations - exposure.not_assessable if exposure else 0
@@ -193,8 +204,9 @@ def _summary(
         not_assessable=len(contacts) - len(latency),
         mean=bca(values, labels, "mean"),
         std=bca(values, labels, "std"),
-        median=latency_quantile(latency, censored, 0.5),
-        p95=latency_quantile(latency, censored, 0.95),
+        median=median_of(latency, censored, seen),
+        p95=p95_of(latency, censored, seen),
+        min_ms=float(values.min()) if len(values) else (math.inf if missed else math.nan),
         max_ms=float(values.max()) if len(values) and not missed else (math.inf if missed else math.nan),
         missed_share=binomial_share(missed, len(latency)),
         missed_at_most=binomial_at_most(missed, len(latency)) if len(latency) else math.nan,

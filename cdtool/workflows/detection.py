@@ -11,7 +11,7 @@ import numpy as np
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.truth.matching import Matching, match
+from cdtool.evaluation.truth.matching import Matching, belongs, match, windows
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.motion.applicable import HOLD
@@ -31,7 +31,7 @@ class Detected:
 
     `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `threshold` says in
     words what was held against the signal, `activation` is what raised the alarms. `learned`: the signature was learned
-    from this log, so that no alarm shows nothing.
+    from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     """
 
     recording: Recording
@@ -41,6 +41,7 @@ class Detected:
     threshold: str
     activation: Activation = field(default_factory=Activation)
     learned: bool = False
+    window: float = 1.0
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -102,7 +103,26 @@ def detect(
         match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window, rearm=raised_by.wait)
         for item in detections
     )
-    return Detected(recording, detections, contacts, matchings, described, raised_by, recording.digest in learned)
+    return Detected(
+        recording, detections, contacts, matchings, described, raised_by, recording.digest in learned, window
+    )
+
+
+def contact_of(found: Detected, alarm: Alarm) -> Contact | None:
+    """The contact that an alarm belongs to: in whose window it lies, or that still presses when it comes."""
+    spans = windows(found.contacts, found.window)
+    return next((span[0] for span in reversed(spans) if belongs(alarm.time, [span])), None)
+
+
+def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
+    """What an alarm of a contact is that did not detect it: another joint's, the same one's again, or too late."""
+    matches = [item for matching in found.matchings for item in matching.matches if item.contact == contact]
+    first = next((item.alarm for item in matches if item.alarm), None)
+    if first is None:
+        return f"contact at {contact.start:.3f} s, more than {found.window:g} s after its onset"
+    if first.joint != alarm.joint:
+        return f"same contact, also {found.joints[alarm.joint]}"
+    return f"same contact, {found.joints[alarm.joint]} again"
 
 
 def why_no_contact(found: Detected, alarm: Alarm) -> str:

@@ -140,7 +140,18 @@ def _detection(operation: Operation, detector: str, said: Triggered, shift: floa
     band = Band(np.full_like(values, -np.inf), np.full_like(values, 0.5))
     outcome: Any = "alarm" if alarms else ("no alarm" if signal.valid.any() else "not assessable")
     reason = "" if signal.valid.any() else "the trigger file says so"
-    return Detection(operation, detector, signal, band, Verdict(outcome, alarms, reason, crossings))
+    return Detection(
+        operation, detector, signal, band, Verdict(outcome, alarms, reason, crossings, _released(alarms, crossings))
+    )
+
+
+def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[float, ...]:
+    """When each trigger is released [s]: it is held for a while after the last one that belongs to it."""
+    after = [*(item.time for item in alarms[1:]), math.inf]
+    return tuple(
+        max(item.time for item in crossings if alarm.time <= item.time < end) + _HELD
+        for alarm, end in zip(alarms, after, strict=True)
+    )
 
 
 def _provenance(setup: BenchmarkFile, given: TriggerFile, clock: str) -> dict[str, Any]:

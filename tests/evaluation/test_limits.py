@@ -180,11 +180,20 @@ def test_a_missed_contact_makes_the_largest_latency_infinite():
     assert by_name["momentum", "stiff"].max_ms == 40.0
 
 
+@pytest.mark.parametrize("figure", ["mean_ms_upper", "median_ms_upper", "p95_ms_upper"])
+def test_the_upper_end_of_an_interval_of_few_contacts_is_not_assessable_and_says_why(figure):
+    (found,) = check(f'"gm.stiff.{figure}" = {{ max = 900 }}')
+    assert (found.outcome, found.value) == ("not assessable", None)
+    assert "needs 10 recordings" in found.reason or "needs 6 contacts" in found.reason
+    (value,) = check(f'"gm.stiff.{figure.removesuffix("_upper")}" = {{ max = 900 }}')
+    assert value.outcome == "kept" and value.value > 0.0
+
+
 def test_campaigns_widen_the_interval_of_the_mean():
     from cdtool.evaluation.results import RecordingResult
 
     base = results()
-    rows = [contact("momentum", "stiff", 10.0 * (i // 5) + 0.1 * (i % 5)) for i in range(20)]
+    rows = [contact("momentum", "stiff", 10.0 * (i // 5) + 0.1 * (i % 5)) for i in range(60)]
     alone = replace(base, contacts=tuple(rows))
     recordings = tuple(
         RecordingResult(row.recording, "stiff", "", 8.0, 1, 1, campaign=f"day {i // 5}") for i, row in enumerate(rows)

@@ -17,11 +17,10 @@ import numpy.typing as npt
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.statistics.clusters import Clusters, IntArray, clusters_of
 from cdtool.evaluation.statistics.interval import Interval, check_level
+from cdtool.evaluation.statistics.small_sample import FEWEST, too_few
 from cdtool.recording import FloatArray
 
 RESAMPLES = 9999
-# With fewer there are fewer than ten different resamples.
-FEWEST_CLUSTERS = 3
 # Resampled numbers held at a time: some ten megabytes, whatever the number of values.
 BATCH = 2**20
 
@@ -45,9 +44,10 @@ def bca(
 
     `values` (n,), finite; `clusters` (n,) the recording or test campaign of each. The bounds are quantiles of the
     statistic of `resamples` resamples, at Phi(z0 + (z0 + z) / (1 - a (z0 + z))): z0 is the bias, a the acceleration
-    from leaving one cluster out. Fewer than 3 clusters: no bounds (NaN). Nothing varies: the interval is the value.
+    from leaving one cluster out. Fewer than 10 clusters: no bounds (NaN), with the reason: they would hold the true
+    figure too rarely. Nothing varies: the interval is the value.
     Ties can leave the acceleration undefined; then the percentiles of the same resamples stand.
-    Too short with few clusters, above all for the standard deviation (docs/statistics.md has the measured coverage).
+    Still too short for the standard deviation of skewed values (docs/statistics.md has the measured coverage).
     Raises UsageError for an unknown statistic, no resamples, values that are not finite or arrays that do not fit.
     """
     check_level(level)
@@ -59,8 +59,8 @@ def bca(
     resampled = _STATISTICS[statistic](groups)
     fewest = 2 if statistic == "std" else 1
     value = float(resampled(np.arange(len(groups)))) if len(groups.values) >= fewest else math.nan
-    if len(groups) < FEWEST_CLUSTERS:
-        return Interval(value, math.nan, math.nan, level)
+    if len(groups) < FEWEST:
+        return Interval(value, math.nan, math.nan, level, too_few(len(groups)) if groups.values.size else "")
     low, high = bca_bounds((len(groups),), resampled, len(groups.values), level, resamples, seed)
     return Interval(value, low, high, level)
 

@@ -14,12 +14,14 @@ class Interval:
 
     `value` is NaN where the figure is undefined, infinite where a quantile was not reached. A bound is NaN where there
     is too little data for an interval, infinite where it is open. `level` is the confidence that was asked for.
+    `reason` says why there is no interval.
     """
 
     value: float
     low: float
     high: float
     level: float = 0.95
+    reason: str = ""
 
     @property
     def known(self) -> bool:

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.statistics.bootstrap import BATCH, FEWEST_CLUSTERS, RESAMPLES, bca, bca_bounds, resampled_mean
+from cdtool.evaluation.statistics.bootstrap import BATCH, RESAMPLES, bca, bca_bounds, resampled_mean
 from cdtool.evaluation.statistics.clusters import Clusters, IntArray, clusters_of
 from cdtool.evaluation.statistics.interval import Interval, check_level
 from cdtool.evaluation.statistics.rates import check_count
+from cdtool.evaluation.statistics.small_sample import FEWEST, too_few
 from cdtool.recording import FloatArray
 
 # Up to so many clusters every sign pattern is tried.
@@ -28,6 +29,7 @@ MOST_ENUMERATED = 13
 class Difference:
     """A mean difference in the unit of its values, and how easily chance alone would give it.
 
+    `mean` has no interval below ten recordings or campaigns (in each set); the tests are exact with any number.
     `p` of the permutation test of the mean, `wilcoxon_p` of the rank test; NaN with fewer than two clusters (a set).
     """
 
@@ -88,9 +90,9 @@ def unpaired_difference(
     fewest = min(len(first), len(second))
     value = float(difference(np.arange(len(first)), np.arange(len(second)))) if fewest else math.nan
     low, high = math.nan, math.nan
-    if fewest >= FEWEST_CLUSTERS:
+    if fewest >= FEWEST:
         low, high = bca_bounds((len(first), len(second)), difference, n, level, RESAMPLES, seed)
-    mean = Interval(value, low, high, level)
+    mean = Interval(value, low, high, level, too_few(fewest) if fewest else "")
     if fewest < 2:
         return Difference(mean, math.nan, math.nan, n, k)
     from scipy import stats

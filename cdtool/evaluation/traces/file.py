@@ -103,6 +103,7 @@ def _panel_values(panel: Panel, start: float) -> dict[str, Any]:
         "alarms": list(panel.alarms),
         "false_alarms": list(panel.false_alarms),
         "why": list(panel.why),
+        "rearmed": [time if math.isfinite(time) else None for time in panel.rearmed],
         "time": _coded(course.time, start, _TIME_STEP),
         "value": _coded(course.value, low, step),
         "lower": _coded(course.lower, low, step),
@@ -141,6 +142,8 @@ def _panel(values: dict[str, Any]) -> Panel:
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),
+        # Files of earlier versions have none.
+        rearmed=tuple(math.inf if time is None else float(time) for time in values.get("rearmed", ())),
     )
 
 

@@ -80,7 +80,8 @@ class Panel:
     """One detector over one operation: the course of the joint that alarmed, else of the leading one.
 
     `seen` has one entry a contact of the trace; `alarms` and `false_alarms` are times [s]; `why` explains the alarms
-    and misses in plain sentences.
+    and misses in plain sentences. `rearmed`: when each alarm was armed again [s], infinite where it never was; empty
+    where that is not known.
     """
 
     detector: str
@@ -93,6 +94,7 @@ class Panel:
     alarms: tuple[float, ...]
     false_alarms: tuple[float, ...]
     why: tuple[str, ...] = ()
+    rearmed: tuple[float, ...] = ()
 
     @property
     def blind(self) -> bool:
@@ -184,6 +186,7 @@ def _panel(
         alarms=tuple(item.time for item in alarms),
         false_alarms=tuple(item.time for item in matching.false_alarms),
         why=tuple(why),
+        rearmed=detection.verdict.rearmed,
     )
 
 

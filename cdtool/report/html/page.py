@@ -18,6 +18,7 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import broken
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import NOTHING, counted, number
 from cdtool.report.html.forces import force_counts, force_table, points_table
 from cdtool.report.html.plots import plot_data
@@ -99,6 +100,7 @@ def _lines(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, str]:
     resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
     return {
         "onset": str(provenance.get("onset") or "rule not stated"),
+        "few": explained(evaluated.summaries),
         "label_file": str(provenance.get("label_file") or ""),
         "resolution": f"{number(max(resolutions))} ms" if resolutions else "",
         "recordings": counted(len(results.recordings), "recording"),

@@ -11,9 +11,11 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import ContactResult, Results, SweepResult
 from cdtool.evaluation.statistics.kaplan_meier import survival
 from cdtool.evaluation.statistics.rates import poisson_at_most
-from cdtool.evaluation.summary import latencies
+from cdtool.evaluation.statistics.small_sample import FEWEST
+from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
+from cdtool.report.few_contacts import draws_no_interval
 from cdtool.report.figure_text import number, with_interval
 from cdtool.report.html.recordings import Log, log_of, logs_of
 from cdtool.report.html.table import short, shown
@@ -73,7 +75,7 @@ def _latency(evaluated: Evaluated, contacts: Contacts) -> list[dict[str, Any]]:
         group["rows"].append(
             {
                 "detector": detectors[item.detector],
-                "median": [short(value) for value in (item.median.value, item.median.low, item.median.high)],
+                "median": [short(value) for value in _median(item)],
                 "words": f"median {with_interval(item.median)} ms",
                 "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
                 "latency": [short(row.latency_ms) for row in detected],
@@ -87,6 +89,12 @@ def _latency(evaluated: Evaluated, contacts: Contacts) -> list[dict[str, Any]]:
     return [{**group, "height": LANE_HEIGHT * len(group["rows"]) + LANES_AXIS_HEIGHT} for group in found.values()]
 
 
+def _median(item: Summary) -> tuple[float, ...]:
+    """The median with its interval; alone where a plot draws none."""
+    median = item.median
+    return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
+
+
 def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
     found = []
     for group in results.groups:
@@ -98,7 +106,8 @@ def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
             curve = survival(latency, censored)
             # A step begins where the share changes; of the others only the band's end is worth keeping.
             kept = np.flatnonzero(np.diff(curve.share, prepend=2.0))
-            columns = {key: _numbers(getattr(curve, key)[kept]) for key in ("times", "share", "low", "high")}
+            keys = ("times", "share", *(("low", "high") if len(latency) >= FEWEST else ()))
+            columns = {key: _numbers(getattr(curve, key)[kept]) for key in keys}
             rows.append({"detector": i, **columns, "until": short(float(latency.max())), "n": len(latency)})
         if rows:
             found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT})

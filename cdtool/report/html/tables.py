@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from cdtool.evaluation.results import Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
 from cdtool.report.comparison_words import without_finding
+from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_figure, latency_words
 from cdtool.report.figure_text import (
     NOT_ASSESSABLE,
     NOT_REACHED,
@@ -86,10 +87,11 @@ def limits_table(results: Results, *, kept: bool) -> Table:
 
 def summary_table(evaluated: Evaluated) -> Table:
     """A row a detector and group: latency with what it has to be read beside."""
+    shown_columns = latency_columns(evaluated.summaries)
     columns = [
         Column("detector"),
         Column("group", choice=True),
-        *(Column(f"{name} [ms]", numeric=True) for name in ("mean", "std", "median", "P95")),
+        *(Column(f"{name} [ms]", numeric=True) for name in shown_columns),
         Column("contacts detected", numeric=True),
         Column("missed", numeric=True),
         Column("not assessable", numeric=True),
@@ -100,7 +102,7 @@ def summary_table(evaluated: Evaluated) -> Table:
     ]
     if evaluated.results.forces:
         columns.append(Column("force limit exceeded", numeric=True))
-    rows = [_summary_row(evaluated.results, item)[: len(columns)] for item in evaluated.summaries]
+    rows = [_summary_row(evaluated.results, item, shown_columns)[: len(columns)] for item in evaluated.summaries]
     return Table("figures-table", "Latency, misses and false alarms by detector and group", columns, rows)
 
 
@@ -146,13 +148,21 @@ def interval_cell(interval: Interval) -> Cell:
     return _split(with_interval(interval), interval.value)
 
 
-def _summary_row(results: Results, item: Summary) -> Row:
+def _latency_cell(item: Summary, column: LatencyColumn) -> Cell:
+    """The range is sorted by its longer end."""
+    if column == "range":
+        return Cell(latency_words(item, column), key=key_of(item.max_ms))
+    figure = latency_figure(item, column)
+    return nothing() if figure is None else interval_cell(figure)
+
+
+def _summary_row(results: Results, item: Summary, shown_columns: Sequence[LatencyColumn]) -> Row:
     hit = item.contacts > 0
     assessable = item.detected + item.missed
     return (
         detector_cell(results, item.detector),
         Cell(shown(item.group)),
-        *(interval_cell(figure) for figure in (item.mean, item.std, item.median, item.p95)),
+        *(_latency_cell(item, column) for column in shown_columns),
         Cell(f"{item.detected} of {item.contacts}", key=item.detected) if hit else nothing(),
         _split(
             missed(item.missed, assessable, item.missed_at_most),

@@ -35,6 +35,7 @@ def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:
             "seen": [{**seen, "reason": plain(seen["reason"])} for seen in panel["seen"]],
             "alarms": panel["alarms"],
             "false_alarms": panel["false_alarms"],
+            "rearmed": panel["rearmed"],
             "why": [plain(line) for line in panel["why"]],
             **{name: _curve(panel[name]) for name in ("time", "value", "lower", "upper")},
             "status": [[code, len(list(same))] for code, same in groupby(panel["status"])],

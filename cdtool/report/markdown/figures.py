@@ -13,6 +13,7 @@ from cdtool.evaluation.results import ForceResult, ForceStepResult, LimitResult,
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
 from cdtool.report.comparison_words import TOO_FEW, without_finding
+from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_words
 from cdtool.report.figure_text import (
     NOT_ASSESSABLE,
     NOTHING,
@@ -25,7 +26,7 @@ from cdtool.report.figure_text import (
 from cdtool.report.markdown.text import Section, Table, escape
 from cdtool.report.verdict_words import allowed, value_of
 
-_LATENCY = ("mean [ms]", "std [ms]", "median [ms]", "P95 [ms]", "n", "missed", "not assessable")
+_COUNTS = ("n", "missed", "not assessable")
 _FALSE_ALARMS = ("false alarms", "per hour", "per operation")
 _FORCE = "force at alarm, largest [N]"
 # More rows of limits than this would push the figures out of sight.
@@ -79,11 +80,13 @@ def group_section(evaluated: Evaluated, group: str, tail: str) -> Section:
     rows = [item for item in evaluated.summaries if item.group == group]
     hit = any(item.contacts for item in rows)
     felt = any(not math.isnan(item.force_at_alarm) for item in rows)
-    headings = ("detector", *(_LATENCY if hit else ()), *_FALSE_ALARMS, *((_FORCE,) if felt else ()))
+    shown = latency_columns(rows)
+    latency = (*(f"{name} [ms]" for name in shown), *_COUNTS) if hit else ()
+    headings = ("detector", *latency, *_FALSE_ALARMS, *((_FORCE,) if felt else ()))
     cells = [
         (
             named(evaluated.results, item.detector),
-            *(_latency_cells(item) if hit else ()),
+            *(_latency_cells(item, shown) if hit else ()),
             *_false_alarm_cells(item),
             *((_force_cell(item),) if felt else ()),
         )
@@ -153,11 +156,11 @@ def time_budget(item: ForceResult | ForceStepResult) -> str:
     return "never" if item.time_budget_ms is None else f"{number(item.time_budget_ms)} ms after the onset"
 
 
-def _latency_cells(item: Summary) -> tuple[object, ...]:
+def _latency_cells(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[object, ...]:
     if not item.contacts:
-        return (NOTHING,) * len(_LATENCY)
+        return (NOTHING,) * (len(shown) + len(_COUNTS))
     return (
-        *(with_interval(figure) for figure in (item.mean, item.std, item.median, item.p95)),
+        *(latency_words(item, column) for column in shown),
         item.detected,
         missed(item.missed, item.detected + item.missed, item.missed_at_most),
         item.not_assessable,

@@ -10,6 +10,7 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import broken
 from cdtool.evaluation.results import LimitResult, Results
+from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import counted
 from cdtool.report.markdown.details import details
 from cdtool.report.markdown.figures import comparison_section, force_sections, group_section, limit_sections
@@ -40,7 +41,7 @@ def to_markdown(evaluated: Evaluated, images: Sequence[Image] = (), most: int = 
     if most < _LEAST:
         raise UsageError(f"a report of at most {most} characters", f"give it {_LEAST} or more")
     results = evaluated.results
-    figures = [Section("", _how_to_read(results))]
+    figures = [Section("", " ".join(part for part in (_how_to_read(results), explained(evaluated.summaries)) if part))]
     figures += [Section("", _image(image)) for image in images if image.group is None]
     for group in results.groups:
         own = [_image(image) for image in images if image.group == group]

@@ -12,7 +12,7 @@ import numpy as np
 from cdtool.evaluation.amoc import AmocCurve, AmocPoint
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import between
-from cdtool.report.plots.latency_axis import set_ticks
+from cdtool.report.plots.latency_axis import FLOOR_MS, set_ticks
 from cdtool.report.plots.style import BAND
 
 if TYPE_CHECKING:
@@ -79,8 +79,11 @@ def set_latencies(axes: Axes, low: float, high: float, logarithmic: bool) -> Non
     axes.grid(color="0.9", linewidth=0.6)
 
 
-def explain(axes: Axes, curves: Sequence[AmocCurve]) -> None:
-    """Below the zone what no false alarm means, below the rates what they are and what the marks mean."""
+def explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
+    """Below the zone what no false alarm means, below the rates what they are and what the marks mean.
+
+    `floored`: the axis of latencies is logarithmic, so that medians below its floor are drawn there.
+    """
     hours, bounds = [item.hours for item in curves], [item.at_most for item in curves]
     per, counts = curves[0].per, sorted({item.operations for item in curves})
     operations = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else str(counts[0])
@@ -95,7 +98,7 @@ def explain(axes: Axes, curves: Sequence[AmocCurve]) -> None:
     for text, share, lift, size, side in (
         (zone, 0.5 * _ZONE, -4.0, 7.5, "center"),
         (rates, _ZONE + 0.5 * (1.0 - _ZONE), -22.0, 9.0, "center"),
-        (_marks(curves), 0.0, -46.0, 8.0, "left"),
+        (_marks(curves, floored), 0.0, -46.0, 8.0, "left"),
     ):
         axes.annotate(
             text,
@@ -111,11 +114,13 @@ def explain(axes: Axes, curves: Sequence[AmocCurve]) -> None:
         )
 
 
-def _marks(curves: Sequence[AmocCurve]) -> str:
+def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:
     points = [point for item in curves for point in item.points]
     words = ["mark: one safety factor, the large one is in use"]
     if any(point.missed for point in points):
         words.append("open: contacts were missed")
     if any(math.isinf(point.median) for point in points):
         words.append("arrow: the median is not reached, half of them or more were missed")
+    if floored and any(point.median < FLOOR_MS for point in points):
+        words.append(f"medians below {FLOOR_MS:.0f} ms are drawn there")
     return "; ".join(words)

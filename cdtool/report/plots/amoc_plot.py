@@ -17,7 +17,7 @@ from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.plots.amoc_axes import RateFrame, explain, rate_frame, set_latencies, set_rates
 from cdtool.report.plots.direct_labels import Labelled, write_labels
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
-from cdtool.report.plots.latency_axis import latency_range
+from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range
 from cdtool.report.plots.side_table import Column, SideTable, key_height
 from cdtool.report.plots.style import look_of
 
@@ -75,13 +75,19 @@ def _figure(evaluated: Evaluated) -> Figure:
         for i, row in enumerate(_by_median(rows[group], by_name)):
             _write_row(table, axes, i, row, by_name.get(row.detector))
     table.write_headings(panels[0])
-    explain(panels[-1], curves)
+    explain(panels[-1], curves, floored=logarithmic)
     return figure
+
+
+def _heights(axes: Axes, item: AmocCurve) -> FloatArray:
+    """Where the medians of a curve are drawn [ms]: on a logarithmic axis, those below its floor at the floor."""
+    medians = np.array([point.median for point in item.points])
+    return np.maximum(medians, FLOOR_MS) if axes.get_yscale() == "log" else medians
 
 
 def _draw_curve(axes: Axes, item: AmocCurve, frame: RateFrame) -> None:
     look, x = look_of(item.detector), frame.x(item.detector, item.points)
-    y = np.array([point.median for point in item.points])
+    y = _heights(axes, item)
     inside = np.array([point.false_alarms == 0 for point in item.points])
     drawn = np.where(np.isfinite(y), y, np.nan)
     same = inside[1:] == inside[:-1]
@@ -120,7 +126,7 @@ def _mark_in_use(axes: Axes, item: AmocCurve, x: float) -> None:
     reached = math.isfinite(point.median)
     axes.plot(
         x,
-        point.median if reached else 0.88,
+        float(_heights(axes, item)[item.in_use]) if reached else 0.88,
         look.marker,
         transform=axes.transData if reached else axes.get_xaxis_transform(),
         markerfacecolor="white" if point.missed else look.colour,
@@ -146,7 +152,7 @@ def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: RateFrame) -> N
     """Names where there are rates, from low ones on; in the zone without a false alarm there is no room."""
     named = []
     for item in curves:
-        y = np.array([point.median for point in item.points])
+        y = _heights(axes, item)
         seen = np.isfinite(y)
         x, y = frame.x(item.detector, item.points)[seen], y[seen]
         if len(x):

@@ -11,8 +11,10 @@ import numpy as np
 
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import Results
+from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
+from cdtool.report.few_contacts import draws_no_interval, grouped
 from cdtool.report.figure_text import NOTHING, with_interval
 from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
@@ -111,7 +113,7 @@ def _figure(evaluated: Evaluated) -> Figure:
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)
     table.write_headings(panels[0])
-    panels[-1].set_xlabel(_explained(list(marks.values()), axis), linespacing=1.4)
+    panels[-1].set_xlabel(_explained(summaries, list(marks.values()), axis), linespacing=1.4)
     return figure
 
 
@@ -191,9 +193,12 @@ def _thinned(ordered: FloatArray) -> FloatArray:
 
 
 def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
-    """Below the marks: the interval of the median as a bar, open to the right where it has no end."""
+    """Below the marks: the interval of the median as a bar, open to the right where it has no end.
+
+    Below ten contacts the median stands alone: the marks show the range.
+    """
     height, median = row + 0.28, summary.median
-    if median.low <= axis.end:
+    if not draws_no_interval(summary) and median.low <= axis.end:
         low, high = axis.placed(median.low), axis.placed(median.high)
         if median.high > axis.end:
             high = min(axis.placed(median.value), axis.end) if np.isfinite(median.value) else low
@@ -225,12 +230,16 @@ def _count(item: Summary) -> str:
     return f"{item.false_alarms} in {item.operations} op." if item.hours > 0.0 else NOTHING
 
 
-def _explained(marks: Sequence[_Marks], axis: _Axis) -> str:
+def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axis) -> str:
     below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
     missed = any(len(item.missed) for item in marks)
     lines = [f"latency from contact onset to alarm [ms]{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
     lines.append(f"mark: one contact{', open where it was missed: watched up to there' if missed else ''}")
     if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
         lines[-1] += f" ({_MOST_MARKS} at most are drawn)"
-    lines.append(f"black: median and its 95 % interval{', missed contacts counted as later' if missed else ''}")
+    few, later = [draws_no_interval(item) for item in summaries], ", missed contacts counted as later" if missed else ""
+    interval = "" if all(few) else " and its 95 % interval"
+    lines.append(f"black: median{interval}{later}")
+    if any(few):
+        lines[-1] += f"; no bar below {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
     return "\n".join(lines)

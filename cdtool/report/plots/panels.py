@@ -99,18 +99,44 @@ def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, c
 
 
 def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str) -> None:
-    """0, and 1 from the first alarm of an operation to its end; nothing where a detector could judge nothing."""
+    """1 while the alarm of any joint stands: from its raising until it is armed again; 0 otherwise.
+
+    A filled mark at each raising, an open one at each re-arming. Nothing where a detector could judge nothing.
+    """
     for detection in detections:
         time = detection.statistic.time
         if not len(time) or detection.verdict.outcome == "not assessable":
             continue
-        steps: list[Span] = [(float(time[0]), 0.0), (float(time[-1]), 0.0)]
-        if detection.verdict.alarms:
-            at = detection.verdict.alarms[0].time
-            steps = [steps[0], (at, 0.0), (at, 1.0), (float(time[-1]), 1.0)]
+        end = float(time[-1])
+        held = trigger_spans([alarm.time for alarm in detection.verdict.alarms], detection.verdict.rearmed, end)
+        steps: list[Span] = [(float(time[0]), 0.0)]
+        for start, release in joined_spans(held):
+            steps += [(start, 0.0), (start, 1.0), (release, 1.0)]
+            steps += [(release, 0.0)] if release < end else []
+        steps += [(end, steps[-1][1])]
         axes.plot(*zip(*steps, strict=True), color=colour, linewidth=1.6)
-    axes.set_ylim(-0.2, 1.3)
+        raised, armed = [start for start, _ in held], [release for _, release in held if release < end]
+        axes.plot(raised, [1.0] * len(raised), "^", color=colour, markersize=5, linestyle="none")
+        axes.plot(armed, [0.0] * len(armed), "v", color=colour, markerfacecolor="white", markersize=5, linestyle="none")
+    axes.set_ylim(-0.35, 1.35)
     axes.set_yticks([0, 1])
+
+
+def trigger_spans(alarms: Sequence[float], rearmed: Sequence[float], end: float) -> list[Span]:
+    """From when to when each alarm stands [s]: until it is armed again, `end` where it never is or that is unknown."""
+    releases = rearmed if len(rearmed) == len(alarms) else [end] * len(alarms)
+    return [(start, min(release, end)) for start, release in zip(alarms, releases, strict=True)]
+
+
+def joined_spans(spans: Sequence[Span]) -> list[Span]:
+    """The times that lie in any of the spans: alarms of several joints overlap."""
+    found: list[Span] = []
+    for start, end in sorted(spans):
+        if found and start <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], end))
+        else:
+            found.append((start, end))
+    return found
 
 
 def draw_onset(axes: Axes, time: float, legend: Legend) -> None:

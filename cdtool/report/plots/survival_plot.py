@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
 from cdtool.report.figure_text import NOTHING, number
@@ -82,7 +83,7 @@ def _times(curves: Sequence[SurvivalCurve]) -> np.ndarray:
 def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], low: float, high: float) -> None:
     seen = [item for item in curves if item.contacts > item.not_assessable]
     for item in seen:
-        _draw_curve(axes, item, low, banded=len(seen) <= _MOST_BANDS)
+        _draw_curve(axes, item, low, banded=len(seen) <= _MOST_BANDS and _enough(item))
     axes.set_ylim(0.0, 1.06)
     axes.set_xlim(low, high)
     axes.set_yticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
@@ -90,6 +91,11 @@ def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], low: float, high: f
     axes.grid(color="0.9", linewidth=0.6)
     if not seen:
         axes.text(0.5, 0.5, "not assessable", transform=axes.transAxes, ha="center", va="center", fontsize=9)
+
+
+def _enough(item: SurvivalCurve) -> bool:
+    """Whether there are enough contacts for a band."""
+    return item.contacts - item.not_assessable >= FEWEST
 
 
 def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) -> None:
@@ -150,6 +156,9 @@ def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
     words = []
     if any(len(item.missed) for items in panels for item in items):
         words.append("open mark: missed, watched up to there")
-    if any(sum(item.contacts > item.not_assessable for item in items) <= _MOST_BANDS for items in panels):
+    few = [items for items in panels if sum(item.contacts > item.not_assessable for item in items) <= _MOST_BANDS]
+    if any(_enough(item) for items in few for item in items):
         words.append("band: 95 % at each time")
+    if any(not _enough(item) for items in few for item in items):
+        words.append(f"no band below {FEWEST} contacts")
     return "\n".join(["time from contact onset [ms]", "; ".join(words)]).rstrip()

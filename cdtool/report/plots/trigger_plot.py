@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
 from cdtool.report.plots.figures import Margins, drawing, label, save, stacked_panels, text_width, unit_label
-from cdtool.report.plots.panels import Legend, count_from, draw_force, draw_onset, draw_signal, frame_signal
+from cdtool.report.plots.panels import (
+    Legend,
+    count_from,
+    draw_force,
+    draw_onset,
+    draw_signal,
+    frame_signal,
+    trigger_spans,
+)
 from cdtool.report.plots.style import look_of
 
 if TYPE_CHECKING:
@@ -81,10 +89,10 @@ def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) 
     draw_signal(axes, row.course, row.detector, span, legend)
     axes.locator_params(axis="y", nbins=3)
     colour = look_of(row.detector).colour
-    trigger = _trigger(trace, row)
-    if trigger is not None:
-        axes.axvspan(trigger, span[1], color=colour, alpha=0.25, linewidth=0, zorder=1.5)
-        axes.axvline(trigger, color=colour, linewidth=2.2, zorder=4)
+    for start, end in _triggers(trace, row, span):
+        axes.axvspan(max(start, span[0]), end, color=colour, alpha=0.25, linewidth=0, zorder=1.5)
+        if span[0] <= start <= span[1]:
+            axes.axvline(start, color=colour, linewidth=2.2, zorder=4)
         legend.add("trigger")
     _name(axes, _row_name(trace, row))
     verdict, detail = _verdict(trace, row)
@@ -118,12 +126,23 @@ def _late(trace: Trace, row: Panel) -> float:
     return seen.late if seen and seen.outcome == "detected" else math.inf
 
 
-def _trigger(trace: Trace, row: Panel) -> float | None:
-    """When the trigger rises [s]: the contact's alarm, or the first one of a run without contacts."""
+def _triggers(trace: Trace, row: Panel, span: Span) -> list[Span]:
+    """From when to when the trigger stands within `span` [s]: each alarm until it is armed again.
+
+    Where the contact's own detection is a crossing of an alarm that still stands, it begins a piece of its own.
+    """
+    held = trigger_spans(row.alarms, row.rearmed, trace.end)
     seen = _seen(trace, row)
-    if seen:
-        return seen.alarm if seen.outcome == "detected" else None
-    return row.alarms[0] if row.alarms else None
+    if seen and seen.outcome == "detected" and seen.alarm not in row.alarms:
+        end = next((end for start, end in held if start <= seen.alarm <= end), trace.end)
+        held = sorted(
+            [
+                *((start, min(end, seen.alarm)) for start, end in held if start <= seen.alarm <= end),
+                *((start, end) for start, end in held if not start <= seen.alarm <= end),
+                (seen.alarm, end),
+            ]
+        )
+    return [(start, min(end, span[1])) for start, end in held if start <= span[1] and end >= span[0]]
 
 
 def _blind(trace: Trace, row: Panel) -> bool:

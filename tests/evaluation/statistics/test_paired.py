@@ -70,9 +70,9 @@ def test_the_contacts_of_a_recording_change_sign_together():
 
 
 def test_no_difference_at_all_is_no_evidence():
-    found = paired_difference([0.0] * 8, range(8))
+    found = paired_difference([0.0] * 10, range(10))
     assert (found.mean.value, found.mean.low, found.mean.high, found.p, found.wilcoxon_p) == (0.0, 0.0, 0.0, 1.0, 1.0)
-    found = unpaired_difference([5.0] * 4, [5.0] * 4, range(4), range(4))
+    found = unpaired_difference([5.0] * 10, [5.0] * 10, range(10), range(10))
     assert (found.mean.value, found.mean.low, found.mean.high, found.p, found.wilcoxon_p) == (0.0, 0.0, 0.0, 1.0, 1.0)
 
 
@@ -116,7 +116,7 @@ def test_unpaired_recordings_are_exchanged_with_all_their_contacts():
     assert found.mean.value == pytest.approx(-10.0416666666667)
     assert found.p == pytest.approx(2 / 35, rel=1e-12)
     assert found.wilcoxon_p == pytest.approx(0.05714286, rel=1e-6)
-    assert found.mean.low < found.mean.value < found.mean.high < 0.0
+    assert math.isnan(found.mean.low) and math.isnan(found.mean.high)
 
 
 def test_the_interval_of_an_unpaired_difference_is_rs():

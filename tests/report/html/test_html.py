@@ -210,6 +210,28 @@ def test_every_figure_of_the_summaries_is_in_the_table(made, page):
         assert per_hour.endswith(f"at most {number(item.at_most_per_hour)}")
 
 
+def test_below_ten_contacts_the_table_shows_median_and_range_and_the_plots_no_interval():
+    evaluated, traces = case(contacts=7)
+    results = evaluated.results
+    alone = tuple(replace(item, campaign=None) for item in results.recordings)
+    evaluated = evaluate(replace(results, recordings=alone))
+    found = parsed(to_html(evaluated, traces))
+    head, *rows = found.tables["figures-table"]
+    assert head[2:5] == ["median [ms]", "range [ms]", "contacts detected"]
+    for row, item in zip(rows, evaluated.summaries, strict=True):
+        if item.contacts:
+            assert row[2] == with_interval(item.median)
+            assert row[3] == f"{number(item.min_ms)} to {number(item.max_ms)}"
+    quick = found.data["latency"][0]["rows"][0]
+    assert len(quick["median"]) == 1 and "(" in quick["words"]
+    assert "low" not in found.data["survival"][0]["rows"][0]
+    assert "Fewer than 10 contacts detected: median and range, no mean, std or P95." in found.text
+    many, _ = case()
+    unnamed = replace(many.results, recordings=tuple(replace(item, campaign=None) for item in many.results.recordings))
+    page = parsed(to_html(evaluate(unnamed), ()))
+    assert len(page.data["latency"][0]["rows"][0]["median"]) == 3 and "low" in page.data["survival"][0]["rows"][0]
+
+
 def test_an_interval_without_an_upper_end_takes_two_lines():
     assert interval_cell(Interval(33.5, 31.0, 40.0)).lines == "33.5\n(31.0 to 40.0)"
     assert interval_cell(Interval(33.5, 31.0, math.inf)).lines == "33.5\n(31.0\nto not reached)"

@@ -204,3 +204,24 @@ def test_hostile_names_are_drawn_as_plain_text(tmp_path, kind):
 def test_nothing_is_clipped_whatever_the_names(name):
     rows = swept(name, name, lambda m: None if m > 2.0 else 60.0 * m, alarms, lambda m: 12 if m > 2.0 else 0)
     assert_within(drawn(of(rows, (name,), (name,))))
+
+
+def test_a_median_of_zero_is_drawn_at_the_floor_of_a_logarithmic_axis_and_said(tmp_path):
+    rows = [
+        *swept("quick", "stiff", lambda _: 0.0, alarms, hours=0.1),
+        *swept("slow", "stiff", lambda m: 60.0 * m, alarms, hours=0.1),
+    ]
+    evaluated = of(rows, ("quick", "slow"))
+    figure = drawn(evaluated)
+    axes = figure.axes[0]
+    assert axes.get_yscale() == "log"
+    low, high = axes.get_ylim()
+    marks = small_marks(figure, False)
+    assert len(marks) == 2 * len(MULTIPLES)
+    assert ((marks[:, 1] > low) & (marks[:, 1] < high)).all()
+    assert np.count_nonzero(marks[:, 1] == 1.0) == len(MULTIPLES)
+    assert sorted(float(line.get_ydata()[0]) for line in in_use(figure)) == pytest.approx([1.0, 60.0])
+    plot_amoc(evaluated, tmp_path / "a.svg")
+    assert "medians below 1 ms are drawn there" in joined(tmp_path / "a.svg")
+    plot_amoc(of(rows[len(MULTIPLES) :], ("slow",)), tmp_path / "b.svg")
+    assert "drawn there" not in joined(tmp_path / "b.svg")

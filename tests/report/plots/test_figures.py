@@ -12,10 +12,12 @@ import pytest
 from cdtool.activation import Activation
 from cdtool.detection import Signal, Status, Verdict
 from cdtool.errors import CdtoolError, UsageError
-from cdtool.evaluation.traces.trace import Seen, Trace
+from cdtool.evaluation.traces.file import _trace as trace_from
+from cdtool.evaluation.traces.file import as_read, trace_values
+from cdtool.evaluation.traces.trace import Seen, Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.operations import operations_of
-from cdtool.pipeline import Detection
+from cdtool.pipeline import Detection, judge
 from cdtool.recording import Recording, Series
 from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
 from cdtool.report.plots.detection_plot import plot_detected
@@ -276,3 +278,62 @@ def test_a_detector_looks_the_same_everywhere_and_known_ones_differ():
     assert len({look_of(name).colour for name in (*NAMES, "inertial_momentum")}) == 5
     assert len({look_of(name).marker for name in (*NAMES, "inertial_momentum")}) == 5
     assert look_of("someone's plug-in") == look_of("someone's plug-in")
+
+
+@pytest.fixture
+def five_alarms() -> Detected:
+    """A log of one axis whose signal leaves its limit five times, a second apart."""
+    time = np.arange(0.0, 10.0, 2e-3)
+    torque = np.zeros((len(time), 1))
+    for start in (1.0, 2.0, 3.0, 4.0, 5.0):
+        torque[(time >= start) & (time < start + 0.1)] = 60.0
+    channels = {"torque": Series(time, torque, "N m"), "speed": Series(time, np.ones((len(time), 1)), "rad/s")}
+    recording = Recording("axis", "axis.csv", ("axis",), channels)
+    (operation,) = operations_of(recording)
+    signal = Signal(time, torque, np.zeros(torque.shape, dtype=np.uint8), "N m", joints=("axis",))
+    detection = judge(operation, "pure_torque", signal, (Limit.given((40.0,)),), Activation())
+    return Detected(recording, (detection,), (), (match(detection.verdict, (), detection.statistic),), "limit 40 N m")
+
+
+def test_the_trigger_panel_rises_and_falls_with_each_of_five_alarms(five_alarms):
+    verdict = five_alarms.detections[0].verdict
+    assert len(verdict.alarms) == 5
+    with drawing():
+        figure = detection_plot._figure(five_alarms)
+    (panel,) = {axes for axes in figure.axes if axes.get_ylabel() == "trigger"}
+    step, raised, again = panel.lines[:3]
+    at, level = (np.asarray(values) for values in step.get_data())
+    assert np.count_nonzero(np.diff(level) > 0) == np.count_nonzero(np.diff(level) < 0) == 5
+    assert at[1:][np.diff(level) > 0] == pytest.approx([alarm.time for alarm in verdict.alarms])
+    assert at[1:][np.diff(level) < 0] == pytest.approx(verdict.rearmed)
+    assert len(raised.get_xdata()) == len(again.get_xdata()) == 5
+
+
+def test_alarms_of_several_joints_are_one_trigger_with_a_mark_for_each(six_joints):
+    with drawing():
+        figure = detection_plot._figure(six_joints)
+    panel = next(axes for axes in figure.axes if axes.get_ylabel() == "trigger")
+    level = np.asarray(panel.lines[0].get_ydata())
+    assert np.count_nonzero(np.diff(level) > 0) == 1
+    assert len(panel.lines[1].get_xdata()) == len(six_joints.detections[0].verdict.alarms) == 2
+
+
+def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_armed_again(five_alarms, tmp_path):
+    (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
+    trace = make_trace("free", detection.operation, (), (detection,), (matching,))
+    assert trace.panels[0].rearmed == detection.verdict.rearmed
+    assert as_read([trace])[0].panels[0].rearmed == pytest.approx(detection.verdict.rearmed)
+    with drawing():
+        axes = trigger_plot._figure(trace).axes[0]
+    shaded = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
+    held = sorted((box.x0, box.x1) for box in shaded if 0.0 < box.width < 2.0)
+    assert [start for start, _ in held] == pytest.approx([alarm.time for alarm in detection.verdict.alarms])
+    assert [end for _, end in held] == pytest.approx(detection.verdict.rearmed)
+
+
+def test_traces_of_earlier_versions_have_no_times_of_rearming_and_are_still_read(five_alarms):
+    (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
+    values = trace_values(make_trace("free", detection.operation, (), (detection,), (matching,)))
+    for panel in values["panels"]:
+        del panel["rearmed"]
+    assert trace_from(values).panels[0].rearmed == ()

@@ -47,7 +47,7 @@ def test_counts_stand_beside_the_latencies(evaluated, tmp_path):
     shown = texts(tmp_path / "a.svg")
     for expected in ("stiff", "soft", "friction_ekf", "momentum", "3 of 4", "2 of 3", "30 of 30", "missed"):
         assert expected in shown
-    assert "34.0 (30.0 to not reached)" in shown
+    assert "34.0 (–)" in shown
     assert "1 in 40 op." in shown and "in holdout" in shown
     assert "holdout" not in shown
 
@@ -84,7 +84,17 @@ def test_without_a_miss_there_is_neither_a_strip_nor_a_word_of_it(results, tmp_p
     shown = joined(tmp_path / "a.svg")
     assert "open" not in shown
     assert "> " not in shown
-    assert "black: median and its 95 % interval" in shown
+    assert "black: median; no bar below 10 contacts" in shown
+
+
+def test_below_ten_contacts_the_median_has_no_bar_and_from_ten_on_it_has_one(results, tmp_path):
+    for count in (1, 4, 9, 10):
+        figure = drawn(of(results, [30.0 + i for i in range(count)]))
+        bars = [line for line in figure.axes[0].lines if line.get_color() == "black" and line.get_linewidth() != TICK]
+        ticks = [line for line in figure.axes[0].lines if line.get_linewidth() == TICK]
+        assert (len(bars), len(ticks)) == (int(count >= 10), 1), count
+    plot_latencies(evaluate(of(results, [30.0 + i for i in range(10)])), tmp_path / "a.svg")
+    assert "black: median and its 95 % interval" in joined(tmp_path / "a.svg")
 
 
 def test_a_median_that_is_not_reached_is_said_and_has_no_tick(results, tmp_path):

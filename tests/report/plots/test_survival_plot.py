@@ -55,13 +55,20 @@ def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_watching():
 
 
 def test_few_curves_have_bands_and_many_have_none(tmp_path):
-    few, many = ({name: [20.0, 30.0, 40.0] for name in FOUR[:count]} for count in (3, 4))
+    few, many = ({name: [20.0 + i for i in range(10)] for name in FOUR[:count]} for count in (3, 4))
     assert len(drawn(of(few)).axes[0].collections) == 3
     assert len(drawn(of(many)).axes[0].collections) == 0
     plot_survival(of(few), tmp_path / "few.svg")
     plot_survival(of(many), tmp_path / "many.svg")
     assert "band: 95 % at each time" in joined(tmp_path / "few.svg")
     assert "band" not in joined(tmp_path / "many.svg")
+
+
+def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_says_so(tmp_path):
+    nine = {"momentum": [20.0 + i for i in range(9)], "direct": [20.0 + i for i in range(10)]}
+    assert len(drawn(of(nine)).axes[0].collections) == 1
+    plot_survival(of(nine), tmp_path / "a.svg")
+    assert "band: 95 % at each time; no band below 10 contacts" in joined(tmp_path / "a.svg")
 
 
 def test_counts_stand_beside_the_curves_the_fastest_first(evaluated, tmp_path):

@@ -57,6 +57,11 @@ function latencyPlan(data, panel, openRecording) {
   function drawMedian(chart, [middle, low, high], y) {
     if (middle === null) return;
     const x = chart.x(clamp(middle));
+    if (low === undefined) {
+      // Too few contacts for an interval that holds what it says.
+      draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}` });
+      return;
+    }
     const from = low === null ? x : chart.x(clamp(low));
     const to = high === null ? x : chart.x(clamp(high));
     draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}M${from} ${y}H${to}` });
@@ -144,7 +149,7 @@ function survivalPlan(data, panel, hidden) {
       const rows = visible(panel, hidden);
       for (const row of rows) {
         const group = tint(draw(chart.layer, "g"), data.detectors[row.detector]);
-        if (rows.length <= MOST_BANDS) draw(group, "path", { class: "shade", d: bandPath(chart, row) });
+        if (rows.length <= MOST_BANDS && row.low) draw(group, "path", { class: "shade", d: bandPath(chart, row) });
         draw(group, "path", { class: "line", d: stepPath(chart, row, row.share) });
       }
     },
@@ -154,8 +159,11 @@ function survivalPlan(data, panel, hidden) {
       const words = visible(panel, hidden).map((row) => {
         const i = stepAt(row, time);
         if (time > row.until) return `${data.detectors[row.detector].name}: not watched any more`;
-        const [share, low, high] = [row.share, row.low, row.high].map((values) => figure(100 * values[i], 2));
-        return `${data.detectors[row.detector].name}: ${share} % (${low} to ${high}) of ${row.n}`;
+        const [share, ...band] = [row.share, row.low, row.high]
+          .filter((values) => values)
+          .map((values) => figure(100 * values[i], 2));
+        const bounds = band.length ? ` (${band.join(" to ")})` : "";
+        return `${data.detectors[row.detector].name}: ${share} %${bounds} of ${row.n}`;
       });
       return { x, y: pointerY, words: [`${figure(time)} ms after the onset, undetected:`, ...words].join("\n") };
     },

@@ -39,11 +39,14 @@ function verdictOf(trace, panel) {
   return { words, reason: extra };
 }
 
-/** When a row's trigger rises: with the contact's alarm, or the first one of a run without contacts. */
-function triggerOf(trace, panel) {
+/** From when to when each alarm stands: until it is armed again; to the end where it never is or that is unknown. */
+function triggersOf(trace, panel) {
+  const spans = panel.alarms.map((time, i) => [time, panel.rearmed[i] ?? trace.end]);
   const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
-  if (seen) return seen.outcome === "detected" ? seen.alarm : null;
-  return panel.alarms.length ? panel.alarms[0] : null;
+  // The contact's own crossing may come while an earlier alarm still stands.
+  if (seen && seen.outcome === "detected" && !spans.some(([from, to]) => from <= seen.alarm && seen.alarm <= to))
+    spans.push([seen.alarm, trace.end]);
+  return spans;
 }
 
 /** Stretches of samples that could not be judged: first and last time, and the reason's number. */
@@ -225,7 +228,6 @@ function tracePlan(data, trace) {
   }
 
   function drawTrigger(chart, panel, detector, box) {
-    const rises = triggerOf(trace, panel);
     const group = tint(draw(chart.layer, "g"), detector);
     const height = box.to - box.from;
     for (const time of panel.alarms) {
@@ -234,9 +236,11 @@ function tracePlan(data, trace) {
         d: `M${chart.x(time).toFixed(1)} ${box.from}v${height}`,
       });
     }
-    if (rises === null) return;
-    const left = Math.max(chart.x(rises), margin.left);
-    draw(group, "rect", { class: "trigger", x: left, y: box.from, width: Math.max(chart.right - left, 0), height });
+    for (const [from, to] of triggersOf(trace, panel)) {
+      const left = Math.max(chart.x(from), margin.left);
+      const right = Math.min(chart.x(to), chart.right);
+      if (right > left) draw(group, "rect", { class: "trigger", x: left, y: box.from, width: right - left, height });
+    }
   }
 
   function drawOnsets(chart) {
@@ -383,7 +387,7 @@ function makeTraceLegend(host) {
   for (const words of [
     "coloured line: signal",
     "coloured upright line: alarm, dashed where it is false",
-    "shaded from an alarm on: trigger on",
+    "shaded from an alarm until it is armed again: trigger on",
   ])
     make(host, "span", {}, words);
 }
