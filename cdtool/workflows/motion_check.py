@@ -10,11 +10,23 @@ from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile
 from cdtool.motion import motion_class
 from cdtool.operations import operations_of
-from cdtool.recording import Finding, Recording, Series
+from cdtool.recording import Finding, FloatArray, Recording, Series
 
 # Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
 # one correlates with the other's more than the second, have their columns mixed up.
 _OWN_FIT, _OTHER_FIT = 0.9, 0.99
+# A joint that moves by less than this share of the one that moves most hardly moves: noise and offset of its speed, added
+# up, say nothing of units.
+_HARDLY = 0.01
+_PARTS, _ABOVE_NOISE = 50, 10.0
+_FACTORS = (
+    (180.0 / np.pi, "deg and rad"),
+    (1000.0, "mm and m, or ms and s"),
+    (60.0 / (2.0 * np.pi), "rpm and rad/s"),
+    (60.0, "min and s"),
+    (6.0, "rpm and deg/s"),
+    (2.0 * np.pi, "turns and rad"),
+)
 
 
 def motion_findings(recording: Recording) -> list[Finding]:
@@ -44,7 +56,11 @@ def _consistency(recording: Recording) -> list[Finding]:
         return []
     found = []
     speed, position = recording["speed"], recording["position"]
+    moved = [_moved(position.values[:, j]) for j in range(speed.joint_count)]
     for j in range(speed.joint_count):
+        if moved[j] <= _HARDLY * max(moved):
+            continue
+        of = f"of {recording.joints[j]}: " if len(recording.joints) > 1 else ""
         way = _travelled(speed, j)
         seen = float(np.nanmax(position.values[:, j]) - np.nanmin(position.values[:, j]))
         signed = (
@@ -55,10 +71,44 @@ def _consistency(recording: Recording) -> list[Finding]:
         if way[1] <= 0.0 or seen <= 0.0:
             continue
         if not 0.8 < way[1] / seen < 1.25:
-            found.append(Finding(f"integrates to {way[1]:.4g}, the position spans {seen:.4g}: check units", "speed"))
+            ratio = max(way[1] / seen, seen / way[1])
+            text = (
+                f"{of}integrates to {way[1]:.4g} {position.unit}, the position spans {seen:.4g} {position.unit} "
+                f"(a factor of {ratio:.4g}{_as_between(ratio)}): check the units of speed (read as {speed.unit}) "
+                f"and position (read as {position.unit})"
+            )
+            found.append(Finding(text, "speed"))
         elif abs(signed) > 0.5 * seen and np.sign(signed) != np.sign(way[0]):
-            found.append(Finding("has the opposite sign of the position's derivative", "speed"))
+            found.append(Finding(f"{of}has the opposite sign of the position's derivative", "speed"))
     return [*found, *_swapped(recording)]
+
+
+def _moved(values: FloatArray) -> float:
+    """How far a joint's position (n,) moves beyond its noise and its encoder's steps; 0 where it rests.
+
+    The medians of fifty parts of the log know neither noise nor single steps: their range counts where it is more than
+    ten times the noise of single samples and ten steps of the encoder.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 3:
+        return 0.0
+    steps = np.diff(known)
+    noise = 1.48 * float(np.median(np.abs(steps - np.median(steps)))) / np.sqrt(2.0)
+    changed = np.abs(steps[steps != 0.0])
+    # Rounding leaves traces far below a step of any encoder.
+    changed = changed[changed > 1e-9 * max(float(np.abs(known).max()), 1e-300)]
+    encoder = float(changed.min()) if len(changed) else 0.0
+    parts = [float(np.median(part)) for part in np.array_split(known, min(_PARTS, len(known)))]
+    span = max(parts) - min(parts)
+    return span if span > _ABOVE_NOISE * max(noise, encoder) else 0.0
+
+
+def _as_between(ratio: float) -> str:
+    """Which units differ by a factor."""
+    for factor, units in _FACTORS:
+        if abs(ratio / factor - 1.0) < 0.05:
+            return f", as between {units}"
+    return ""
 
 
 def _swapped(recording: Recording) -> list[Finding]:
