@@ -17,7 +17,7 @@ import numpy as np
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.formats.header_units import time_unit_findings, unit_findings
+from cdtool.formats.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
 from cdtool.formats.written_origin import with_written_origin
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
@@ -116,7 +116,8 @@ class _Assembly:
             rows = {len(column.values) for column in self.columns.values()}
             return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
         column = self._column("time", time.column)
-        self.findings += time_unit_findings(time, column)
+        self.findings += check_clock_unit(self.source.path, time, column, self.origin)
+        self.findings += time_unit_findings(time, column, self.origin)
         start = epoch_start(column.values, time.factor)
         if start:
             self.origin += start * time.factor

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import EPOCH
-from cdtool.recording import FloatArray
+from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
+from cdtool.recording import Finding, FloatArray
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,20 @@ class EpochClock:
         if self.missing:
             times[np.isin(raw, self.missing)] = np.nan
         return times
+
+
+def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding], channel: str) -> EpochClock:
+    """The clock; where its stamps cannot be times in the stated unit but count from 1970 in another one, that one's.
+
+    A warning with both readings is added to the findings.
+    """
+    stamp = float(clock.first) if clock.first is not None else 0.0
+    meant = contradicted_by_epoch(stamp, clock.factor)
+    if clock.base or not meant:
+        return clock
+    text = f"the file says {stated}, but {both_readings(stamp, clock.factor, stated, meant)}: taken to be {meant}"
+    findings.append(Finding(f"{text}; if that is wrong, name another clock in [channels] time", channel))
+    return EpochClock(clock.read, SECONDS[meant], missing=clock.missing)
 
 
 def common_origin(clocks: Iterable[EpochClock]) -> Fraction:

@@ -21,7 +21,7 @@ from cdtool.formats.container_checks import (
     library,
     one_line_errors,
 )
-from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.own_clocks import asked_keys
 from cdtool.formats.pieces import Pieces, joined
@@ -197,7 +197,8 @@ class _Tree:
             return _rows_of(dataset, None, start, end)
 
         base += Fraction(packing.offset) * Fraction(repr(factor))
-        return EpochClock(read, factor * packing.scale, base, packing.missing)
+        clock = EpochClock(read, factor * packing.scale, base, packing.missing)
+        return with_plausible_unit(clock, told, self.findings, path)
 
 
 def _rows_of(dataset: Any, place: int | None, start: int, end: int) -> Any:

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch, contradicted_by_steps
+from cdtool.errors import RecordingError
 from cdtool.formats.source import Column, Source, find_key, split_unit
 from cdtool.recording import Finding
 from cdtool.units import RAW_UNITS, Unit, find_unit
@@ -43,15 +48,54 @@ def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> lis
     return [Finding(_contradiction(item, stated, unit, found), item.channel) for unit, found in by_unit.items()]
 
 
-def time_unit_findings(time: TimeSource, column: Column) -> list[Finding]:
-    """The warning on a clock whose column has another unit than the machine file states, or is no time at all."""
+def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
+    """The warning on a clock whose steps no log has in the unit that the machine file states.
+
+    `origin` [s in that unit] has been taken off the stamps.
+    Raises RecordingError where its stamps cannot be times in that unit, and count from 1970 in another one.
+    """
+    if time.rate is not None:
+        return []
+    first = _first_stamp(time, column, origin)
+    stated, told = time.unit or "s", find_unit(column.unit) if column.unit else None
+    header = f", as its header says '{_shown(column)}'" if told == Unit("s", time.factor) else ""
+    meant = contradicted_by_epoch(first, time.factor)
+    if meant:
+        raise RecordingError(
+            f"{path}: the machine file states {stated} for the clock '{column.name}'{header}, but "
+            f"{both_readings(first, time.factor, stated, meant)}",
+            f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
+        )
+    likely, step = contradicted_by_steps(column.values, time.factor)
+    if not likely:
+        return []
+    rate = time.factor / (step * SECONDS[likely])
+    text = f"steps of {step:.3g} s in {stated}{header}; in {likely} they are {rate:.4g} Hz"
+    return [Finding(f'{text}: write unit = "{likely}" if that is the rate', "time")]
+
+
+def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
+    """The warning on a clock whose column has another unit than the machine file states, or is no time at all.
+
+    None where the stamps count from 1970 in the unit of the machine file: the header is wrong, and nothing is to do.
+    """
     told = find_unit(column.unit) if column.unit else None
+    if told is not None and told.si == "s":
+        meant = contradicted_by_epoch(_first_stamp(time, column, origin), told.factor)
+        if meant and math.isclose(SECONDS[meant], time.factor):
+            return []
     if told is None or told.si in _PLAIN or (told.si == "s" and math.isclose(told.factor, time.factor)):
         return []
     stated = f"counts samples at {time.rate:g} Hz" if time.rate else time.unit
     text = f"the header says '{_shown(column)}', the machine file {stated}"
     advice = f'write unit = "{column.unit}" if the header is right' if told.si == "s" else "is it another column?"
     return [Finding(f"{text}{_ratio(told, Unit('s', time.factor))}: {advice}", "time")]
+
+
+def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
+    """The first stamp as the file holds it, in the unit of the machine file; 0 where there is none."""
+    known = np.flatnonzero(np.isfinite(column.values))
+    return float(column.values[known[0]]) + origin / time.factor if len(known) else 0.0
 
 
 def _fits(told: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
-from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
 from cdtool.formats.groups import Group, Part, Parts, Written, stored
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.library_lines import collected_lines
@@ -185,7 +185,9 @@ class _Tree:
             if unit is None or unit.si != "s" or len(clock) < len(channel):
                 continue
             if clock.path not in self._clocks:
-                self._clocks[clock.path] = EpochClock(partial(_raw, clock), unit.factor)
+                made = EpochClock(partial(_raw, clock), unit.factor)
+                said = str(_unit(clock))
+                self._clocks[clock.path] = with_plausible_unit(made, said, self._findings, clock.name)
             return clock.path, self._clocks[clock.path]
         return None
 

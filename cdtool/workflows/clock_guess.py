@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
 from cdtool.formats.distribution import Distribution
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding, FloatArray
@@ -18,8 +19,6 @@ from cdtool.workflows.log_figures import ClockFigures, ColumnFigures
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # Median step -> unit: log rates of 2 Hz to 2 MHz in each of them.
 _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
-# A clock that counts from 1970 in one of these stands there between the years 2001 and 2100.
-_EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))
 # Days since 1899-12-30, as Excel counts them, of the years 2000 to 2100; a clock in seconds would step by more.
 _EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
 _DAY = 86400.0
@@ -111,8 +110,15 @@ def _described(
     column: Column, first_row: int, start: float, step: float, stamps: Callable[[], Iterable[FloatArray]]
 ) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
-    epoch = next((name for low, high, name in _EPOCHS if low <= start < high), "")
-    if known is not None and known.si == "s":
+    epoch = unit_since_1970(start)
+    wrong: tuple[Finding, ...] = ()
+    stated = known is not None and known.si == "s"
+    if known is not None and stated and contradicted_by_epoch(start, known.factor):
+        stated = False
+        readings = both_readings(start, known.factor, str(column.unit), epoch)
+        text = f"the header says {column.unit}, but {readings}: taken to be {epoch}; a machine file says it for sure"
+        wrong = (Finding(text, column.name),)
+    if stated:
         unit, why = str(column.unit), "its header says so"
     elif epoch:
         unit, why = epoch, f"from its start, {start:.0f} after 1970"
@@ -124,7 +130,7 @@ def _described(
     # An epoch is taken off before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
     text = f"taken to be the clock, in {unit} ({why}); a machine file says it for sure"
-    clock = TableClock(column.name, origin, factor, ClockFigures(), (Finding(text, column.name, "note"),))
+    clock = TableClock(column.name, origin, factor, ClockFigures(), (Finding(text, column.name, "note"), *wrong))
     return _checked(clock, first_row, stamps)
 
 

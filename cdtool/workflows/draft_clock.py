@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.clock.plausible_unit import contradicted_by_epoch
 from cdtool.formats.source import Column, Source
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
@@ -60,12 +61,15 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     unit = min(_UNITS, key=lambda name: abs(np.log(assumed / seconds(name))))
     clock = TableClock(found.column, step, assumed, unit, "", is_counter(found.column))
     stated = find_unit(column.unit) if column.unit else None
+    against = ""
+    if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):
+        against, stated = f", against its header, which says {column.unit}", None
     if stated is not None and stated.si == "s":
         return replace(clock, unit=str(column.unit), told="the header, which names the unit"), found
     if taken_off:
         # A table's reader makes seconds of days.
         days = assumed > 2.0 * seconds("min")
-        return replace(clock, unit="s" if days else unit, told=_since(values[0], days)), found
+        return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
         return replace(clock, unit=named, told="the unit in its name"), found

@@ -15,8 +15,7 @@ from cdtool.recording import Finding, FloatArray, Recording, Series
 # Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
 # one correlates with the other's more than the second, have their columns mixed up.
 _OWN_FIT, _OTHER_FIT = 0.9, 0.99
-# A joint that moves by less than this share of the one that moves most hardly moves: noise and offset of its speed, added
-# up, say nothing of units.
+# Below this share of the largest movement a joint hardly moves: noise and offset of its speed, added up, say nothing.
 _HARDLY = 0.01
 _PARTS, _ABOVE_NOISE = 50, 10.0
 _FACTORS = (

@@ -1,0 +1,137 @@
+"""A clock whose unit its own values contradict is refused or warned of with both readings; an honest one is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdtool.clock.plausible_unit import contradicted_by_epoch, contradicted_by_steps
+from cdtool.errors import RecordingError
+from cdtool.formats.reading import read_recording
+from cdtool.machine_file import read_machine_file
+from cdtool.workflows.information import info
+from tests.command import cdtool
+from tests.data_folder import data, needs_data
+
+MACHINE = """
+[machine]
+type = "linear_axis"
+name = "gate"
+coordinates = "load"
+load_mass = 620.0
+
+[channels]
+time = {{ column = "{column}", unit = "{unit}" }}
+position = {{ column = "x", unit = "m" }}
+"""
+EPOCHS = {"s": 1.6e9, "ms": 1.6e12, "us": 1.6e15}
+ONE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def log(folder: Path, header: str, stamps: np.ndarray, name: str = "log.csv") -> Path:
+    path = folder / name
+    rows = "".join(f"{stamp:.6f};{0.001 * k:.4f}\n" for k, stamp in enumerate(stamps))
+    path.write_text(f"{header};x\n{rows}")
+    return path
+
+
+def read(folder: Path, header: str, unit: str, stamps: np.ndarray):
+    path = folder / "machine.toml"
+    path.write_text(MACHINE.format(column=header, unit=unit))
+    return read_recording(log(folder, header, stamps), read_machine_file(path))
+
+
+@pytest.mark.parametrize(("meant", "stated"), [("ms", "s"), ("us", "s"), ("us", "ms")])
+def test_stamps_since_1970_that_cannot_be_in_the_stated_unit_are_refused_with_both_readings(tmp_path, meant, stated):
+    stamps = EPOCHS[meant] + np.arange(40) * 1e-3 / ONE[meant]
+    with pytest.raises(RecordingError) as fault:
+        read(tmp_path, f"Time [{stated}]", stated, stamps)
+    text = fault.value.message
+    assert "log.csv: the machine file states" in text and f"its header says 'Time [{stated}]'" in text
+    assert f"years in {stated}, and 2020-09-13 in {meant} since 1970" in text
+    assert fault.value.hint == f'write time = {{ column = "Time [{stated}]", unit = "{meant}" }} in [channels]'
+    assert "Traceback" not in text and "\n" not in text
+
+
+def test_where_the_machine_file_has_the_unit_that_fits_the_wrong_header_is_no_warning(tmp_path):
+    recording = read(tmp_path, "Time [sec]", "ms", 1.6e12 + np.arange(40.0))
+    assert recording.duration == pytest.approx(0.039)
+    assert not [str(item) for item in recording.findings if "header" in str(item)]
+
+
+def test_info_without_a_machine_file_reads_it_as_it_must_be_and_warns(tmp_path):
+    shown = info(log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0)))
+    assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(1000.0, rel=1e-3)] * len(shown.channels)
+    (warning,) = [str(item) for item in shown.findings if item.severity == "warning" and "header" in str(item)]
+    assert "the header says sec, but its first stamp 1600000000000 is 50,702 years in sec" in warning
+    assert "2020-09-13 in ms since 1970: taken to be ms" in warning
+
+
+def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
+    path = log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0))
+    done = cdtool("init", path, "-o", tmp_path / "drafted.toml")
+    text = (tmp_path / "drafted.toml").read_text()
+    assert 'unit = "ms"' in text and "against its header, which says sec" in text + done.out + done.err
+
+
+@pytest.mark.parametrize(("step", "unit", "likely"), [(1e3, "s", "us"), (1e6, "s", "ns"), (1.0, "ns", "ms")])
+def test_steps_that_no_log_has_are_a_warning_with_both_readings(tmp_path, step, unit, likely):
+    recording = read(tmp_path, f"t [{unit}]", unit, step * np.arange(40))
+    (text,) = [str(item) for item in recording.findings if "steps of" in str(item)]
+    rate = 1.0 / (step * ONE[likely])
+    assert f"steps of {step * ONE[unit]:.3g} s in {unit}" in text and f"in {likely} they are {rate:.4g} Hz" in text
+    assert f'write unit = "{likely}"' in text
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "unit"),
+    [
+        (0.0, 1.0, "s"),  # an honest log at 1 Hz
+        (0.0, 10.0, "s"),
+        (0.0, 1.0, "ms"),
+        (1.6e9, 0.001, "s"),
+        (1.6e9, 1.0, "ms"),  # 18 days since power-on
+        (1.6e12, 1000.0, "us"),  # the same
+        (1.6e15, 1e6, "ns"),
+        (3.85e9, 0.01, "s"),  # since 1904
+        (6.4e10, 0.01, "s"),  # since the year 0
+        (1.6e18, 1e6, "ns"),
+    ],
+)
+def test_an_honest_clock_is_neither_refused_nor_warned_of(first, step, unit):
+    stamps = first + step * np.arange(100)
+    assert contradicted_by_epoch(first, ONE[unit]) == ""
+    assert contradicted_by_steps(stamps, ONE[unit])[0] == ""
+
+
+def test_no_sample_log_is_warned_of():
+    for name in ("gate/stiff/01.csv", "arm/trial_1/free/01.csv"):
+        path = next(Path("sample_logs").glob(name.replace("01.csv", "*")))
+        shown = info(path)
+        assert not [item for item in shown.findings if "since 1970" in str(item) or "steps of" in item.message[:9]]
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_data(name)) for name in ("ur10e", "ur3e", "emps")])
+def test_no_real_recording_is_warned_of(name):
+    for path in [path for path in sorted(data(name).rglob("*")) if path.suffix in (".csv", ".mat")][:2]:
+        shown = info(path)
+        wrong = [str(item) for item in shown.findings if "the header says" in str(item) or "steps of" in str(item)]
+        assert not [text for text in wrong if "since 1970" in text or "if that is the rate" in text], path
+
+
+def test_a_containers_clock_that_its_attribute_contradicts_is_read_as_it_must_be_with_a_warning(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["drive/time"] = 1_600_000_000_000 + np.arange(50)
+        file["drive/time"].attrs["unit"] = "s"
+        file["drive/pos"] = 0.001 * np.arange(50)
+        file["drive/pos"].attrs["unit"] = "m"
+    machine = tmp_path / "machine.toml"
+    machine.write_text(MACHINE.format(column="time", unit="s").replace('"x"', '"drive/pos"'))
+    recording = read_recording(path, read_machine_file(machine))
+    assert recording.duration == pytest.approx(0.049)
+    (text,) = [str(item) for item in recording.findings if "since 1970" in str(item)]
+    assert "the file says s, but its first stamp 1600000000000 is 50,702 years in s, and 2020-09-13 in ms" in text
