@@ -118,7 +118,7 @@ def _column(
             for alarm in item.verdict.alarms:
                 if alarm.joint == joint:
                     draw_alarm(axes, alarm, colour, legend)
-    draw_trigger(rows[len(joints)], parts, colour)
+    draw_trigger(rows[len(joints)], parts, colour, legend)
     if len(rows) > len(joints) + 1:
         force = found.recording["force"]
         draw_force(rows[-1], force.time, force.values[:, 0], span, contact=bool(matches))

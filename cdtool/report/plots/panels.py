@@ -45,6 +45,10 @@ class Legend:
             "onset": Line2D([], [], color=FORCE, linestyle=ONSET_DASHES, linewidth=1.0, label="contact onset"),
             "alarm": Line2D([], [], color=colour, linewidth=2.2, label="alarm"),
             "trigger": Patch(facecolor=colour, alpha=0.25, edgecolor="none", label="trigger on"),
+            "raised": Line2D([], [], color=colour, marker="^", markersize=5, linestyle="none", label="trigger raised"),
+            "rearmed": Line2D(
+                [], [], color=colour, marker="v", markerfacecolor="white", linestyle="none", label="armed again"
+            ),
         }
         for code, reason in REASONS.items():
             known[reason] = Patch(
@@ -98,7 +102,7 @@ def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, c
         axes.plot(*decimate(time[part], force[part], _PIXELS), color=FORCE, linewidth=0.9)
 
 
-def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str) -> None:
+def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legend: Legend) -> None:
     """1 while the alarm of any joint stands: from its raising until it is armed again; 0 otherwise.
 
     A filled mark at each raising, an open one at each re-arming. Nothing where a detector could judge nothing.
@@ -116,6 +120,9 @@ def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str) -> No
         steps += [(end, steps[-1][1])]
         axes.plot(*zip(*steps, strict=True), color=colour, linewidth=1.6)
         raised, armed = [start for start, _ in held], [release for _, release in held if release < end]
+        for kind, times in (("raised", raised), ("rearmed", armed)):
+            if times:
+                legend.add(kind)
         axes.plot(raised, [1.0] * len(raised), "^", color=colour, markersize=5, linestyle="none")
         axes.plot(armed, [0.0] * len(armed), "v", color=colour, markerfacecolor="white", markersize=5, linestyle="none")
     axes.set_ylim(-0.35, 1.35)
