@@ -18,6 +18,8 @@ from cdtool.recording import BoolArray, FloatArray
 
 # Without a number of samples, an alarm needs this long outside the band [s]: 9 samples at 1 kHz.
 DEBOUNCE_TIME = 9e-3
+# Samples that are looked at first for when an alarm is armed again.
+_LOOKED_AT = 4096
 
 
 class ActivationSettings(TypedDict, total=False):
@@ -140,8 +142,18 @@ class Activation:
         return tuple(again)
 
     def _calm_again(self, statistic: Signal, band: Band, alarm: Alarm, inner: Band | None) -> float:
-        joint, first = alarm.joint, int(np.searchsorted(statistic.time, alarm.time))
-        known = first + np.flatnonzero(statistic.status[first:, joint] != Status.GAP)
+        """When the value had been inside for long enough after an alarm [s]; most are calm again soon."""
+        first, count, length = int(np.searchsorted(statistic.time, alarm.time)), len(statistic.time), _LOOKED_AT
+        while math.isfinite(self.wait):
+            rows = slice(first, min(first + length, count))
+            at = self._calm_within(statistic, band, alarm.joint, inner, rows)
+            if math.isfinite(at) or rows.stop == count:
+                return at
+            length *= 4
+        return math.inf
+
+    def _calm_within(self, statistic: Signal, band: Band, joint: int, inner: Band | None, rows: slice) -> float:
+        known = rows.start + np.flatnonzero(statistic.status[rows, joint] != Status.GAP)
         value, time = statistic.values[known, joint], statistic.time[known]
         outside = (value > band.upper[known, joint]) | (value < band.lower[known, joint])
         if inner is not None:

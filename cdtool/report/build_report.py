@@ -26,7 +26,7 @@ _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
     "Two figures are old / new. Contacts: the same ones in both, unless two numbers stand there. Latency and force are "
     "means, in pairs of the contacts that both detected. *No change shown* is not *no change*: the change in brackets "
-    "would have been shown with 80 % power."
+    "would have been shown with 80 % power. A change has an interval from ten recordings or campaigns on."
 )
 
 
