@@ -25,6 +25,7 @@ HATCHES = {
     Status.NOT_APPLICABLE: "xxxx",
     Status.GAP: "....",
     Status.NO_LIMIT: "\\\\\\\\",
+    Status.OTHER_SPEED: "||||",
 }
 
 

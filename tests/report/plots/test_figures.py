@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from importlib.resources import files
 from math import nan
 
 import matplotlib
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 
 from cdtool.activation import Activation
-from cdtool.detection import Signal, Status, Verdict
+from cdtool.detection import REASONS, Signal, Status, Verdict
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.traces.file import _trace as trace_from
 from cdtool.evaluation.traces.file import as_read, trace_values
@@ -23,7 +25,7 @@ from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
 from cdtool.report.plots.detection_plot import plot_detected
 from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
 from cdtool.report.plots.latency_plot import plot_latencies
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import HATCHES, look_of
 from cdtool.report.plots.trigger_plot import plot_triggers
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.detection import Detected
@@ -337,3 +339,11 @@ def test_traces_of_earlier_versions_have_no_times_of_rearming_and_are_still_read
     for panel in values["panels"]:
         del panel["rearmed"]
     assert trace_from(values).panels[0].rearmed == ()
+
+
+def test_every_reason_not_to_judge_has_a_hatch_and_a_name_in_the_page():
+    assert set(HATCHES) == set(REASONS)
+    assert len(set(HATCHES.values())) == len(HATCHES)
+    script = (files("cdtool.report.html") / "page_files" / "trace.js").read_text(encoding="utf-8")
+    named = dict(re.findall(r'(\d): "([a-z -]+)"', script.split("const REASONS = {")[1].split("}")[0]))
+    assert named == {str(int(code)): text for code, text in REASONS.items()}
