@@ -51,7 +51,8 @@ def whys(found: Detected, capsys: pytest.CaptureFixture[str]) -> list[str]:
 def test_the_second_joints_alarm_in_a_contact_is_of_that_contact(capsys):
     found = detected([(0, 5.05, 5.3), (1, 5.15, 5.35)])
     first, second = whys(found, capsys)
-    assert first.split()[-3:] == ["60", "40", "56"]
+    signal, limit, latency = first.split()[-3:]
+    assert (signal, limit) == ("60", "40") and 50 < float(latency) < 65
     assert second.endswith("same contact, also elbow")
     (row,) = as_rows([(None, found)], {})
     assert [item["contact_onset_s"] for item in row["alarms"]] == [pytest.approx(ONSET)] * 2
