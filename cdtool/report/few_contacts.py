@@ -17,7 +17,7 @@ LatencyColumn = Literal["mean", "std", "median", "range", "P95"]
 
 EXPLAINED: Final = (
     f"Fewer than {FEWEST} contacts detected: median and range, no mean, std or P95. The 95 % interval of the mean of "
-    "four contacts holds the true mean in 83 to 88 of 100 tests, in 48 where 15 % of the contacts are slow. The median "
+    "four contacts holds the true mean in about 80 of 100 tests, in 47 where 15 % of the contacts are slow. The median "
     "has an interval from 6 contacts on (docs/statistics.md)."
 )
 GROUPED: Final = (

@@ -1,7 +1,7 @@
 """Which intervals few contacts allow: none of a mean below ten recordings, an exact one of the median from six on.
 
-Conventions: the 95 % bootstrap interval of a mean holds the true mean in 83 to 88 of 100 tests with four contacts, and
-in 48 where 15 % of the contacts are slow: none of the four is slow in half of the tests (docs/statistics.md). An
+Conventions: the 95 % bootstrap interval of a mean holds the true mean in about 80 of 100 tests with four contacts, and
+in 47 where 15 % of the contacts are slow: none of the four is slow in half of the tests (docs/statistics.md). An
 interval that does not hold what it says is not given. The interval between two order statistics of the median holds for
 any distribution.
 """
