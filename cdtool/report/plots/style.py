@@ -26,6 +26,7 @@ HATCHES = {
     Status.GAP: "....",
     Status.NO_LIMIT: "\\\\\\\\",
     Status.OTHER_SPEED: "||||",
+    Status.OTHER_RATE: "----",
 }
 
 

@@ -134,14 +134,9 @@ def _triggers(trace: Trace, row: Panel, span: Span) -> list[Span]:
     held = trigger_spans(row.alarms, row.rearmed, trace.end)
     seen = _seen(trace, row)
     if seen and seen.outcome == "detected" and seen.alarm not in row.alarms:
-        end = next((end for start, end in held if start <= seen.alarm <= end), trace.end)
-        held = sorted(
-            [
-                *((start, min(end, seen.alarm)) for start, end in held if start <= seen.alarm <= end),
-                *((start, end) for start, end in held if not start <= seen.alarm <= end),
-                (seen.alarm, end),
-            ]
-        )
+        stands = next(((start, end) for start, end in held if start <= seen.alarm <= end), (seen.alarm, trace.end))
+        cut = [(start, seen.alarm) if (start, end) == stands else (start, end) for start, end in held]
+        held = [*cut, (seen.alarm, stands[1])]
     return [(start, min(end, span[1])) for start, end in held if start <= span[1] and end >= span[0]]
 
 

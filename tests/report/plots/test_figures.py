@@ -20,7 +20,7 @@ from cdtool.evaluation.traces.trace import Seen, Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, judge
-from cdtool.recording import Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
 from cdtool.report.plots.detection_plot import plot_detected
 from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
@@ -347,3 +347,14 @@ def test_every_reason_not_to_judge_has_a_hatch_and_a_name_in_the_page():
     script = (files("cdtool.report.html") / "page_files" / "trace.js").read_text(encoding="utf-8")
     named = dict(re.findall(r'(\d): "([a-z -]+)"', script.split("const REASONS = {")[1].split("}")[0]))
     assert named == {str(int(code)): text for code, text in REASONS.items()}
+
+
+def test_a_contact_that_is_detected_while_an_alarm_still_stands_begins_a_piece_of_its_own(five_alarms):
+    (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
+    trace = make_trace("stiff", detection.operation, (), (detection,), (matching,))
+    first, again = detection.verdict.alarms[0].time, detection.verdict.rearmed[0]
+    hit = Contact(first + 0.2, first + 0.3, 100.0)
+    panel = replace(trace.panels[0], seen=(Seen("detected", 0.1, first + 0.3),))
+    trace = replace(trace, contacts=(hit,), contact=0, panels=(panel,), view=(first - 0.1, first + 2.0))
+    spans = trigger_plot._triggers(trace, panel, trace.view)
+    assert np.ravel(sorted(spans)[:2]) == pytest.approx([first, first + 0.3, first + 0.3, again])
