@@ -347,6 +347,8 @@ def test_every_reason_not_to_judge_has_a_hatch_and_a_name_in_the_page():
     script = (files("cdtool.report.html") / "page_files" / "trace.js").read_text(encoding="utf-8")
     named = dict(re.findall(r'(\d): "([a-z -]+)"', script.split("const REASONS = {")[1].split("}")[0]))
     assert named == {str(int(code)): text for code, text in REASONS.items()}
+    drawn = dict(re.findall(r'(\d): "(M[^"]+)"', script.split("const HATCHES = {")[1].split("}")[0]))
+    assert set(drawn) == set(named) and len(set(drawn.values())) == len(drawn)
 
 
 def test_a_contact_that_is_detected_while_an_alarm_still_stands_begins_a_piece_of_its_own(five_alarms):

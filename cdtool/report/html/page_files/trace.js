@@ -3,12 +3,21 @@
 const HEAD = 26,
   GAP = 10;
 const HEADROOM = 1.5;
-const REASONS = { 1: "start-up", 2: "not applicable", 3: "missing samples", 4: "no limit known here", 5: "other speed", 6: "other sample rate" };
+const REASONS = {
+  1: "start-up",
+  2: "not applicable",
+  3: "missing samples",
+  4: "no limit known here",
+  5: "other speed",
+  6: "other sample rate",
+};
 const HATCHES = {
   1: "M0 8L8 0",
   2: "M0 8L8 0M0 0L8 8",
   3: "M1 2h2M5 6h2",
   4: "M0 0L8 8",
+  5: "M4 0V8",
+  6: "M0 4H8",
 };
 const LONGEST_LABEL = 40;
 
