@@ -90,9 +90,22 @@ def test_json_holds_every_question_and_is_strict(written, tmp_path):
     assert values["verdict"] == "worse" and values["asked"] == 4
     (row,) = [item for item in values["rows"] if item["detector"] == "momentum"]
     by_figure = {item["figure"]: item for item in row["questions"]}
-    assert by_figure["latency_ms"]["change"] == {"value": 5.0, "low": 5.0, "high": 5.0, "level": 0.95}
+    exact = {"value": 5.0, "low": 5.0, "high": 5.0, "level": 0.95, "reason": ""}
+    assert by_figure["latency_ms"]["change"] == exact
     assert by_figure["missed"]["p"] is None and by_figure["missed"]["outcome"] == "not asked"
     assert set(by_figure) == {"latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n"}
+
+
+def test_a_change_of_few_recordings_has_no_interval_in_json_and_says_why(written):
+    few = {("momentum", "stiff"): LATENCIES[:8]}
+    slower = {("momentum", "stiff"): [x + 5.0 for x in LATENCIES[:8]]}
+    old, new = written("old.json", build(few)), written("new.json", build(slower))
+    done = cdtool("compare", old, new, "--json")
+    (row,) = json.loads(done.out)["rows"]
+    change = next(item["change"] for item in row["questions"] if item["figure"] == "latency_ms")
+    assert (change["value"], change["low"], change["high"]) == (5.0, None, None)
+    assert change["reason"] == "an interval needs 10 recordings or campaigns; there are 8"
+    assert "slower by 5.0 ms" in row["words"] and "(5.0 to" not in row["words"]
 
 
 def test_markdown_has_a_row_a_detector_and_group_with_its_words(written, tmp_path):
