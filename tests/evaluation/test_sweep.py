@@ -66,7 +66,7 @@ def test_above_the_critical_factor_there_is_no_alarm_and_below_it_there_is_one(s
 
 
 def test_too_short_a_run_of_judged_samples_has_no_critical_factor():
-    blind = replace(detection(0), threshold=None)
+    blind = replace(detection(0), threshold=None, judgement=None)
     assert critical_factor(blind, ACTIVATION) == -np.inf
 
 
@@ -139,7 +139,11 @@ def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
 
 def test_limits_without_spread_cannot_be_set():
     stuck = FittedLimit((0.0,), (0.0,), (0.0,), (0.0,), safety_factor=3.0)
-    runs = [replace(detection(seed), threshold=stuck) for seed in range(4)]
+    runs = []
+    for seed in range(4):
+        found = detection(seed)
+        assert found.judgement is not None
+        runs.append(replace(found, judgement=replace(found.judgement, thresholds=(stuck,))))
     with pytest.raises(UsageError, match="no spread"):
         set_factor(Budget(0.5, "operation"), "d", runs, ACTIVATION)
 
