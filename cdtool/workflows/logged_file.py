@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -49,13 +49,15 @@ class LoggedChannel:
         self._known = np.zeros(self.joints, np.int64)
         self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
 
-    def add(self, stamps: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values."""
-        keep = self.clean.keep(stamps, stamps)
-        time = stamps[keep]
+    def add(self, stamps: FloatArray, values: FloatArray | None, final: bool = False) -> tuple[FloatArray, FloatArray]:
+        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values.
+
+        The last ones wait for those that follow, or for `final`.
+        """
         table = np.full((len(stamps), self.joints), np.nan) if values is None else values.reshape(len(stamps), -1)
         check_width(self._path, self.item, table.shape[1])
-        rows, infinite, saturated = in_si(self.item, table[keep])
+        time, table = self.clean.rows(stamps, stamps, table, final)
+        rows, infinite, saturated = in_si(self.item, table)
         self._infinite, self._saturated = self._infinite + infinite, self._saturated + saturated
         present = np.isfinite(rows)
         self._missing += rows.size - int(np.count_nonzero(present))
@@ -162,31 +164,33 @@ class LoggedFile:
             for name, channel in self.channels.items()
             if name in names
         }
-        for piece in self._in_order():
-            for channel, time, rows in _added(again, piece):
-                if len(time):
-                    name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
-                    yield Piece(name, time + shift, {name: values}, len(time))
+        for channel, time, rows in _added(again, self._in_order()):
+            if len(time):
+                name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
+                yield Piece(name, time + shift, {name: values}, len(time))
         self.channels |= again
 
     def _survey(self) -> tuple[Source, Lateness]:
         """The figures, as if all were in order."""
         lateness, orders = Lateness(), dict[str, Lateness]()
         run = Run(self._log.pieces())
-        for piece in run:
-            if piece.time is not None:
-                lateness.add(piece.time)
-                orders.setdefault(piece.clock, Lateness()).add(piece.time)
-            for _ in _added(self.channels, piece):
-                pass
+
+        def looked_at() -> Iterator[Piece]:
+            for piece in run:
+                if piece.time is not None:
+                    lateness.add(piece.time)
+                    orders.setdefault(piece.clock, Lateness()).add(piece.time)
+                yield piece
+
+        for _ in _added(self.channels, looked_at()):
+            pass
         self._is_sorted = all(order.late == 0.0 for order in orders.values())
         return run.source, lateness
 
     def _survey_in_order(self) -> None:
         self.channels = self._new()
-        for piece in self._in_order():
-            for _ in _added(self.channels, piece):
-                pass
+        for _ in _added(self.channels, self._in_order()):
+            pass
 
     def _new(self) -> dict[str, LoggedChannel]:
         return {item.channel: LoggedChannel(self.path, item) for item in self._items}
@@ -202,9 +206,12 @@ class LoggedFile:
 
 
 def _added(
-    channels: Mapping[str, LoggedChannel], piece: Piece
+    channels: Mapping[str, LoggedChannel], pieces: Iterable[Piece]
 ) -> Iterator[tuple[LoggedChannel, FloatArray, FloatArray]]:
-    """The channels that a field's piece is one of, with their times and values in it."""
+    """The channels that each field's pieces are one of, with their times and values; at the end what still waits."""
+    for piece in pieces:
+        for channel in channels.values():
+            if channel.item.described == piece.clock and piece.time is not None:
+                yield channel, *channel.add(piece.time, piece.values.get(piece.clock))
     for channel in channels.values():
-        if channel.item.described == piece.clock and piece.time is not None:
-            yield channel, *channel.add(piece.time, piece.values.get(piece.clock))
+        yield channel, *channel.add(np.empty(0), np.empty((0, channel.joints)), final=True)

@@ -75,7 +75,7 @@ def test_rows_above_a_second_header_of_another_width_are_refused_with_their_line
 
 def test_a_thousand_rows_of_24_columns_below_which_another_table_follows_are_refused(tmp_path):
     path = log(tmp_path, ",".join("abcdefghijklmnopqrstuvwx") + "\n" + rows(700, 24) + "t,a\n" + rows(4000, 2))
-    with pytest.raises(RecordingError, match="hold numbers|has 2 cells"):
+    with pytest.raises(RecordingError, match=r"hold numbers|has 2 cells"):
         Csv().columns(path)
 
 
