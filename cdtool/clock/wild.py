@@ -5,6 +5,8 @@ Which they are is decided by what comes before and by the next 100 rows at most,
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from cdtool.recording import BoolArray, FloatArray
@@ -107,4 +109,4 @@ def _trailing_wild(stamps: FloatArray) -> int:
 def _usual_step(stamps: list[float]) -> float:
     """The shortest step ahead among the last stamps, 0 where there is none."""
     last = stamps[-_STEPS_BEFORE - 1 :]
-    return min((b - a for a, b in zip(last[:-1], last[1:], strict=True) if b > a), default=0.0)
+    return min((b - a for a, b in pairwise(last) if b > a), default=0.0)
