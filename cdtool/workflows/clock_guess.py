@@ -61,6 +61,11 @@ class TableClock:
         yield clean.times(np.empty(0), np.empty(0), final=True)
 
 
+def is_clock_name(name: str) -> bool:
+    """True for a column that is called as clocks are."""
+    return _NAMES.match(name) is not None
+
+
 def guess_clock(source: Source) -> GuessedClock | None:
     """The clock of a table that is in memory; None where no column looks like one."""
     figures: dict[str, ColumnFigures] = {}
