@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from cdtool.clock import clean_time, epoch_start
 from cdtool.clock.wild import EPOCH
 from cdtool.errors import RecordingError
 from cdtool.workflows.clean_pieces import CleanPieces
+from cdtool.workflows.detection import detect
 from cdtool.workflows.information import info
 
 COUNT = 6106
@@ -117,3 +120,22 @@ def test_a_survey_shows_the_log_as_long_as_it_is(tmp_path, row, wild, start):
         assert f"lie far off those around them (line {row + 2})" in told
         assert duration == pytest.approx(59.99, abs=0.03)
     assert shown.channels[0].rate_hz == pytest.approx(100.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("row", [1, 2, 700])
+def test_one_wild_stamp_changes_no_verdict(tmp_path, row):
+    """Of 6,106 rows 6,104 were dropped, and "no alarm" was said of the two that were left."""
+    gate = Path(__file__).parents[1] / "sample_logs" / "gate"
+    lines = (gate / "stiff" / "03.csv").read_text().splitlines()
+    lines[row] = ",".join(["4294967295", *lines[row].split(",")[1:]])
+    log = tmp_path / "03.csv"
+    log.write_text("\n".join(lines) + "\n")
+    whole, wild = (
+        detect(path, gate / "machine.toml", detector="momentum", limit=[300.0])
+        for path in (gate / "stiff" / "03.csv", log)
+    )
+    assert [alarm.time for item in whole.detections for alarm in item.verdict.alarms]
+    assert [item.verdict.outcome for item in wild.detections] == ["alarm"]
+    times = [[alarm.time for item in found.detections for alarm in item.verdict.alarms] for found in (whole, wild)]
+    assert times[1] == pytest.approx(times[0], abs=0.002)
+    assert any("lie far off those around them" in str(item) for item in wild.recording.findings)
