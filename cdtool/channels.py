@@ -32,7 +32,10 @@ class Duty:
 
 @dataclass(frozen=True)
 class ChannelSource:
-    """Where one channel comes from, and how its numbers become SI: value * factor [unit]; `stated`: the log's unit."""
+    """Where one channel comes from, and how its numbers become SI: value * factor [unit]; `stated`: the log's unit.
+
+    In the log's unit: at the ends of `valid_range` the sensor saturates, below `least` and above `most` it gives none.
+    """
 
     channel: str
     columns: tuple[str | int, ...] = ()
@@ -43,6 +46,8 @@ class ChannelSource:
     stated: str = ""
     time_offset: float = 0.0
     valid_range: tuple[float, float] | None = None
+    least: float = -math.inf
+    most: float = math.inf
     duty: Duty | None = None
 
     @property
@@ -171,6 +176,7 @@ def _source(
     kind = table.choice("kind", ("measured", "duty"), "measured")
     duty = _duty(table, channel) if kind == "duty" else None
     stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
+    least, most = _possible_range(table)
     source = ChannelSource(
         channel=channel,
         columns=columns,
@@ -181,6 +187,8 @@ def _source(
         stated=stated,
         time_offset=table.number("time_offset", 0.0),
         valid_range=_valid_range(table),
+        least=least,
+        most=most,
         duty=duty,
     )
     table.finish()
@@ -240,6 +248,14 @@ def _valid_range(table: Table) -> tuple[float, float] | None:
         if math.isfinite(low) and math.isfinite(high) and low < high:
             return low, high
     raise table.fault("saturation", f"is {value!r}", "[lowest, highest] reading of the sensor, in the log's unit")
+
+
+def _possible_range(table: Table) -> tuple[float, float]:
+    least = table.number("min") if "min" in table else -math.inf
+    most = table.number("max") if "max" in table else math.inf
+    if least >= most:
+        raise table.fault("min", f"is {least:g}, max is {most:g}", "the least and the most that the sensor can give")
+    return least, most
 
 
 def _column(table: Table, value: object, key: str) -> str | int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -37,6 +37,11 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.channel}: {self.message}" if self.channel else self.message
+
+
+def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Losses, then warnings, then notes, each in the order that they are in."""
+    return tuple(sorted(findings, key=lambda item: ("loss", "warning", "note").index(item.severity)))
 
 
 @dataclass(frozen=True)

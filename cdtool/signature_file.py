@@ -11,6 +11,7 @@ from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint
 from cdtool.plain_text import counted, digits
+from cdtool.plausible import PlausibleRanges
 from cdtool.thresholds.base import FittedThreshold
 
 
@@ -50,7 +51,7 @@ class SignatureFile:
 
     `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
     first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
-    `operations`: how the logs were cut.
+    `operations`: how the logs were cut. `plausible`: what values the runs' channels had; None in older files.
     """
 
     machine: str
@@ -67,6 +68,7 @@ class SignatureFile:
     runs: tuple[LearnedRun, ...]
     operations: str = "whole"
     source: str = ""
+    plausible: PlausibleRanges | None = None
 
     @property
     def threshold(self) -> str:

@@ -15,12 +15,15 @@ from cdtool.activation import Activation
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
 from cdtool.operations import HOW_TO_CUT
+from cdtool.plausible import PlausibleRanges
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
+# Version 3 is without plausible ranges.
+_READ = (3, SCHEMA_VERSION)
 _KIND = "cdtool signature"
 # Every signature file begins with it: `_to_json` names its kind first.
 MARK = f'"kind": "{_KIND}"'.encode()
@@ -70,7 +73,7 @@ def read_signature(path: str | Path) -> SignatureFile:
         ) from fault
     if not isinstance(values, dict) or values.get("kind") != _KIND:
         raise SignatureError(f"{file}: not a signature file", "make one with cdtool learn-signature")
-    if values.get("schema_version") != SCHEMA_VERSION:
+    if values.get("schema_version") not in _READ:
         raise SignatureError(
             f"{file}: schema_version is {values.get('schema_version')}, this cdtool knows {SCHEMA_VERSION}",
             "learn it again with this version",
@@ -114,6 +117,7 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "safety_factor_set": asdict(signature.origin),
         "activation": asdict(signature.activation),
         "operations": signature.operations,
+        "plausible": signature.plausible.to_dict() if signature.plausible is not None else None,
         "runs": [asdict(run) for run in signature.runs],
         "current": [fitted_to_dict(signature.rule, item) for item in signature.current],
         "first": [fitted_to_dict(signature.rule, item) for item in signature.first],
@@ -140,6 +144,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
         operations=known("operations", values["operations"], HOW_TO_CUT),
         source=source,
+        plausible=PlausibleRanges.from_dict(values["plausible"]) if values.get("plausible") else None,
     )
 
 

@@ -33,6 +33,7 @@ def test_a_clock_in_pieces_is_cleaned_as_the_whole_one_is(stamps, parts, first_r
     pieces = np.array_split(stamps, parts)
     clean = CleanPieces()
     times = [clean.times(piece, piece) for piece in pieces]
+    times.append(clean.times(np.empty(0), np.empty(0), final=True))
     whole = clean_time(stamps, first_row, "line" if first_row else "sample")
     assert np.array_equal(np.concatenate(times), whole.time)
     assert tuple(clean.findings(first_row)) == whole.findings

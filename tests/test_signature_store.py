@@ -51,7 +51,7 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     assert (loaded.rule, loaded.origin, loaded.activation) == (learned.rule, learned.origin, learned.activation)
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
-    assert values["schema_version"] == 3 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+    assert values["schema_version"] == 4 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
 
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.errors import CdtoolError, ExitStatus
+from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
@@ -38,11 +39,12 @@ def print_json(value: Any) -> None:
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
-    """On stderr what was left out and why, what is damaged, then warnings and notes; long lists are cut and counted."""
+    """On stderr what was left out and why, what is damaged, then warnings and notes, what is alike once."""
     left_out, damaged = _apart(skipped)
-    for items, word in ((left_out, "left out"), (damaged, "damaged"), (findings, "warning"), (notes, "note")):
+    for every, word in ((left_out, "left out"), (damaged, "damaged"), (findings, "warning"), (notes, "note")):
+        items = alike([Skipped(item.recording, _without_name(item)) for item in every])
         for item in items[:_SHOWN]:
-            reason = _without_name(item).removeprefix("damaged, ")
+            reason = item.reason.removeprefix("damaged, ")
             typer.echo(f"{word}: {plain(item.recording)}: {plain(reason)}", err=True)
         if len(items) > _SHOWN:
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)

@@ -48,6 +48,8 @@ def info(
 
 
 def _show(item: Info) -> None:
+    from cdtool.evaluation.alike import grouped
+
     details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
     typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
     columns = [("channel", "left"), ("unit", "left")]
@@ -68,8 +70,10 @@ def _show(item: Info) -> None:
     ]
     table(columns, rows)
     typer.echo()
-    for finding in item.findings:
-        typer.echo(f"{finding.severity}: {plain(finding)}")
+    for severity in ("loss", "warning", "note"):
+        told = [(finding.channel, finding.message) for finding in item.findings if finding.severity == severity]
+        for name, text in grouped(told):
+            typer.echo(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
     if not item.findings:
         typer.echo("nothing odd found")
     if item.dialect:

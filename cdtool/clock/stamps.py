@@ -9,19 +9,20 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock.coarse import line_through
+from cdtool.clock.wild import EPOCH, WildStamps, leading_wild
 from cdtool.errors import RecordingError
 from cdtool.recording import BoolArray, Finding, FloatArray, Series
 
 # A pause of more than this many periods between samples is a gap.
 GAP_PERIODS = 2.5
-# A clock that starts later than this [s] counts from an epoch (3 years): it is shifted to start at 0.
-EPOCH = 1e8
 # Above this share of repeated stamps the clock is coarse, not faulty.
 _COARSE_SHARE = 0.2
 # Stamps that are dropped are a loss above this share, and where so many in succession run backward: the clock restarts.
 _STRAY_SHARE, _RESTART_ROWS = 0.01, 3
 # Counters are this wide, in bits, where they wrap within a log.
 _COUNTERS = (16, 32)
+# What is told of wild stamps.
+FAR_OFF = "lie far off those around them"
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def clean_time(
     counted: npt.ArrayLike | None = None,
     sampled: bool = True,
 ) -> CleanTime:
-    """Drop stamps [s] that are missing, repeated or run backward; regularise a clock that is coarser than the samples.
+    """Drop stamps [s] that are missing, wild (wild.py), repeated or run backward; regularise a coarse clock.
 
     `first_row` is the number of the first sample in the file, for messages; `counted` (n,) are the stamps as the file
     has them, in which a counter's wrap shows. A coarse clock (more than 20 % repeated stamps) is replaced by the
@@ -56,6 +57,9 @@ def clean_time(
     index = np.flatnonzero(finite)
     if len(index) == 0:
         return CleanTime(np.empty(0), finite, tuple(told.findings))
+    wild = WildStamps().add(stamps[index], final=True)
+    told.dropped(index[wild], FAR_OFF)
+    index = index[~wild]
     kept = stamps[index]
     highest = np.maximum.accumulate(kept)
     repeated = np.zeros(len(kept), dtype=bool)
@@ -89,12 +93,13 @@ def clean_time(
 
 
 def epoch_start(stamps: FloatArray, factor: float) -> float:
-    """The first stamp, in its own unit, where the clock counts from an epoch, else 0; `factor` leads to seconds.
+    """The first stamp, in its own unit, where the clock counts from an epoch (3 years or more), else 0.
 
-    To be taken off before scaling, so that no digit is lost.
+    `factor` leads to seconds. To be taken off before scaling, so that no digit is lost; a wild stamp is not the first.
     """
     finite = stamps[np.isfinite(stamps)]
-    return float(finite[0]) if len(finite) and finite[0] * factor > EPOCH else 0.0
+    first = finite[leading_wild(finite, EPOCH / factor) :][:1]
+    return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0
 
 
 def gap_findings(series: Series, channel: str) -> list[Finding]:

@@ -1,18 +1,19 @@
 """A file's columns -> channels in SI: the same for every format.
 
-Times are cleaned (clock.clean_time), values scaled, saturated and infinite ones masked; what was odd is told, all at
-once. Nothing is resampled.
+Times are cleaned (clock.clean_time), values scaled; saturated and infinite ones and those that no sensor gives are
+masked; what was odd is told, all at once. Nothing is resampled.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
@@ -20,13 +21,10 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
 from cdtool.formats.written_origin import with_written_origin
+from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
 
-
-def assemble(source: Source, channels: ChannelMap, machine: Any) -> Recording:
-    """A file's recording, referred to the load side; raises RecordingError or ConfigurationError."""
-    recording: Recording = machine.referred_to_load(as_logged(source, channels, machine), channels.speed_low_pass)
-    return recording
+Counts = npt.NDArray[np.int64]
 
 
 def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
@@ -57,7 +55,7 @@ def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
         findings=(
             *source.findings,
             *work.findings,
-            *stuck_findings({name: _constant(series[name]) for name in MEASURED if name in series}),
+            *stuck_findings({name: _constant(series[name]) for name in MEASURED if name in series}, channels.joints),
             *apart_findings({name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}),
         ),
         digest=file_digest(source.path),
@@ -163,8 +161,8 @@ class _Assembly:
         return table if keep.all() else table[keep]
 
     def _scaled(self, item: ChannelSource, values: FloatArray) -> FloatArray:
-        scaled, infinite, saturated = in_si(item, values)
-        self.findings += masked_findings(item, infinite, saturated)
+        scaled, masked = in_si(item, values)
+        self.findings += masked.findings(item, self.channels.joints)
         return scaled
 
 
@@ -178,22 +176,55 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
         )
 
 
-def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, int, int]:
-    """(n, J) values of a channel in its SI unit; how many of them are infinite, and at the sensor's limit: NaN now."""
+@dataclass(frozen=True)
+class Masked:
+    """How many values of each joint are masked: infinite, at the sensor's limit, and none that a sensor gives."""
+
+    infinite: Counts
+    saturated: Counts
+    impossible: Counts
+
+    def __add__(self, other: Masked) -> Masked:
+        return Masked(
+            self.infinite + other.infinite, self.saturated + other.saturated, self.impossible + other.impossible
+        )
+
+    def findings(self, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+        """What is told of them, by joint."""
+        kinds: tuple[tuple[Counts, str, Literal["warning", "loss"]], ...] = (
+            (self.infinite, "infinite", "loss"),
+            (self.saturated, "at the sensor's limit", "warning"),
+            (self.impossible, "none that a sensor gives", "loss"),
+        )
+        return [
+            Finding(f"{count} values{of_joint(joints, j, len(counts))} are {what}: masked", item.channel, severity)
+            for counts, what, severity in kinds
+            for j, count in enumerate(counts.tolist())
+            if count
+        ]
+
+
+def of_joint(joints: Sequence[str], joint: int, count: int) -> str:
+    """ " of joint elbow" where a channel has several joints, else nothing."""
+    return f" of joint {joints[joint]}" if count > 1 else ""
+
+
+def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Masked]:
+    """(n, J) values of a channel in its SI unit, NaN where they are masked, and how many these are."""
     infinite = np.isinf(values)
     saturated = np.zeros_like(infinite)
     if item.valid_range is not None:
         low, high = item.valid_range
         saturated = ((values <= low) | (values >= high)) & ~infinite
-    scaled: FloatArray = values * np.array(item.factor)
-    scaled[infinite | saturated] = np.nan
-    return scaled, int(np.count_nonzero(infinite)), int(np.count_nonzero(saturated))
-
-
-def masked_findings(item: ChannelSource, infinite: int, saturated: int) -> list[Finding]:
-    """What is told of the values that in_si masked."""
-    kinds = ((infinite, "infinite"), (saturated, "at the sensor's limit"))
-    return [Finding(f"{count} values are {what}: masked", item.channel) for count, what in kinds if count]
+    with np.errstate(over="ignore"):
+        scaled: FloatArray = values * np.array(item.factor)
+    beyond = (values < item.least) | (values > item.most)
+    if item.channel not in UNITLESS:
+        beyond |= np.abs(scaled) >= IMPOSSIBLE
+    beyond &= ~(infinite | saturated)
+    scaled[infinite | saturated | beyond] = np.nan
+    infinite, saturated, beyond = (np.count_nonzero(item, axis=0) for item in (infinite, saturated, beyond))
+    return scaled, Masked(infinite, saturated, beyond)
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
@@ -215,14 +246,15 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
     return Series(logged.time, torque, "N m")
 
 
-def stuck_findings(constant: Mapping[str, Sequence[bool]]) -> list[Finding]:
+def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]) -> list[Finding]:
     """A measured channel that never changes while its joint moves; `constant`: joint by joint, a channel does not."""
     found = []
     for name in (item for item in MEASURED if item in constant):
         others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
         for joint, stands in enumerate(constant[name]):
             if stands and not all(other[joint] for other in others):
-                found.append(Finding("the value never changes while the machine moves: stuck?", name))
+                which = of_joint(joints, joint, len(constant[name]))
+                found.append(Finding(f"the value{which} never changes while the machine moves: stuck?", name))
     return found
 
 

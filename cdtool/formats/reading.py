@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
 from cdtool.formats import FORMATS
-from cdtool.formats.channel_assembly import as_logged, assemble
+from cdtool.formats.channel_assembly import as_logged
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.own_clocks import with_own_clocks
 from cdtool.formats.parts import joined_recordings, joined_sources, lost_parts
 from cdtool.formats.source import Format, Source, is_absent
 from cdtool.machine_file import MachineFile
+from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
 
 # How a note about ground truth begins that is mapped and not in a log.
@@ -85,17 +87,37 @@ def survey(path: Path) -> Source:
     return choose_format(path).columns(path)
 
 
-def read_recording(path: Path, machine_file: MachineFile) -> Recording:
+@dataclass(frozen=True)
+class LoggedRecording:
+    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers."""
+
+    recording: Recording
+    factors: Mapping[str, tuple[float, ...]]
+    speed_low_pass: float
+
+    def on_load_side(self, machine: Any, ranges: PlausibleRanges | None = None) -> Recording:
+        """The recording on the load side, made without the values that are outside of the plausible ranges."""
+        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors)
+        recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
+        return recording
+
+
+def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
     """One log as a recording on the load side; raises RecordingError or ConfigurationError.
 
-    A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts.
+    A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts. Values outside of `ranges` are masked.
     """
-    if path.is_dir():
-        parts = log_parts(path)
-        recording = read_parts(parts, machine_file, path.name)
-        return replace(recording, source=str(path), findings=(*lost_parts(path, parts), *recording.findings))
-    source, channels = mapped_source(path, machine_file)
-    return assemble(source, channels, machine_file.machine)
+    return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
+
+
+def read_as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
+    """One log, or a folder of its parts, as it is logged; raises RecordingError or ConfigurationError."""
+    if not path.is_dir():
+        return _parts_as_logged([path], machine_file, path.stem)
+    parts = log_parts(path)
+    logged = _parts_as_logged(parts, machine_file, path.name)
+    findings = (*lost_parts(path, parts), *logged.recording.findings)
+    return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
 
 
 def log_parts(path: Path) -> list[Path]:
@@ -133,14 +155,19 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> R
     """Files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
     if not paths:
         raise UsageError(f"{name}: no file is given", "name the parts of the log")
+    return _parts_as_logged(paths, machine_file, name).on_load_side(machine_file.machine)
+
+
+def _parts_as_logged(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
     parts: list[Recording] = []
-    low_pass = 0.0
+    low_pass, factors = 0.0, dict[str, tuple[float, ...]]()
     for path in paths:
         source, channels = mapped_source(path, machine_file)
         low_pass = channels.speed_low_pass
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
         parts.append(as_logged(source, channels, machine_file.machine))
-    recording: Recording = machine_file.machine.referred_to_load(joined_recordings(parts, name), low_pass)
-    return recording
+    joined = parts[0] if len(parts) == 1 and parts[0].name == name else joined_recordings(parts, name)
+    return LoggedRecording(joined, factors, low_pass)
 
 
 def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:

@@ -106,7 +106,7 @@ def benchmark(
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
 
     def score(item: tuple[str, Path]) -> Scored:
-        return score_log(setup, item[0], item[1], detect, factors)
+        return score_log(setup, item[0], item[1], detect, factors, learn.ranges)
 
     for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
         gathered.add(group, scored)

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS
+from cdtool.clock.stamps import FAR_OFF
+from cdtool.clock.wild import WildStamps
 from cdtool.formats.distribution import Distribution
 from cdtool.recording import BoolArray, Finding, FloatArray
 
@@ -89,48 +91,71 @@ class _Restart:
 
 
 class CleanPieces:
-    """Stamps [s] -> strictly increasing times; what is missing, repeated or runs backward is dropped.
+    """Stamps [s] -> strictly increasing times; what is missing, wild, repeated or runs backward is dropped.
 
-    Of a coarse clock, whose stamps repeat, clean_time makes a straight line: this says only that it `is_coarse`.
-    guess_clock takes no column for a clock that stands still at more than a fifth of its steps.
+    The last rows of a piece wait for the next one, or for `final`: whether they are wild shows behind them. Of a coarse
+    clock, whose stamps repeat, clean_time makes a straight line: this says only that it `is_coarse`.
     """
 
     def __init__(self) -> None:
         self._unknown, self._repeated = _Dropped("are no number"), _Dropped("repeat")
+        self._wild, self._wild_stamps = _Dropped(FAR_OFF), WildStamps()
         self._backward, self._restart = _Dropped("run backward"), _Restart()
         self._highest = -np.inf
         self._rows = 0
+        self._waiting: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
-    def times(self, stamps: FloatArray, counted: FloatArray) -> FloatArray:
-        """The times of those rows of a piece that are kept; `counted` are the stamps as the file has them."""
-        times: FloatArray = stamps[self.keep(stamps, counted)]
-        return times
+    def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
+        """The times of those rows that are decided and kept; `counted` are the stamps as the file has them."""
+        return self.rows(stamps, counted, np.empty((len(stamps), 0)), final)[0]
 
-    def keep(self, stamps: FloatArray, counted: FloatArray) -> BoolArray:
-        """Which rows of a piece are kept."""
-        known = np.isfinite(stamps)
+    def rows(
+        self, stamps: FloatArray, counted: FloatArray, values: FloatArray, final: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """The times of those rows that are decided and kept, and their (n, J) values."""
+        is_wild = self._wild_stamps.add(stamps[np.isfinite(stamps)], final)
+        if self._waiting is not None:
+            held = self._waiting
+            stamps, counted = np.concatenate((held[0], stamps)), np.concatenate((held[1], counted))
+            values = np.concatenate((held[2], values))
+        known = np.flatnonzero(np.isfinite(stamps))
+        decided = len(stamps) if len(is_wild) == len(known) else int(known[len(is_wild)])
+        if final:
+            self._waiting = None
+        else:  # copies: a view would keep all of the piece
+            self._waiting = stamps[decided:].copy(), counted[decided:].copy(), values[decided:].copy()
+        stamps, values = stamps[:decided], values[:decided]
+        keep = self._keep(stamps, counted[:decided], is_wild)
+        return stamps[keep], values if keep.all() else values[keep]
+
+    def _keep(self, stamps: FloatArray, counted: FloatArray, is_wild: BoolArray) -> BoolArray:
+        """Which of the decided rows are kept; `is_wild` is of those with a stamp."""
+        keep: BoolArray = np.isfinite(stamps)
         before, self._rows = self._rows, self._rows + len(stamps)
-        index, kept = np.flatnonzero(known), stamps[known]
+        self._unknown.add(np.flatnonzero(~keep), before)
+        index = np.flatnonzero(keep)
+        self._wild.add(index[is_wild], before)
+        keep[index[is_wild]] = False
+        index = index[~is_wild]
+        kept = stamps[index]
         highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
         repeated, backward = kept == highest[:-1], kept < highest[:-1]
         self._highest = float(highest[-1])
-        self._unknown.add(np.flatnonzero(~known), before)
         self._backward.add(index[backward], before)
         self._repeated.add(index[repeated], before)
-        self._restart.add(counted[known], backward)
-        keep = known
+        self._restart.add(counted[index], backward)
         keep[index[backward | repeated]] = False
         return keep
 
     @property
     def is_coarse(self) -> bool:
         """So many stamps repeat that clean_time would make a straight line of the clock."""
-        known = self._rows - self._unknown.count
+        known = self._rows - self._unknown.count - self._wild.count
         return known > 0 and self._repeated.count / known > _COARSE_SHARE
 
     def findings(self, first_row: int) -> list[Finding]:
         """What was dropped; `first_row` is the file's line of the first sample (0: not known)."""
-        kinds = ((self._unknown, ""), (self._backward, self._restart.why()), (self._repeated, ""))
+        kinds = ((self._unknown, ""), (self._wild, ""), (self._backward, self._restart.why()), (self._repeated, ""))
         return [rows.finding(self._rows, first_row, why) for rows, why in kinds if rows.count]
 
 

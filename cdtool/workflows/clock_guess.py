@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
+from cdtool.clock.wild import EDGE_ROWS, leading_wild
 from cdtool.formats.distribution import Distribution
 from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding, FloatArray
@@ -50,9 +51,19 @@ class TableClock:
     findings: tuple[Finding, ...]
 
     def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """The stamps' pieces as times [s] that strictly increase; as long as the pieces where nothing is dropped."""
-        clean = CleanPieces()
-        return (clean.times((piece - self.origin) * self.factor, piece) for piece in stamps)
+        """The stamps' pieces as times [s] that strictly increase; the last rows of a piece come with the next one."""
+        return self.cleaned(CleanPieces(), stamps)
+
+    def cleaned(self, clean: CleanPieces, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
+        """The same through a given cleaner, which then says what was dropped."""
+        for piece in stamps:
+            yield clean.times((piece - self.origin) * self.factor, piece)
+        yield clean.times(np.empty(0), np.empty(0), final=True)
+
+
+def is_clock_name(name: str) -> bool:
+    """True for a column that is called as clocks are."""
+    return _NAMES.match(name) is not None
 
 
 def guess_clock(source: Source) -> GuessedClock | None:
@@ -64,7 +75,8 @@ def guess_clock(source: Source) -> GuessedClock | None:
     found = find_clock(source, figures, lambda name: [source.columns[name].values])
     if found is None:
         return None
-    return GuessedClock(found.column, next(found.times([source.columns[found.column].values])), found.findings)
+    times = np.concatenate(list(found.times([source.columns[found.column].values])))
+    return GuessedClock(found.column, times, found.findings)
 
 
 def find_clock(source: Source, figures: Mapping[str, ColumnFigures], reread: Reread) -> TableClock | None:
@@ -82,7 +94,7 @@ def find_clock(source: Source, figures: Mapping[str, ColumnFigures], reread: Rer
         stamps = _stamps(column, known.present, reread)
         step = _usual_step(stamps())
         if step is not None:
-            return _described(source.columns[column], source.first_row, known.first, step, stamps)
+            return _described(source.columns[column], source.first_row, step, stamps)
     return None
 
 
@@ -106,10 +118,9 @@ def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
     return median if regular else None
 
 
-def _described(
-    column: Column, first_row: int, start: float, step: float, stamps: Callable[[], Iterable[FloatArray]]
-) -> TableClock:
+def _described(column: Column, first_row: int, step: float, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
+    start = _start(stamps())
     epoch = unit_since_1970(start)
     wrong: tuple[Finding, ...] = ()
     stated = known is not None and known.si == "s"
@@ -134,11 +145,19 @@ def _described(
     return _checked(clock, first_row, stamps)
 
 
+def _start(stamps: Iterable[FloatArray]) -> float:
+    """The first stamp that is not wild; the first of an epoch where one that is of none stands before it."""
+    known = next(found for piece in stamps if len(found := piece[np.isfinite(piece)]))
+    rows = leading_wild(known, np.inf)
+    if not rows and not unit_since_1970(known[0]):
+        rows = next((i for i, stamp in enumerate(known[: EDGE_ROWS + 1]) if unit_since_1970(stamp)), 0)
+    return float(known[rows])
+
+
 def _checked(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     """The clock with its figures and all that is odd about it."""
     clean = CleanPieces()
-    for piece in stamps():
-        times = clean.times((piece - clock.origin) * clock.factor, piece)
+    for times in clock.cleaned(clean, stamps()):
         clock.figures.add(times, len(times))
     gaps = gaps_in(clock.times(stamps()), clock.figures.steps.median, clock.column)
     return replace(clock, findings=(*clock.findings, *clean.findings(first_row), *gaps))

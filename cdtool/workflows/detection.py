@@ -18,6 +18,7 @@ from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
+from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
@@ -74,13 +75,14 @@ def detect(
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
+    ranges: PlausibleRanges | None = None
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
         if joints:
             raise UsageError("joints belong to a limit", "a signature watches the joints that it was learned for")
-        thresholds, joints = stored.current, stored.joints
+        thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
     else:
@@ -94,7 +96,7 @@ def detect(
     stored_one, raised_by = raised_by, raised_by.changed(activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with another activation than that of the file"
-    recording, parts = load_operations(Path(log), machine_file, operations)
+    recording, parts = load_operations(Path(log), machine_file, operations, ranges=ranges)
     detections = tuple(
         detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, max(HOLD, window))
     )

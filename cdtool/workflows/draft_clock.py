@@ -95,10 +95,11 @@ def _complete(source: Source) -> GuessedClock | None:
 
 def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:
     """Seconds of one unit of the stamps, as the guess took them; and whether it took the start off."""
-    known = np.flatnonzero(np.isfinite(column.values))
-    first, last = (float(column.values[known[i]]) for i in (0, -1))
-    factor = float(found.time[-1] - found.time[0]) / (last - first) if last != first else 1.0
-    return abs(factor) or 1.0, found.time[0] == 0.0 and first > 0.0
+    known = column.values[np.isfinite(column.values)]
+    steps = np.diff(known)
+    steps = steps[steps > 0.0]  # the median of them: a wild stamp must not decide
+    factor = float(np.median(np.diff(found.time)) / np.median(steps)) if len(steps) and len(found.time) > 1 else 1.0
+    return abs(factor) or 1.0, found.time[0] == 0.0 and bool(np.median(known) > 0.0 and known[0] != 0.0)
 
 
 def _since(start: float, days: bool) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import Finding, Recording, Series
+from cdtool.recording import Finding, Recording, Series, worst_first
 from cdtool.workflows.accelerometer_check import accelerometer_findings
 from cdtool.workflows.motion_check import bandwidth_findings, motion_findings
 
@@ -64,6 +64,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 def _survey(log: Path) -> Info:
     from cdtool.formats.csv import TableSource
     from cdtool.formats.part_pieces import in_time_order, log_pieces
+    from cdtool.workflows.clock_doubts import clock_doubts
     from cdtool.workflows.clock_guess import find_clock
     from cdtool.workflows.log_figures import LogFigures
 
@@ -72,13 +73,14 @@ def _survey(log: Path) -> Info:
     clock = find_clock(source, figures.columns, figures.values_of)
     channels = [_described(column, figures, clock.figures if clock else None) for column in source.columns.values()]
     findings = [*source.findings, *(clock.findings if clock else ())]
+    findings += clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
     findings += [
         Finding(f"{channel.missing} of {channel.samples} values are missing (NaN)", channel.name)
         for channel in channels
         if channel.missing
     ]
     dialect = source.dialect if isinstance(source, TableSource) else ""
-    return Info(str(log), source.format, source.details, tuple(channels), tuple(findings), dialect)
+    return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), dialect)
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
@@ -116,7 +118,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     findings = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording)]
     findings += bandwidth_findings(recording, machine_file)
     dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
-    found = tuple(dict.fromkeys(findings))
+    found = worst_first(dict.fromkeys(findings))
     return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
 
 

@@ -86,6 +86,7 @@ def learn_signature(
         first=thresholds,
         runs=tuple(learned_run(operation) for operation in fitted.used),
         operations=operations,
+        plausible=runs.ranges,
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)

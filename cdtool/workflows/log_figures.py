@@ -29,7 +29,6 @@ class ColumnFigures:
     steps: int = 0
     forward: int = 0
     by_one: bool = True
-    first: float = np.nan
     last: float = np.nan
 
     def add(self, values: FloatArray, in_table: bool) -> None:
@@ -49,7 +48,6 @@ class ColumnFigures:
         self.forward += int(np.count_nonzero(steps >= 0.0))
         self.by_one = self.by_one and all_present and bool(np.all(steps == 1.0))
         if len(present):
-            self.first = float(present[0]) if self.present == 0 else self.first
             self.last = float(present[-1])
 
 

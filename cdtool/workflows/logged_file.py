@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ from cdtool.formats.channel_assembly import (
     apart_findings,
     check_width,
     in_si,
-    masked_findings,
     stuck_findings,
 )
 from cdtool.formats.distribution import Distribution
@@ -38,25 +37,27 @@ class LoggedChannel:
     `period` [s] is the median step, where it is known: then gaps are looked for, too.
     """
 
-    def __init__(self, path: Path, item: ChannelSource, period: float | None = None) -> None:
-        self._path, self.item, self.joints = path, item, len(item.factor)
+    def __init__(self, path: Path, item: ChannelSource, names: Sequence[str], period: float | None = None) -> None:
+        self._path, self.item, self.joints, self._names = path, item, len(item.factor), names
         self.clean = CleanPieces()
         self.rows, self.first, self.last = 0, np.nan, np.nan
         self.steps = Distribution()
         self.digest: Any = hashlib.blake2b(digest_size=16)  # of the times
         self._gaps = None if period is None else Gaps(period, item.channel)
-        self._infinite = self._saturated = self._missing = 0
+        self._masked, self._missing = in_si(item, np.empty((0, self.joints)))[1], 0
         self._known = np.zeros(self.joints, np.int64)
         self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
 
-    def add(self, stamps: FloatArray, values: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values."""
-        keep = self.clean.keep(stamps, stamps)
-        time = stamps[keep]
-        table = np.full((len(stamps), self.joints), np.nan) if values is None else values.reshape(len(stamps), -1)
+    def add(self, stamps: FloatArray, values: FloatArray | None, final: bool = False) -> tuple[FloatArray, FloatArray]:
+        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values.
+
+        The last ones wait for those that follow, or for `final`.
+        """
+        table = np.full((len(stamps), self.joints), np.nan) if values is None else _table(values)
         check_width(self._path, self.item, table.shape[1])
-        rows, infinite, saturated = in_si(self.item, table[keep])
-        self._infinite, self._saturated = self._infinite + infinite, self._saturated + saturated
+        time, table = self.clean.rows(stamps, stamps, table, final)
+        rows, masked = in_si(self.item, table)
+        self._masked += masked
         present = np.isfinite(rows)
         self._missing += rows.size - int(np.count_nonzero(present))
         self._known += np.count_nonzero(present, axis=0)
@@ -89,7 +90,7 @@ class LoggedChannel:
     def findings(self) -> list[Finding]:
         """What is odd, in the words of channel_assembly."""
         found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
-        found += masked_findings(self.item, self._infinite, self._saturated)
+        found += self._masked.findings(self.item, self._names)
         found += self._gaps.findings() if self._gaps is not None else []
         if self._missing:
             text = f"{self._missing} of {self.rows * self.joints} values are missing (NaN)"
@@ -105,7 +106,7 @@ class LoggedFile:
     """
 
     def __init__(self, path: Path, machine_file: MachineFile) -> None:
-        self.path, self._items = path, machine_file.topics.sources
+        self.path, self._items, self._joints = path, machine_file.topics.sources, machine_file.topics.joints
         self._log = MappedLog(path, machine_file.topics)
         self._is_sorted = True
         self.channels = self._new()
@@ -151,45 +152,48 @@ class LoggedFile:
     def findings(self) -> tuple[Finding, ...]:
         """What is odd about the file and its channels."""
         found = [*self._told, *(item for channel in self.channels.values() for item in channel.findings())]
-        found += stuck_findings({name: self.channels[name].constant for name in MEASURED if name in self.channels})
+        constant = {name: self.channels[name].constant for name in MEASURED if name in self.channels}
+        found += stuck_findings(constant, self._joints)
         found += apart_findings({name: channel.span for name, channel in self.channels.items()})
         return tuple(found)
 
     def pieces(self, names: Collection[str], shift: float) -> Iterator[Piece]:
         """The channels of those names, each a clock of its own; `shift` [s] is added to their times."""
         again = {
-            name: LoggedChannel(self.path, channel.item, channel.steps.median)
+            name: LoggedChannel(self.path, channel.item, self._joints, channel.steps.median)
             for name, channel in self.channels.items()
             if name in names
         }
-        for piece in self._in_order():
-            for channel, time, rows in _added(again, piece):
-                if len(time):
-                    name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
-                    yield Piece(name, time + shift, {name: values}, len(time))
+        for channel, time, rows in _added(again, self._in_order()):
+            if len(time):
+                name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
+                yield Piece(name, time + shift, {name: values}, len(time))
         self.channels |= again
 
     def _survey(self) -> tuple[Source, Lateness]:
         """The figures, as if all were in order."""
         lateness, orders = Lateness(), dict[str, Lateness]()
         run = Run(self._log.pieces())
-        for piece in run:
-            if piece.time is not None:
-                lateness.add(piece.time)
-                orders.setdefault(piece.clock, Lateness()).add(piece.time)
-            for _ in _added(self.channels, piece):
-                pass
+
+        def looked_at() -> Iterator[Piece]:
+            for piece in run:
+                if piece.time is not None:
+                    lateness.add(piece.time)
+                    orders.setdefault(piece.clock, Lateness()).add(piece.time)
+                yield piece
+
+        for _ in _added(self.channels, looked_at()):
+            pass
         self._is_sorted = all(order.late == 0.0 for order in orders.values())
         return run.source, lateness
 
     def _survey_in_order(self) -> None:
         self.channels = self._new()
-        for piece in self._in_order():
-            for _ in _added(self.channels, piece):
-                pass
+        for _ in _added(self.channels, self._in_order()):
+            pass
 
     def _new(self) -> dict[str, LoggedChannel]:
-        return {item.channel: LoggedChannel(self.path, item) for item in self._items}
+        return {item.channel: LoggedChannel(self.path, item, self._joints) for item in self._items}
 
     def _in_order(self) -> Iterator[Piece]:
         """The fields' pieces, those of each field in the order of their times."""
@@ -202,9 +206,17 @@ class LoggedFile:
 
 
 def _added(
-    channels: Mapping[str, LoggedChannel], piece: Piece
+    channels: Mapping[str, LoggedChannel], pieces: Iterable[Piece]
 ) -> Iterator[tuple[LoggedChannel, FloatArray, FloatArray]]:
-    """The channels that a field's piece is one of, with their times and values in it."""
+    """The channels that each field's pieces are one of, with their times and values; at the end what still waits."""
+    for piece in pieces:
+        for channel in channels.values():
+            if channel.item.described == piece.clock and piece.time is not None:
+                yield channel, *channel.add(piece.time, piece.values.get(piece.clock))
     for channel in channels.values():
-        if channel.item.described == piece.clock and piece.time is not None:
-            yield channel, *channel.add(piece.time, piece.values.get(piece.clock))
+        yield channel, *channel.add(np.empty(0), np.empty((0, channel.joints)), final=True)
+
+
+def _table(values: FloatArray) -> FloatArray:
+    """(n, J) of values (n,) or (n, J), of no rows, too."""
+    return values[:, np.newaxis] if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))

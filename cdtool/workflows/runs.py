@@ -12,8 +12,10 @@ from typing import Any, TypeVar
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.formats.reading import LoggedRecording, read_as_logged
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
+from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
 from cdtool.workflows.impact_free import contacts_shown, unchecked, without_contacts
 
@@ -27,11 +29,12 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Runs:
-    """The operations of some logs, what was left out, and findings worth telling."""
+    """The operations of some logs, what was left out, findings worth telling, and the plausible ranges of channels."""
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
     findings: tuple[Skipped, ...]
+    ranges: PlausibleRanges
 
 
 def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
@@ -68,23 +71,32 @@ def in_order(
                 progress(i, len(items))
 
 
-def read_log(log: str | Path, machine: str | Path | MachineFile) -> Recording:
-    """A recording on the load side, through a machine file; raises CdtoolError, naming the file."""
-    from cdtool.formats.reading import read_recording
+def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
+    """A recording on the load side, through a machine file; raises CdtoolError, naming the file.
 
+    Values outside of the plausible `ranges` are masked, and a loss.
+    """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    recording = read_recording(Path(log), machine_file)
-    if not recording.channels:
-        raise RecordingError(f"{log}: no channel is mapped", "write [channels] in the machine file")
-    return recording
+    return _as_logged(Path(log), machine_file).on_load_side(machine_file.machine, ranges)
 
 
 def load_operations(
-    path: Path, machine_file: MachineFile, how: str, base: Path | None = None
+    path: Path,
+    machine_file: MachineFile,
+    how: str,
+    base: Path | None = None,
+    ranges: PlausibleRanges | None = None,
 ) -> tuple[Recording, list[Operation]]:
     """One log's recording, named by its path below `base`, and its operations; raises CdtoolError, naming the file."""
-    recording = replace(read_log(path, machine_file), name=shown_path(path, base))
+    recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
     return recording, operations_of(recording, how)
+
+
+def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
+    logged = read_as_logged(path, machine_file)
+    if not logged.recording.channels:
+        raise RecordingError(f"{path}: no channel is mapped", "write [channels] in the machine file")
+    return logged
 
 
 def load_runs(
@@ -93,13 +105,15 @@ def load_runs(
     how: str,
     *,
     onset: OnsetRule | None = None,
+    ranges: PlausibleRanges | None = None,
     jobs: int = 1,
     base: Path | None = None,
     progress: Progress | None = None,
 ) -> Runs:
     """The operations of many impact-free logs; a log that cannot be read is left out and named, the others go on.
 
-    So is an operation in which the load cell shows a contact by the `onset` rule.
+    So is an operation in which the load cell shows a contact by the `onset` rule. Values that no sensor gives are
+    masked: those outside of the plausible `ranges`, which are learned from all these logs where none are given.
     """
     rule = onset or OnsetRule()
     operations: list[Operation] = []
@@ -107,13 +121,26 @@ def load_runs(
     findings: list[Skipped] = []
     without: list[tuple[str, Finding]] = []
 
-    def load(path: Path) -> tuple[Recording, list[Operation]] | CdtoolError:
+    def read(path: Path) -> LoggedRecording | CdtoolError:
         try:
-            return load_operations(path, machine_file, how, base)
+            return _as_logged(path, machine_file)
         except CdtoolError as fault:
             return fault
 
-    for path, loaded in zip(paths, in_order(load, paths, jobs, progress), strict=True):
+    def cut(item: tuple[Path, LoggedRecording | CdtoolError]) -> tuple[Recording, list[Operation]] | CdtoolError:
+        path, logged = item
+        if isinstance(logged, CdtoolError):
+            return logged
+        try:
+            recording = logged.on_load_side(machine_file.machine, known)
+            recording = replace(recording, name=shown_path(path, base))
+            return recording, operations_of(recording, how)
+        except CdtoolError as fault:
+            return fault
+
+    logged = list(zip(paths, in_order(read, paths, jobs, progress), strict=True))
+    known = ranges or PlausibleRanges.learned([it.recording for _, it in logged if isinstance(it, LoggedRecording)])
+    for path, loaded in zip(paths, in_order(cut, logged, jobs, None), strict=True):
         if isinstance(loaded, CdtoolError):
             skipped.append(unread(path, base, loaded))
             continue
@@ -124,7 +151,7 @@ def load_runs(
         findings.extend(told(recording))
         skipped.extend(lost(recording))
         without.extend((recording.name, item) for item in absent_truth(recording))
-    return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)))
+    return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
 
 
 def unread(path: Path, base: Path | None, fault: CdtoolError) -> Skipped:

@@ -18,6 +18,7 @@ from cdtool.evaluation.truth.matching import match
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
+from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, Finding, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
@@ -88,16 +89,21 @@ def detect_with(
 
 
 def score_log(
-    setup: BenchmarkFile, group: str, path: Path, detect: Detect, factors: Mapping[str, FloatArray]
+    setup: BenchmarkFile,
+    group: str,
+    path: Path,
+    detect: Detect,
+    factors: Mapping[str, FloatArray],
+    ranges: PlausibleRanges | None = None,
 ) -> Scored:
-    """A log's rows; `factors`: the safety factors of the sweep by detector.
+    """A log's rows; `factors`: the safety factors of the sweep by detector; outside of `ranges` values are masked.
 
     A log or detector that fails is left out and named, and nothing is raised.
     """
     scored = Scored()
     begin = perf_counter()
     try:
-        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent)
+        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
         contacts = true_contacts(recording, setup, path) if group != HOLDOUT else []
     except CdtoolError as fault:
         scored.skipped.append(unread(path, setup.path.parent, fault))

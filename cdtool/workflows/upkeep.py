@@ -114,7 +114,9 @@ def check_signature(
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
     cut = _cut(file, operations)
-    runs = load_runs([Path(log) for log in logs], machine_file, cut, onset=onset, jobs=jobs, progress=progress)
+    runs = load_runs(
+        [Path(log) for log in logs], machine_file, cut, onset=onset, ranges=file.plausible, jobs=jobs, progress=progress
+    )
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
     known = {(run.sha256, run.operation) for run in file.runs}
@@ -194,7 +196,15 @@ def update_with_runs(
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
     cut = _cut(stored, operations)
-    runs = load_runs([Path(log) for log in logs], machine_file, cut, onset=onset, jobs=jobs, progress=progress)
+    runs = load_runs(
+        [Path(log) for log in logs],
+        machine_file,
+        cut,
+        onset=onset,
+        ranges=stored.plausible,
+        jobs=jobs,
+        progress=progress,
+    )
     added: list[str] = []
     refused = list(runs.skipped)
 

@@ -18,6 +18,7 @@ def test_one_broken_message_is_left_out_and_counted(by_hand):
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "x")))):
         assert source.columns["/a x"].values.tolist() == [1, 2]
         assert "/a: 4 of 6 messages cannot be decoded: JSONDecodeError" in str(source.findings[0])
+        assert source.findings[0].severity == "loss"
 
 
 @pytest.mark.parametrize(
@@ -40,7 +41,7 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
     source = Mcap().columns(path)
     assert not source.columns
-    assert "1 of 1 messages cannot be decoded" in str(source.findings[0])
+    assert "1 of 1 messages cannot be decoded" in str(source.findings[0]) and source.findings[0].severity == "loss"
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
 

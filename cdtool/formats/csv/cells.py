@@ -92,6 +92,20 @@ def number(text: str, decimal: str, thousands: str = "") -> float | None:
     return float(text.replace(",", "."))
 
 
+def holds_numbers(line: str) -> bool:
+    """True for a line of numbers, stamps beside them or not, whichever mark separates them: words hold no sample."""
+    for separator in SEPARATORS:
+        cells = [cell for cell in split_line(line, separator) if cell]
+        if any(_is_plain_number(cell) for cell in cells) and all(kind(cell) in "NT" for cell in cells):
+            return True
+    return False
+
+
+def _is_plain_number(cell: str) -> bool:
+    """A number, and neither a stamp nor an address such as 192.168.0.1."""
+    return kind(cell) == "N" and (cell.count(".") < 2 or _grouped(cell))
+
+
 def is_number(cell: str, decimal: str) -> bool:
     """True for a cell that holds a number, infinity, true or false; not for a missing one."""
     value = number(cell, decimal)

@@ -17,7 +17,7 @@ from cdtool.formats.csv.doubtful_commas import refuse_commas_that_may_be_decimal
 from cdtool.formats.csv.doubtful_points import settled_marks
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.footer import find_footer
-from cdtool.formats.csv.head import Head, HeadFinder
+from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines, shown_lines
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
@@ -147,6 +147,8 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
         refuse_commas_that_may_be_decimal(path, data, kinds, separator, named)
     if cut.width == 2 and separator == "," and not pins.separator:
         refuse_one_column_of_decimals(path, rows, head, data)
+    if pins.header is None:  # a pinned header says which table is meant: what stands above is a loss
+        refuse_table_above(path, head, cut.width)
     findings += _findings(text, head, told)
     trailing = _trailing(head, kinds, data)
     below = [x for x in comments if x.number > head.first.number]
@@ -236,13 +238,18 @@ def _findings(text: Text, head: Head, told: Line | None) -> list[Finding]:
         found.append(Finding(f"not valid UTF-8, read as {shown}", severity="note"))
     if told:
         found.append(Finding(f"line {told.number} ({told.text.strip()[:12]}) names the separator", severity="note"))
-    if head.preamble:
-        found.append(
-            Finding(f"{shown_lines(head.preamble)} above the rows skipped: no names, no numbers", severity="note")
-        )
+    if head.numbers:
+        lost = f"{shown_lines(head.numbers)} above the rows skipped though {_holds(head.numbers)} numbers"
+        found.append(Finding(f"{lost}; skip_lines in [csv] says that they are no rows", severity="loss"))
+    if words := [line for line in head.preamble if line not in head.numbers]:
+        found.append(Finding(f"{shown_lines(words)} above the rows skipped: no names, no numbers", severity="note"))
     if head.from_comment:
         found.append(Finding(f"the names are those of the comment in line {head.header_line}", severity="note"))
     return found
+
+
+def _holds(lines: Sequence[int]) -> str:
+    return "it holds" if len(lines) == 1 else "they hold"
 
 
 def _unique(cells: Sequence[str]) -> list[str]:

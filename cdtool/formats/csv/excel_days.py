@@ -17,14 +17,15 @@ _DAYS_STEP, _SECONDS_STEP = 10.0 / DAY_S, 5e-5
 def two_readings(stamps: FloatArray, factor: float) -> str:
     """Both readings of a clock that may be in days or in the unit of `factor` [s]; empty where only that one is likely.
 
-    `stamps` (n,) are all of the column; those that are missing are passed over. The step is the mean of all: stamps
-    with four decimals repeat. A clock above 20 kHz that has run for so long that it looks like a date of 2000 to 2100
-    cannot be told from one in days.
+    `stamps` (n,) are all of the column; those that are missing are passed over. The step is the mean of the middle
+    half: stamps with four decimals repeat, and one at an edge may be wild. A clock above 20 kHz that has run for so
+    long that it looks like a date of 2000 to 2100 cannot be told from one in days.
     """
     known = stamps[np.isfinite(stamps)]
-    if len(known) < 2 or not _FIRST < known[0] < _LAST:
+    if len(known) < 2 or not _FIRST < np.median(known) < _LAST:
         return ""
-    step = float(known[-1] - known[0]) / (len(known) - 1)
+    quarter = len(known) // 4
+    step = float(known[-1 - quarter] - known[quarter]) / (len(known) - 1 - 2 * quarter)
     if not 0.0 < step < min(_DAYS_STEP, _SECONDS_STEP / factor):
         return ""
     start = np.datetime64(round(since_1970(float(known[0]))), "s")

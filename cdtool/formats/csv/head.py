@@ -9,12 +9,14 @@ from pathlib import Path
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
-from cdtool.formats.csv.cells import kind, split_line
+from cdtool.formats.csv.cells import holds_numbers, kind, split_line
 from cdtool.formats.csv.head_words import are_numbered, are_types, is_unit
-from cdtool.formats.csv.lines import Line, is_ruler
+from cdtool.formats.csv.lines import Line, is_ruler, shown_lines
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
+# A single line of numbers above the names may be a setting; so many are rows.
+_ROWS_OF_A_TABLE = 2
 # LabVIEW's measurement files name the units of Y in the preamble, below a word of their own instead of that of X.
 _LABVIEW_UNITS = "Y_Unit_Label"
 
@@ -23,7 +25,8 @@ _LABVIEW_UNITS = "Y_Unit_Label"
 class Head:
     """`names` (None: no header) in `header_line`, `units` in `units_line` (0: none), rows from line `first` on.
 
-    `preamble` are the lines above the rows that are neither, comments apart; `from_comment`: a comment held the names.
+    `preamble` are the lines above the rows that are neither, comments apart; `numbers` those of them that hold numbers
+    only; `from_comment`: a comment held the names.
     """
 
     names: tuple[str, ...] | None
@@ -33,6 +36,7 @@ class Head:
     first: Line
     preamble: tuple[int, ...]
     from_comment: bool = False
+    numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,9 @@ class HeadFinder:
         if start is None:
             raise self._no_rows(cut)
         head = self._pinned(cut, start) if self.pins.header is not None else self._found(cut, start, comments)
-        return replace(head, preamble=tuple(sorted((*head.preamble, *empty))))
+        numbers = [row for row in cut if row.line.number in head.preamble and holds_numbers(row.line.text)]
+        preamble = tuple(sorted((*head.preamble, *empty)))
+        return replace(head, preamble=preamble, numbers=tuple(row.line.number for row in numbers))
 
     def _found(self, cut: Sequence[_Cut], start: int, comments: Sequence[Line]) -> Head:
         while start and self._is_damaged_row(cut, start - 1):
@@ -89,13 +95,18 @@ class HeadFinder:
             if above:
                 self._refuse_other_width(above, cut[start])
             return self._from_comments(cut[start:], comments, above)
-        header = above[-1]
-        if len(above) > 1 and self.pins.units is None and (self._are_units(header) or are_types(header.cells)):
-            upper = self._names(above[-2])
-            if upper is not None and (above[-2].kinds.count("N") == 0 or are_numbered(above[-2].cells)):
-                units, header, names = header, above[-2], upper
+        header, types = above[-1], None
+        for upper_row in reversed(above[:-1]):  # units and types stand below the names, in either order
+            is_types = are_types(header.cells)
+            if types if is_types else units or not self._are_units(header):
+                break
+            upper = self._names(upper_row)
+            if upper is None or ("N" in upper_row.kinds and not are_numbered(upper_row.cells)):
+                break
+            units, types = (units, header) if is_types else (header, types)
+            header, names = upper_row, upper
         self._refuse_row_as_names(header, cut[start])
-        return self._head(names, header, units, cut[start].line, above)
+        return self._head(names, header, units or types, cut[start].line, above)
 
     def _head(self, names: list[str], header: _Cut, units: _Cut | None, first: Line, above: Sequence[_Cut]) -> Head:
         if units is None and self.pins.units is None:
@@ -192,9 +203,11 @@ class HeadFinder:
             )
         below = [i for i, row in enumerate(cut) if row.line.number > header.line.number]
         units = next((cut[i] for i in below if cut[i].line.number == self.pins.units), None)
-        if self.pins.units is None and below and self._are_units(cut[below[0]]) and not self._is_row(cut[below[0]]):
-            units = cut[below[0]]
-        rows = [i for i in below if units is None or cut[i].line.number > units.line.number]
+        types = [i for i in below[:2] if are_types(cut[i].cells)]
+        plain = [i for i in below if i not in types]
+        if self.pins.units is None and plain and self._are_units(cut[plain[0]]) and not self._is_row(cut[plain[0]]):
+            units = cut[plain[0]]
+        rows = [i for i in plain if units is None or cut[i].line.number > units.line.number]
         if not rows:
             raise self._no_rows(cut)
         above = [row for row in cut if row.line.number < cut[rows[0]].line.number]
@@ -244,3 +257,15 @@ class HeadFinder:
                 f"{self.path}: line {cut[0].line.number} ({','.join(counted)[:40]}) may number the columns or be a row",
                 "pin header = 1 or header = false in [csv]",
             )
+
+
+def refuse_table_above(path: Path, head: Head, width: int) -> None:
+    """Raise RecordingError where rows of another table stand above this one: they would be lost."""
+    if len(head.numbers) < _ROWS_OF_A_TABLE:
+        return
+    below = f"the header in line {head.header_line}" if head.names else f"line {head.first.number}"
+    raise RecordingError(
+        f"{path}: {shown_lines(head.numbers)} above {below} hold numbers, but not those of its {width} columns: "
+        "several tables in one file?",
+        f"split the file, or skip the upper table: skip_lines = {head.numbers[-1]} in [csv]",
+    )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.errors import RecordingError
-from cdtool.formats.csv.cells import STAMP_LIKE, kind, number, split_line
+from cdtool.formats.csv.cells import STAMP_LIKE, holds_numbers, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
@@ -39,8 +39,9 @@ class OddLines:
 
     With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
     `unread` are these cells by column, each with its line. `dropped` are the rows that are none, with their lines;
-    `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none), `blank`
-    are lines that hold nothing, `empty` those of them that are rows, `words` perhaps a footer.
+    `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none);
+    `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold nothing,
+    `empty` those of them that are rows, `words` perhaps a footer.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class OddLines:
     unread: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
     skipped: dict[str, list[int]] = field(default_factory=dict)
     cut_line: int = 0
+    ends_skipped: bool = False
     blank: list[int] = field(default_factory=list)
     empty: list[int] = field(default_factory=list)
     words: list[tuple[int, int, str]] = field(default_factory=list)
@@ -63,6 +65,7 @@ class OddLines:
         """One line, in the file's order; `first_line` is that of its block."""
         line = first_line + item.line
         if self._is_skipped(item, line):
+            self.ends_skipped = item.unfinished
             return
         if item.unfinished and line > self.dialect.first_line:
             self._drop(item, line, "")
@@ -135,7 +138,7 @@ class OddLines:
 
     def _not_a_row(self, item: OddLine, line: int, cells: list[str], text: str) -> None:
         """Words below the rows are a footer, if nothing but words follows; anything else is a row of another width."""
-        if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X":
+        if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not holds_numbers(text):
             self._drop(item, line, "words below the rows")
             self.words.append((item.row, line, text))
             return

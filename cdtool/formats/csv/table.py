@@ -98,7 +98,7 @@ def end_findings(
     `ended`: the last line has its line end.
     """
     findings = odd.findings(rows.line(rows.count - 1))
-    if not ended and not odd.cut_line:
+    if not ended and not odd.cut_line and not odd.ends_skipped:
         findings += _judge_last_line(dialect, rows, asked, before)
     if odd.cut_line or dialect.text.padding:
         line = odd.cut_line or rows.line(rows.count)

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdtool.evaluation.alike import alike
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import broken
 from cdtool.evaluation.results import Results
@@ -86,8 +87,8 @@ def _tables(evaluated: Evaluated, opens: dict[tuple[str, str], list[int]]) -> di
         "points": points_table(results),
         "recordings": recordings_table(results, opens),
         "not_judged": not_judged_table(results),
-        "skipped": reasons_table("skipped-table", "Left out or lost", results.skipped),
-        "findings": reasons_table("findings-table", "Odd, but used", results.findings),
+        "skipped": reasons_table("skipped-table", "Left out or lost", alike(results.skipped)),
+        "findings": reasons_table("findings-table", "Odd, but used", alike(results.findings)),
         "calibration": calibration_table(results),
     }
     return {name: table if table.rows else None for name, table in made.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import ContactResult, Results, Skipped
 from cdtool.report.figure_text import NOTHING, number, percent
 from cdtool.report.markdown.figures import force_verdict, named, part_of, steps_words, time_budget
@@ -45,8 +46,8 @@ def details(results: Results) -> list[Section]:
         _folded("Contacts not assessable", _CONTACT, [_contact_row(results, item) for item in blind], "contacts"),
         _folded("What could not be judged", _NOT_JUDGED, _not_judged(results), "exposure"),
         _folded("Force limits not kept", _FORCE, _force_rows(results), "forces"),
-        _folded("Left out", ("recording", "reason"), _reasons(results.skipped), "skipped"),
-        _folded("Findings", ("recording", "finding"), _reasons(results.findings), "findings"),
+        _folded("Left out", ("recording", "reason"), _reasons(alike(results.skipped)), "skipped"),
+        _folded("Findings", ("recording", "finding"), _reasons(alike(results.findings)), "findings"),
         _folded("False-alarm budget", _BUDGET, _calibration(results), "calibration"),
         _folded("Provenance", ("what", "value"), _one_line(results.provenance), "provenance"),
         _folded("Gains and thresholds", _GAINS, _gains(results), "provenance"),

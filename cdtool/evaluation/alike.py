@@ -1,0 +1,37 @@
+"""What is said of many logs or channels in the same words is said once, with how many it was said of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from cdtool.evaluation.results import Skipped
+
+# Up to so many are each said; of more the first, and so many names of the others.
+_EACH, _NAMED = 3, 3
+_NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
+
+
+def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Names with texts in the order of their first ones; texts that differ in numbers only are one, with a count.
+
+    >>> grouped([("a", "3 gaps"), ("b", "1 gaps"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
+    [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]
+    """
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for name, text in items:
+        groups.setdefault(_NUMBERS.sub("#", text), []).append((name, text))
+    found: list[tuple[str, str]] = []
+    for (name, text), *others in groups.values():
+        if len(others) < _EACH:
+            found += [(name, text), *others]
+            continue
+        names = list(dict.fromkeys(other for other, _ in others if other not in ("", name)))
+        listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+        found.append((name, f"{text}; {len(others)} more like it{f' ({listed})' if listed else ''}"))
+    return found
+
+
+def alike(items: Sequence[Skipped]) -> list[Skipped]:
+    """Reasons, those that are alike once."""
+    return [Skipped(name, reason) for name, reason in grouped([(item.recording, item.reason) for item in items])]

@@ -1,0 +1,198 @@
+"""Values that no sensor of a machine gives: fill values, wraps of integers, spikes. Masked, counted, and a loss.
+
+`IMPOSSIBLE` holds for every channel. What else is plausible is learned from impact-free runs and kept with what was
+learned of them; a log is held against that, sample by sample, and never against its own later samples. Ranges are of
+channels as they are logged, in SI, before anything is derived from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
+
+# No channel of a machine reaches this in SI: 1e9 N m, rad/s or rad.
+IMPOSSIBLE = 1e9
+# Beyond so many reaches (the distance from the median that 99 % of the samples keep) a value is no measurement. Stiff
+# impacts come to 13 of them in this project's logs; accelerometers feel shocks, and encoders may start elsewhere.
+FAR = {"acceleration": 1e4, "position": 1e4, "reference_position": 1e4}
+_FAR_ELSE = 1e3
+# Where integers end, as a log has them before scaling: beyond so many reaches such a value fills a gap.
+_ENDS = np.array([-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1, 2.0**32 - 1])
+_FAR_ENDS = 20.0
+# A step of 16-bit integers this large is a wrap.
+_WRAP = 0.9 * 2**16
+# A position that steps further than its whole reach, and so many times as fast as it usually moves, has not moved so.
+_FASTER = 10.0
+# The share of samples and of runs that may be broken without moving a range.
+_SHARE, _RUNS = 0.99, 0.8
+_EDGE = 3
+
+
+@dataclass(frozen=True)
+class ChannelRange:
+    """A channel's median for each joint, its reach about it (that of the joint that reaches furthest), and its rate.
+
+    `rate` [unit/s] is how fast it changes at most, 0 where that is not looked at.
+    """
+
+    unit: str
+    centre: tuple[float, ...]
+    reach: float
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlausibleRanges:
+    """What was learned of each channel's values."""
+
+    channels: Mapping[str, ChannelRange]
+
+    @classmethod
+    def learned(cls, recordings: Sequence[Recording]) -> Self:
+        """The ranges of impact-free runs as logged: up to a fifth of the runs may be wrong without moving them."""
+        found: dict[str, ChannelRange] = {}
+        for name in (*MEASURED, *REFERENCES):
+            series = [item[name] for item in recordings if name in item]
+            alike = [
+                item for item in series if (item.unit, item.joint_count) == (series[0].unit, series[0].joint_count)
+            ]
+            learned = _learned(alike, name.endswith("position")) if alike else None
+            if learned is not None:
+                found[name] = learned
+        return cls(found)
+
+    def masked(self, recording: Recording, factors: Mapping[str, Sequence[float]]) -> Recording:
+        """The recording with what is not plausible missing, and a loss for each joint that had such values.
+
+        `factors` lead from a channel's numbers in the log to SI, joint by joint.
+        """
+        channels, findings = dict(recording.channels), list(recording.findings)
+        for name, known in self.channels.items():
+            if name not in recording:
+                continue
+            series = recording[name]
+            if (series.unit, series.joint_count) != (known.unit, len(known.centre)):
+                text = f"logged in {series.unit}, learned in {known.unit}: not checked for values that no sensor gives"
+                findings.append(Finding(text, name))
+                continue
+            wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), factors.get(name, ()))
+            if wrong.any():
+                values = series.values.copy()
+                values[wrong] = np.nan
+                channels[name] = Series(series.time, values, series.unit)
+                findings += _findings(name, series, wrong, known, recording.joints)
+        return replace(recording, channels=channels, findings=tuple(findings))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {name: asdict(item) for name, item in self.channels.items()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`; raises KeyError, TypeError or ValueError for anything else."""
+        channels = {
+            str(name): ChannelRange(
+                str(item["unit"]), tuple(map(float, item["centre"])), float(item["reach"]), float(item["rate"])
+            )
+            for name, item in values.items()
+        }
+        for name, item in channels.items():
+            if not (np.isfinite([*item.centre, item.reach, item.rate]).all() and item.reach > 0.0 <= item.rate):
+                raise ValueError(f"plausible range of {name}: {item}")
+        return cls(channels)
+
+
+def impossible(values: FloatArray) -> BoolArray:
+    """True where a value in SI is finite and beyond what any sensor of a machine gives."""
+    return (np.abs(values) >= IMPOSSIBLE) & np.isfinite(values)
+
+
+def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
+    """One channel's range; None where no run holds a value, or all hold the same one."""
+    medians = [np.array([_quantile(column, 0.5) for column in item.values.T]) for item in series]
+    medians = [median for median in medians if np.isfinite(median).all()]
+    if not medians:
+        return None
+    centre = np.median(np.array(medians), axis=0)
+    reach = _usual([max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series])
+    rate = _usual([_rate(item) for item in series]) if moves else 0.0
+    return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate) if reach > 0.0 else None
+
+
+def _rate(series: Series) -> float:
+    if len(series) < 2:
+        return 0.0
+    rates = np.abs(np.diff(series.values, axis=0)) / np.diff(series.time)[:, np.newaxis]
+    return max(_quantile(column, _SHARE) for column in rates.T)
+
+
+def _usual(figures: Sequence[float]) -> float:
+    """The largest of the lowest four fifths of the runs; 0 where there is none."""
+    known = sorted(figure for figure in figures if np.isfinite(figure))
+    return known[int(_RUNS * (len(known) - 1))] if known else 0.0
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return float("nan")
+    place = int(share * (len(finite) - 1))
+    return float(np.partition(finite, place)[place])
+
+
+def _implausible(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> BoolArray:
+    """True (n, J) where a value is no measurement."""
+    with np.errstate(invalid="ignore"):
+        distance = np.abs(series.values - np.array(known.centre))
+        wrong: BoolArray = distance > far * known.reach
+        for j, factor in enumerate(factors):
+            ends = np.isin(series.values[:, j], _ENDS * factor)
+            wrong[:, j] |= ends & (distance[:, j] > _FAR_ENDS * known.reach)
+    for j in range(series.joint_count):
+        factor = factors[j] if factors else 0.0
+        wrong[:, j] |= _jumped(series.time, np.where(wrong[:, j], np.nan, series.values[:, j]), known, factor)
+    return wrong
+
+
+def _jumped(time: FloatArray, values: FloatArray, known: ChannelRange, factor: float) -> BoolArray:
+    """True from a step that is none of the machine's until the value is back where it was before."""
+    wrong = np.zeros(len(values), dtype=bool)
+    index = np.flatnonzero(np.isfinite(values))
+    rows, step = values[index], np.abs(np.diff(values[index]))
+    if known.rate > 0.0:
+        near, is_jump = known.reach, step > np.maximum(known.reach, _FASTER * known.rate * np.diff(time[index]))
+    else:
+        near = 0.5 * _WRAP * abs(factor)
+        is_jump = (step >= 2.0 * near) & (near > _FAR_ENDS * known.reach)
+    jumps = np.flatnonzero(is_jump)
+    end = 0
+    for at in jumps.tolist():
+        if at < end:
+            continue
+        if at < _EDGE and end == 0 and len(rows) > 2 * _EDGE:  # the log begins with what is wrong
+            wrong[index[: at + 1]] = True
+            end = at + 2
+            continue
+        back = np.flatnonzero(np.abs(rows[at + 1 :] - rows[at]) <= near)
+        end = at + 1 + (int(back[0]) if len(back) else len(rows) - at - 1)
+        wrong[index[at + 1 : end]] = True
+    return wrong
+
+
+def _findings(name: str, series: Series, wrong: BoolArray, known: ChannelRange, joints: Sequence[str]) -> list[Finding]:
+    found = []
+    for j in np.flatnonzero(wrong.any(axis=0)).tolist():
+        rows = np.flatnonzero(wrong[:, j])
+        joint = f" of joint {joints[j]}" if series.joint_count > 1 else ""
+        text = (
+            f"{len(rows)} values{joint} are none that its sensor gives (first {series.values[rows[0], j]:.4g} "
+            f"{series.unit} at {series.time[rows[0]]:.3f} s; usual are {known.centre[j]:.3g} +- {known.reach:.3g} "
+            f"{series.unit}): masked"
+        )
+        found.append(Finding(text, name, "loss"))
+    return found
