@@ -33,13 +33,22 @@ _SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Movement:
-    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason."""
+    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason.
+
+    Compared with impact-free runs: its `value` where it was farthest off, with their `mean` and `spread` there, in
+    `unit`; NaN where the run's own past had to do. `brief`: it came back within a few samples.
+    """
 
     channel: str
     joint: str
     time: float
     direction: Literal["up", "down", ""] = ""
     reason: str = ""
+    unit: str = ""
+    value: float = math.nan
+    mean: float = math.nan
+    spread: float = math.nan
+    brief: bool = False
 
 
 def which_moved_first(

@@ -1,0 +1,141 @@
+"""Which channels left their normal course, in which order, and what the alarm likely comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from cdtool.detection import WHOLE_MACHINE
+from cdtool.evaluation.explanation.cause import Cause, CauseKind, likely_cause
+from cdtool.evaluation.explanation.departure import Track, tracks_of
+from cdtool.evaluation.explanation.movement import Movement, which_moved_first
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.explanation.transient import Transient
+from cdtool.motion import MotionClass
+from cdtool.recording import REFERENCES, Recording
+from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
+
+# Departures are looked for from so long before the signal left its band for good [s]: a soft contact takes as long.
+_BEFORE = 0.9
+# Which class of motion a run is of is asked up to so long before it left the band [s].
+_LATEST = 0.1
+# After accelerating so much of the run says how far it is off anyway [s]; and at least so long departures are looked for.
+_SETTLING, _LEAST_BEFORE = 0.3, 0.3
+# What follows an alarm tells a contact from friction: so long it is looked at [s].
+_AFTER = 0.5
+
+# When a channel began to move is known to about this [s].
+_RESOLUTION = 0.02
+# Of channels that move at the same time the one that physically answers first comes first.
+_ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The channels in the order in which they left their course, and the likely cause (a contact's is known).
+
+    `absent`: why there were no impact-free runs to compare with; None where there were, `runs` of them.
+    """
+
+    moved: tuple[Movement, ...]
+    cause: Cause
+    absent: Absence | None
+    runs: int = 0
+
+
+@dataclass(frozen=True)
+class Event:
+    """An alarm at `alarm` [s] of a signal that left its band for good at `left` [s]; `inputs`: what its detector reads.
+
+    `joint` is the signal's: one of the machine's, or the whole machine. `motion` is the operation's.
+    """
+
+    joint: str
+    left: float
+    alarm: float
+    inputs: tuple[str, ...]
+    motion: MotionClass
+
+
+def diagnose_alarm(
+    recording: Recording, event: Event, normals: NormalMotions, own_past: Sequence[Movement]
+) -> Diagnosis:
+    """What led to an alarm.
+
+    `own_past`: the movements against the run's own past, which count where there are no impact-free runs.
+    """
+    normal = normals.of(recording, event.left - _LATEST)
+    known = isinstance(normal, NormalMotion)
+    begin = _search_begin(recording, normal, event.left) if known else event.left - _BEFORE
+    end = min(event.alarm + _AFTER, recording.end)
+    tracks = tracks_of(recording, normal if known else None, recording.joints, begin, end)
+    motion = normal.motion if known else event.motion
+    leading, direction = recording.joints[motion.joint], motion.direction or 1
+    cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
+    moved = moved_channels(tracks, event.joint, begin, end, leading) if known else list(own_past)
+    if cause.transient is not None:
+        moved = _with_transient(moved, cause.transient, tracks if known else [])
+    runs = normal.runs if known else 0
+    return Diagnosis(in_order(moved), cause, None if known else normal, runs)
+
+
+def diagnose_contact(
+    recording: Recording, joint: str, onset: float, until: float, normals: NormalMotions, own_past: Sequence[Movement]
+) -> Diagnosis:
+    """What a contact moved, from its onset less what that is uncertain by; its cause is known."""
+    normal = normals.of(recording, onset)
+    if not isinstance(normal, NormalMotion):
+        return Diagnosis(tuple(own_past), Cause(CauseKind.CONTACT), normal)
+    end = min(until, recording.end)
+    tracks = tracks_of(recording, normal, recording.joints, onset, end)
+    leading = recording.joints[normal.motion.joint]
+    return Diagnosis(in_order(moved_channels(tracks, joint, onset, end, leading)), Cause(CauseKind.CONTACT), None, normal.runs)
+
+
+def moved_channels(
+    tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str
+) -> list[Movement]:
+    """Every channel of the signal's joint, and those of other joints that left their normal band.
+
+    The position of the joint that leads the motion is where in the stroke it is: the others are compared at that place.
+    """
+    found = [track.movement(begin, end) for track in tracks if track.channel not in POSITIONS or track.joint != leading]
+    return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
+
+
+def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:
+    """From where on departures are looked for [s]: not far into the acceleration, if that was shortly before."""
+    clock = recording["speed"].time
+    ran = clock[normal.progress(recording, clock).running]
+    settled = float(ran[0]) + _SETTLING if len(ran) else -math.inf
+    return max(left - _BEFORE, min(settled, left - _LEAST_BEFORE))
+
+
+def in_order(moved: Sequence[Movement]) -> tuple[Movement, ...]:
+    """By time, those that did not move behind them; a position, an integral, not shortly before its own speed."""
+    speeds = {item.joint: item.time for item in moved if item.channel == "speed" and not math.isnan(item.time)}
+
+    def place(item: Movement) -> tuple[bool, float, int]:
+        time = item.time
+        if item.channel == "position" and 0.0 < speeds.get(item.joint, -math.inf) - time < _RESOLUTION:
+            time = speeds[item.joint]
+        return math.isnan(time), time, _ORDER.index(item.channel)
+
+    return tuple(sorted(moved, key=place))
+
+
+def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequence[Track]) -> list[Movement]:
+    """The channel of the transient as moved when it began: it may have stayed within the spread of the runs."""
+    others = [item for item in moved if (item.channel, item.joint) != (found.channel, found.joint)]
+    told = Movement(found.channel, found.joint, found.start, "up" if found.height > 0.0 else "down", unit=found.unit)
+    for track in tracks:
+        if (track.channel, track.joint) == (found.channel, found.joint):
+            part = track.between(found.start, found.end)
+            k = part.start + int(abs(track.value[part] - track.mean[part]).argmax())
+            numbers = {name: float(getattr(track, name)[k]) for name in ("value", "mean", "spread")}
+            told = replace(told, **numbers)
+    return [*others, replace(told, brief=True)]
+
+
+__all__ = ["Absence", "CauseKind", "Diagnosis", "Event", "NormalMotions", "diagnose_alarm", "diagnose_contact"]
