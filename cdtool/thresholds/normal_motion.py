@@ -25,6 +25,8 @@ POSITIONS = ("position", "reference_position")
 LEVEL_SECONDS = 0.05
 _FILLED = 0.8
 _SUCCESSION = 3
+# Share of the runs [%] that stay within the largest distance: one faulty sample in one run does not widen it.
+_MOST = 80.0
 # Fewer runs tell no spread.
 LEAST_RUNS = 3
 
@@ -41,8 +43,8 @@ _SMALLEST_SPREAD, _SMALLEST_OF_COMMAND = 1e-3, 0.02
 class NormalCurves:
     """Statistics of one quantity (g, J): over time since motion start, and along the travel (None: over time alone).
 
-    `farthest_by_time` and `farthest_by_travel` (J,): the largest distance from the mean that the runs kept to for 3
-    samples, in spreads: over time while accelerating, and along the travel after it.
+    `farthest_by_time` and `farthest_by_travel` (J,): the largest distance from the mean that a run keeps to for 3
+    samples, in spreads: over time while accelerating, and along the travel after it. Four of five runs stay within it.
     """
 
     by_time: Curve
@@ -71,21 +73,17 @@ class NormalCurves:
         return np.where(running, along[0], mean), np.where(running, along[1], spread)
 
     def updated(self, values: FloatArray, clock: FloatArray, where: Progress, cap: float, forget: float | None) -> Self:
-        """With one more run (n, J), no further than `cap` spreads from the mean; see `Curve.updated`."""
+        """With one more run (n, J), no further than `cap` spreads from the mean; see `Curve.updated`.
+
+        How far runs go from the mean stays as first learned.
+        """
         signal = _signal(clock, values)
 
         def one(curve: Curve, axis: FloatArray) -> Curve:
             return curve.updated(curve.clipped(resample(signal, where, curve, axis), cap, pooled=True), forget)
 
         by_travel = one(self.by_travel, where.travel) if self.by_travel is not None else None
-        changed = replace(self, by_time=one(self.by_time, where.elapsed), by_travel=by_travel)
-        # Clipped as the run itself: no single run widens the band by more than that.
-        by_time, along = (np.minimum(item, cap) for item in changed.distances(values, where))
-        return replace(
-            changed,
-            farthest_by_time=np.maximum(self.farthest_by_time, by_time),
-            farthest_by_travel=np.maximum(self.farthest_by_travel, along),
-        )
+        return replace(self, by_time=one(self.by_time, where.elapsed), by_travel=by_travel)
 
     def distances(self, values: FloatArray, where: Progress) -> tuple[FloatArray, FloatArray]:
         """How far (J,) a run is from the mean at most for 3 samples [spreads]: while accelerating, and after it."""
@@ -312,7 +310,7 @@ def _learn_curves(
         by_travel = learned(Curve.empty(step, window, farthest, joints), [where.travel for where in wheres])
     curves = NormalCurves(by_time, by_travel, np.zeros(joints), np.zeros(joints))
     distances = [curves.distances(value, where) for value, where in zip(values, wheres, strict=True)]
-    by_time_most, along_most = (np.max([item[i] for item in distances], axis=0) for i in (0, 1))
+    by_time_most, along_most = (np.percentile([item[i] for item in distances], _MOST, axis=0) for i in (0, 1))
     return replace(curves, farthest_by_time=by_time_most, farthest_by_travel=along_most)
 
 

@@ -113,7 +113,10 @@ def likely_cause(
     window = left - _SHORTLY, alarm
     found = {
         channel: [
-            item for name, track in by_name.items() if name[0] == channel for item in _transients(recording, track, window)
+            item
+            for name, track in by_name.items()
+            if name[0] == channel
+            for item in _transients(recording, track, window)
         ]
         for channel in ("speed", "torque", "acceleration")
         # What the detector does not read cannot have raised its alarm.

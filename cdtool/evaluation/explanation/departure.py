@@ -16,12 +16,12 @@ import numpy as np
 
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels
 
-# A channel has left its normal band where it is farther off the mean than any impact-free run has been, by this factor
-# (the runs learned from keep closer to their own mean than others), and at least so many spreads.
-_BEYOND, _LEAST_OUT = 1.4, 5.0
+# A channel has left its normal band where it is farther off the mean than impact-free runs go, by this factor (the runs
+# learned from keep closer to their own mean than others do), and at least so many spreads.
+_BEYOND, _LEAST_OUT = 1.5, 5.0
 # It began to leave it where it last was within this share of that.
 _BACK_TO = 0.4
 _SUCCESSION = 3
@@ -184,17 +184,17 @@ def _own_past(recording: Recording, channel: str, begin: float) -> Comparison:
     series = recording[channel]
     quiet = slice(*np.searchsorted(series.time, (begin - _BASELINE, begin)))
     level = levels(series.time, series.values)
-    parts = []
-    for values in (series.values, level):
-        past = values[quiet]
-        shape = values.shape
-        if np.count_nonzero(np.isfinite(past).all(axis=1)) < _ENOUGH:
-            parts += [np.full(shape, np.nan), np.full(shape, np.nan)]
-            continue
-        spread = np.maximum(np.nanstd(past, axis=0), 1e-3 * np.nanmax(np.abs(past), axis=0))
-        parts += [np.broadcast_to(np.nanmean(past, axis=0), shape), np.broadcast_to(spread, shape)]
     reach = np.full(series.values.shape, _OWN_REACH)
-    return Comparison(series.unit, series.time, series.values, *parts[:2], level, *parts[2:], reach, reach)
+    samples, means = (_own_normal(values, quiet) for values in (series.values, level))
+    return Comparison(series.unit, series.time, series.values, *samples, level, *means, reach, reach)
+
+
+def _own_normal(values: FloatArray, quiet: slice) -> tuple[FloatArray, FloatArray]:
+    past, shape = values[quiet], values.shape
+    if np.count_nonzero(np.isfinite(past).all(axis=1)) < _ENOUGH:
+        return np.full(shape, np.nan), np.full(shape, np.nan)
+    spread = np.maximum(np.nanstd(past, axis=0), 1e-3 * np.nanmax(np.abs(past), axis=0))
+    return np.broadcast_to(np.nanmean(past, axis=0), shape), np.broadcast_to(spread, shape)
 
 
 def _own_offset(past: FloatArray, reach: float) -> float:
@@ -219,7 +219,7 @@ def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool]
     return min(found) if found else None
 
 
-def _first(outside: FloatArray) -> int | None:
+def _first(outside: BoolArray) -> int | None:
     """The first of the samples in succession that are outside; missing ones (False) break them."""
     if len(outside) < _SUCCESSION:
         return None

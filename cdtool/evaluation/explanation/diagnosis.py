@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.evaluation.explanation.cause import Cause, CauseKind, likely_cause
 from cdtool.evaluation.explanation.departure import Track, tracks_of
-from cdtool.evaluation.explanation.movement import Movement, which_moved_first
+from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.transient import Transient
 from cdtool.motion import MotionClass
@@ -20,11 +22,13 @@ from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
 _BEFORE = 0.9
 # Which class of motion a run is of is asked up to so long before it left the band [s].
 _LATEST = 0.1
-# After accelerating so much of the run says how far it is off anyway [s]; and at least so long departures are looked for.
+# After accelerating so much of the run says how far it is off anyway [s]; departures are looked for at least so long.
 _SETTLING, _LEAST_BEFORE = 0.3, 0.3
 # What follows an alarm tells a contact from friction: so long it is looked at [s].
 _AFTER = 0.5
 
+# Without impact-free runs a run has to have been steady: its speed within this share of its median.
+_STEADY, _ENOUGH = 0.3, 10
 # When a channel began to move is known to about this [s].
 _RESOLUTION = 0.02
 # Of channels that move at the same time the one that physically answers first comes first.
@@ -65,19 +69,21 @@ def diagnose_alarm(
 
     `own_past`: the movements against the run's own past, which count where there are no impact-free runs.
     """
-    normal = normals.of(recording, event.left - _LATEST)
-    known = isinstance(normal, NormalMotion)
-    begin = _search_begin(recording, normal, event.left) if known else event.left - _BEFORE
+    found = normals.of(recording, event.left - _LATEST)
+    absent = None if isinstance(found, NormalMotion) else found
+    normal = found if isinstance(found, NormalMotion) else None
+    begin = event.left - _BEFORE if normal is None else _search_begin(recording, normal, event.left)
     end = min(event.alarm + _AFTER, recording.end)
-    tracks = tracks_of(recording, normal if known else None, recording.joints, begin, end)
-    motion = normal.motion if known else event.motion
+    tracks = tracks_of(recording, normal, recording.joints, begin, end)
+    motion = normal.motion if normal is not None else event.motion
     leading, direction = recording.joints[motion.joint], motion.direction or 1
-    cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
-    moved = moved_channels(tracks, event.joint, begin, end, leading) if known else list(own_past)
+    cause = Cause(CauseKind.UNCLEAR)
+    if normal is not None or _steady(tracks, leading, begin):
+        cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
+    moved = list(own_past) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
     if cause.transient is not None:
-        moved = _with_transient(moved, cause.transient, tracks if known else [])
-    runs = normal.runs if known else 0
-    return Diagnosis(in_order(moved), cause, None if known else normal, runs)
+        moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
+    return Diagnosis(in_order(moved), cause, absent, normal.runs if normal is not None else 0)
 
 
 def diagnose_contact(
@@ -90,18 +96,29 @@ def diagnose_contact(
     end = min(until, recording.end)
     tracks = tracks_of(recording, normal, recording.joints, onset, end)
     leading = recording.joints[normal.motion.joint]
-    return Diagnosis(in_order(moved_channels(tracks, joint, onset, end, leading)), Cause(CauseKind.CONTACT), None, normal.runs)
+    return Diagnosis(
+        in_order(moved_channels(tracks, joint, onset, end, leading)), Cause(CauseKind.CONTACT), None, normal.runs
+    )
 
 
-def moved_channels(
-    tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str
-) -> list[Movement]:
+def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str) -> list[Movement]:
     """Every channel of the signal's joint, and those of other joints that left their normal band.
 
     The position of the joint that leads the motion is where in the stroke it is: the others are compared at that place.
     """
     found = [track.movement(begin, end) for track in tracks if track.channel not in POSITIONS or track.joint != leading]
     return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
+
+
+def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
+    """Whether the leading joint ran steadily up to `begin` [s]: only then its own past says what is normal."""
+    for track in tracks:
+        if (track.channel, track.joint) == ("speed", leading):
+            past = track.value[: track.between(begin, begin).start]
+            known = past[np.isfinite(past)]
+            middle = abs(float(np.median(known))) if len(known) >= _ENOUGH else 0.0
+            return middle > 0.0 and float(np.ptp(known)) < _STEADY * middle
+    return False
 
 
 def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:
@@ -133,8 +150,8 @@ def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequenc
         if (track.channel, track.joint) == (found.channel, found.joint):
             part = track.between(found.start, found.end)
             k = part.start + int(abs(track.value[part] - track.mean[part]).argmax())
-            numbers = {name: float(getattr(track, name)[k]) for name in ("value", "mean", "spread")}
-            told = replace(told, **numbers)
+            value, mean, spread = (float(part[k]) for part in (track.value, track.mean, track.spread))
+            told = replace(told, value=value, mean=mean, spread=spread)
     return [*others, replace(told, brief=True)]
 
 

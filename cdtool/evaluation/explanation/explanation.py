@@ -117,7 +117,9 @@ def explain_operation(
         for alarm in {*detection.verdict.alarms, *detecting}
     ]
     found += [
-        explain_miss(detection, item, activation, inputs, margins, normals) for item in matching.matches if item.alarm is None
+        explain_miss(detection, item, activation, inputs, margins, normals)
+        for item in matching.matches
+        if item.alarm is None
     ]
     return tuple(sorted(found, key=_order))
 

@@ -94,7 +94,7 @@ def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, beg
     outside = np.abs(off) > _MOVED * noise
     run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
     if not run.any():
-        return Movement(channel, joint, math.nan, reason="within its usual range")
+        return Movement(channel, joint, math.nan, reason="no departure found")
     first = int(np.argmax(run))
     upward = bool(off[first] > 0.0)
     calm = np.flatnonzero((off if upward else -off)[:first] <= _BACK_TO * noise[:first])

@@ -15,7 +15,7 @@ from cdtool.recording import FloatArray, Recording, Series
 # is a pulse.
 _MEDIAN_SECONDS, _MEDIAN_SAMPLES = 0.07, 7
 # A pulse is this many of the channel's own noises off its running median; an accelerometer's noise swings.
-_PULSE_OUT, _KNOCK_OUT = 6.5, 10.0
+_PULSE_OUT, _KNOCK_OUT = 6.5, 8.0
 # Samples outside less than this apart are one transient [s].
 _TOGETHER = 0.02
 # 95 % of Gaussian noise stays within so many of its standard deviations.
@@ -70,7 +70,9 @@ def transients(
     off = values - running_median(time, values)
     # Of a monotonous piece the running median is the piece itself: the middle of what is off says nothing.
     before = np.abs(off[time < begin])
-    noise = max(float(np.percentile(before if len(before) else np.abs(off), 95.0)) / _TWO_SIDED, _ROUNDING * _step(values))
+    noise = max(
+        float(np.percentile(before if len(before) else np.abs(off), 95.0)) / _TWO_SIDED, _ROUNDING * _step(values)
+    )
     noise = max(noise, least)
     if not noise > 0.0:
         noise = 1e-9 * max(float(np.abs(values).max()), 1e-300)
@@ -90,8 +92,10 @@ def transients(
         if not begin <= time[first] <= end:
             continue
         rings = bool((part < -0.3 * abs(height)).any() and (part > 0.3 * abs(height)).any())
-        steps = np.diff(time[first : last + 2], append=time[last]) if last + 1 >= len(time) else np.diff(
-            time[first : last + 2]
+        steps = (
+            np.diff(time[first : last + 2], append=time[last])
+            if last + 1 >= len(time)
+            else np.diff(time[first : last + 2])
         )
         area = float(np.sum(part * steps[: len(part)]))
         found.append(
