@@ -5,6 +5,7 @@ No detector and no threshold reads it: it is what an explanation compares a run 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -13,9 +14,8 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.motion import MotionClass
+from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
-from cdtool.thresholds.alignment import Progress, progress
-from cdtool.thresholds.fitted_signature import RUNNING_SHARE, START_SHARE
 from cdtool.thresholds.signature_curve import Curve, resample
 
 CHANNELS = (*MEASURED, *REFERENCES)
@@ -32,6 +32,8 @@ LEAST_RUNS = 3
 
 # Grid and window over time while accelerating [s]; along the travel [s at the nominal speed]; of a position [s].
 _TIME, _TRAVEL, _POSITION = (0.01, 0.03), (0.05, 0.1), (0.05, 0.1)
+# Numbers are stored to so many digits of the largest.
+_DIGITS = 6
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
 # A spread is at least this share of the largest mean: a channel that is computed may not vary at all, and a command
@@ -299,7 +301,7 @@ def _learn_curves(
             resample(_signal(clock, value), where, curve, axis)
             for clock, value, where, axis in zip(clocks, values, wheres, axes, strict=True)
         ]
-        return curve.learned(np.array(runs))
+        return _rounded(curve.learned(np.array(runs)))
 
     step, window = _POSITION if over_time else _TIME
     reach = longest if over_time else _TIME_RESERVE * longest
@@ -312,6 +314,17 @@ def _learn_curves(
     distances = [curves.distances(value, where) for value, where in zip(values, wheres, strict=True)]
     by_time_most, along_most = (np.percentile([item[i] for item in distances], _MOST, axis=0) for i in (0, 1))
     return replace(curves, farthest_by_time=by_time_most, farthest_by_travel=along_most)
+
+
+def _rounded(curve: Curve) -> Curve:
+    """The same to `_DIGITS` digits: spreads are known far worse, and files are read by people."""
+
+    def short(values: FloatArray) -> FloatArray:
+        size = np.abs(values).max(initial=0.0)
+        decimals = _DIGITS - 1 - math.floor(math.log10(size)) if size > 0.0 else 0
+        return np.round(values, decimals)
+
+    return replace(curve, mean=short(curve.mean), squares=short(curve.squares))
 
 
 def _looked_up(curve: Curve, axis: FloatArray) -> tuple[FloatArray, FloatArray]:

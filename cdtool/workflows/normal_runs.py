@@ -6,27 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from statistics import median
 
+from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion
-
-# Speeds of one class differ by at most this share.
-_TOLERANCE = 0.1
+from cdtool.workflows.grouping import by_class
 
 
 def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
-    """The normal motion of each class of motion of which there are enough runs with speed and position."""
-    classes: list[list[Operation]] = []
-    for operation in operations:
-        for members in classes:
-            if operation.motion.matches(members[0].motion, _TOLERANCE):
-                members.append(operation)
-                break
-        else:
-            classes.append([operation])
+    """Return the normal motion of each class of motion of which there are enough runs with speed and position."""
+    able = [item for item in operations if "speed" in item.recording and "position" in item.recording]
     learned = []
-    for members in classes:
-        motion = replace(members[0].motion, nominal_speed=median(item.motion.nominal_speed for item in members))
+    for members in by_class(able)[0] if able else []:
+        classes = [measured_class(item.recording) for item in members]
+        motion = replace(classes[0], nominal_speed=median(item.nominal_speed for item in classes))
         normal = learn_normal_motion([item.recording.without_ground_truth() for item in members], motion)
         if normal is not None:
             learned.append(normal)
@@ -36,12 +30,16 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
 def with_operation(
     file: SignatureFile, operation: Operation, cap: float, forget: float | None
 ) -> tuple[NormalMotion, ...] | None:
-    """A file's normal motions with one more impact-free operation in that of its class; None where it has none."""
+    """Return a file's normal motions with one more impact-free operation in that of its class; None where it has none.
+
+    The run is clipped to `cap` spreads and counts as it does in the signature (`forget`).
+    """
     if file.normal is None:
         return None
     recording, motions = operation.recording.without_ground_truth(), list(file.normal)
+    motion = measured_class(recording)
     for i, normal in enumerate(motions):
-        if normal.motion.matches(operation.motion, _TOLERANCE) and normal.serves(recording):
+        if normal.motion.matches(motion, SPEED_TOLERANCE) and normal.serves(recording):
             motions[i] = normal.with_run(recording, cap, forget)
             break
     return tuple(motions)
