@@ -76,7 +76,7 @@ def changed(recording: Recording, channel: str, change: Callable[[np.ndarray, np
 
 
 def glitch(recording: Recording, height: float, start: float = 4.0, length: float = 0.006) -> Recording:
-    """The speed is off by `height` for `length` from `start` [s]."""
+    """The speed is off by `height` for `length` from `start` [s]; downward it looks to an observer like a contact."""
 
     def added(time: np.ndarray, values: np.ndarray) -> np.ndarray:
         values[(time >= start) & (time < start + length), 0] += height
@@ -106,22 +106,21 @@ def test_every_channel_that_left_its_band_is_told_with_value_mean_spread_and_uni
 
 
 def test_a_glitch_of_sixty_revolutions_a_minute_that_alone_raised_the_alarm_is_named(gate):
-    clean = log("gate", "holdout/01.csv")
-    ratio = 1.333e-3
-    log_with = glitch(clean, 60.0 * 2.0 * np.pi / 60.0 * ratio)
-    item = explained("gate", log_with, gate, 255.0, activation=Activation(2))
+    clean = log("gate", "holdout/03.csv")
+    height = -60.0 * 2.0 * np.pi / 60.0 * 1.333e-3  # 60 rpm of the motor, on the load side
+    item = explained("gate", glitch(clean, height), gate, 255.0, activation=Activation(2))
     assert item.cause.kind is CauseKind.SPEED_GLITCH and item.alarm.time == pytest.approx(4.0, abs=0.02)
     assert item.cause.transient is not None
     assert item.cause.transient.start == pytest.approx(4.0, abs=3e-3)
-    assert item.cause.transient.height == pytest.approx(60.0 * 2.0 * np.pi / 60.0 * ratio, rel=0.15)
+    assert item.cause.transient.height == pytest.approx(height, rel=0.15)
     first = item.moved[0]
     assert (first.channel, first.brief) == ("speed", True)
     assert any(line.startswith("Likely cause: a glitch of the speed sensor") for line in words(item))
 
 
 def test_a_speed_that_the_position_confirms_is_no_glitch(gate):
-    clean = log("gate", "holdout/01.csv")
-    height, start, length = 0.03, 4.0, 0.006
+    clean = log("gate", "holdout/03.csv")
+    height, start, length = -0.03, 4.0, 0.006
     moved = glitch(clean, height, start, length)
 
     def follow(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -142,7 +141,7 @@ def test_the_load_cell_is_no_input_of_the_cause(gate):
 
 
 def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number(gate):
-    clean = log("gate", "holdout/01.csv")
+    clean = log("gate", "holdout/03.csv")
     parts = {}
     for name, series in clean.channels.items():
         gone = (series.time > 4.0) & (series.time < 4.021)
@@ -165,16 +164,16 @@ def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number
 
 
 def test_a_quiet_channel_is_told_as_within_its_usual_range_with_its_numbers(gate):
-    clean = log("gate", "holdout/01.csv")
-    item = explained("gate", glitch(clean, 0.02), gate, 255.0, activation=Activation(2))
+    clean = log("gate", "holdout/03.csv")
+    item = explained("gate", glitch(clean, -0.02), gate, 255.0, activation=Activation(2))
     torque = next(found for found in item.moved if found.channel == "torque")
     assert torque.reason == "within its usual range" and math.isnan(torque.time)
     assert abs(torque.value - torque.mean) < 5.0 * torque.spread
 
 
 def test_a_torque_that_is_off_from_the_start_is_never_called_usual(gate):
-    clean = changed(log("gate", "holdout/01.csv"), "torque", lambda _, values: values + 150.0)
-    item = explained("gate", glitch(clean, 0.05), gate, 500.0, activation=Activation(2))
+    clean = changed(log("gate", "holdout/03.csv"), "torque", lambda _, values: values + 150.0)
+    item = explained("gate", glitch(clean, -0.05), gate, 500.0, activation=Activation(2))
     torque = next(found for found in item.moved if found.channel == "torque")
     assert torque.reason != "within its usual range"
 
@@ -205,7 +204,7 @@ def test_a_stroke_of_another_speed_is_compared_with_no_class_that_was_learned(ga
 
 
 def test_an_alarm_without_any_departure_is_not_clear(gate):
-    item = explained("gate", log("gate", "holdout/01.csv"), gate, 215.0, activation=Activation(1))
+    item = explained("gate", log("gate", "holdout/03.csv"), gate, 215.0, activation=Activation(1))
     assert item.cause.kind in (CauseKind.UNCLEAR, CauseKind.FRICTION)
     if item.cause.kind is CauseKind.UNCLEAR:
         assert "Likely cause: not clear." in words(item)
