@@ -83,7 +83,7 @@ def diagnose_alarm(
     moved = list(own_past) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
     if cause.transient is not None:
         moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
-    return Diagnosis(in_order(moved), cause, absent, normal.runs if normal is not None else 0)
+    return Diagnosis(in_order(moved, event.joint), cause, absent, normal.runs if normal is not None else 0)
 
 
 def diagnose_contact(
@@ -97,7 +97,7 @@ def diagnose_contact(
     tracks = tracks_of(recording, normal, recording.joints, onset, end)
     leading = recording.joints[normal.motion.joint]
     return Diagnosis(
-        in_order(moved_channels(tracks, joint, onset, end, leading)), Cause(CauseKind.CONTACT), None, normal.runs
+        in_order(moved_channels(tracks, joint, onset, end, leading), joint), Cause(CauseKind.CONTACT), None, normal.runs
     )
 
 
@@ -129,14 +129,19 @@ def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> fl
     return max(left - _BEFORE, min(settled, left - _LEAST_BEFORE))
 
 
-def in_order(moved: Sequence[Movement]) -> tuple[Movement, ...]:
-    """By time, those that did not move behind them; a position, an integral, not shortly before its own speed."""
+def in_order(moved: Sequence[Movement], joint: str) -> tuple[Movement, ...]:
+    """By time, those that did not move behind them; not shortly before what they follow.
+
+    A position, an integral, follows its own speed; another joint follows the signal's.
+    """
     speeds = {item.joint: item.time for item in moved if item.channel == "speed" and not math.isnan(item.time)}
 
     def place(item: Movement) -> tuple[bool, float, int]:
         time = item.time
         if item.channel == "position" and 0.0 < speeds.get(item.joint, -math.inf) - time < _RESOLUTION:
             time = speeds[item.joint]
+        if (joint,) != WHOLE_MACHINE and item.joint != joint:
+            time += _RESOLUTION
         return math.isnan(time), time, _ORDER.index(item.channel)
 
     return tuple(sorted(moved, key=place))
