@@ -1,4 +1,4 @@
-"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py tries five, and 100 alarms a seed."""
+"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py tries five and 100 alarms."""
 
 from __future__ import annotations
 

@@ -241,3 +241,22 @@ def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
     monkeypatch.setenv("COLUMNS", "70")
     assert module.columns_to_fill() == 100
+
+
+def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feekf_signature, tmp_path):
+    copy = tmp_path / "gate.json"
+    copy.write_bytes(feekf_signature.read_bytes())
+    before = json.loads(copy.read_text())["normal_motion"][0]
+    done = cdtool("signature", "update", copy, gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml")
+    assert done.status == 0, done.err
+    after = json.loads(copy.read_text())["normal_motion"][0]
+    assert (before["runs"], after["runs"]) == (11, 12)
+    one, other = (item["channels"]["torque"]["samples"]["by_travel"]["mean"][50][0] for item in (before, after))
+    assert one != other and other == pytest.approx(one, rel=0.05)
+
+
+def test_a_benchmark_explains_its_events_against_the_runs_it_learned_from(gate_folder):
+    done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
+    told = [line for trace in done.traces for panel in trace.panels for line in panel.explanation]
+    assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]
+    assert any(line.startswith("Likely cause: a contact") for line in told)

@@ -134,7 +134,7 @@ def test_a_speed_that_the_position_confirms_is_no_glitch(gate):
 def test_the_load_cell_is_no_input_of_the_cause(gate):
     whole = log("gate", "stiff/03.csv")
     bare = whole.without_ground_truth()
-    wild = changed(whole, "force", lambda time, values: 1e4 * np.sin(40.0 * time)[:, np.newaxis])
+    wild = changed(whole, "force", lambda time, _: 1e4 * np.sin(40.0 * time)[:, np.newaxis])
     found = [explained("gate", item, gate, 300.0) for item in (whole, bare, wild)]
     assert found[0].cause == found[1].cause == found[2].cause
     assert found[0].moved == found[1].moved == found[2].moved
