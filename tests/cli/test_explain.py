@@ -257,6 +257,6 @@ def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feek
 
 def test_a_benchmark_explains_its_events_against_the_runs_it_learned_from(gate_folder):
     done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
-    told = [line for trace in done.traces for panel in trace.panels for line in panel.explanation]
+    told = [line for trace in done.traces for panel in trace.panels for line in panel.why]
     assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]
     assert any(line.startswith("Likely cause: a contact") for line in told)
