@@ -13,6 +13,7 @@ from cdtool.machine_file import fingerprint
 from cdtool.plain_text import counted, digits
 from cdtool.plausible import PlausibleRanges
 from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.normal_motion import NormalMotion
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,9 @@ class SignatureFile:
 
     `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
     first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
-    `operations`: how the logs were cut. `plausible`: what values the runs' channels had; None in older files.
+    `operations`: how the logs were cut. `plausible`: what values the runs' channels had; None in older files. `normal`:
+    what every channel looks like in the runs, one for each class of motion with enough of them; None in a file that
+    was written before there was such a thing.
     """
 
     machine: str
@@ -69,6 +72,7 @@ class SignatureFile:
     operations: str = "whole"
     source: str = ""
     plausible: PlausibleRanges | None = None
+    normal: tuple[NormalMotion, ...] | None = ()
 
     @property
     def threshold(self) -> str:
@@ -116,9 +120,19 @@ class SignatureFile:
                 )
 
 
-def with_run(signature: SignatureFile, index: int, updated: FittedThreshold, run: LearnedRun) -> SignatureFile:
-    """The file with the class at `index` replaced and the run noted; the first signature stays."""
+def with_run(
+    signature: SignatureFile,
+    index: int,
+    updated: FittedThreshold,
+    run: LearnedRun,
+    normal: tuple[NormalMotion, ...] | None = None,
+) -> SignatureFile:
+    """The file with the class at `index` and the normal motions replaced, and the run noted; the first signature stays.
+
+    Without `normal` the file keeps its own.
+    """
     current = list(signature.current)
     current[index] = updated
     origin = replace(signature.origin, added=signature.origin.added + 1)
-    return replace(signature, current=tuple(current), runs=(*signature.runs, run), origin=origin)
+    changed = replace(signature, current=tuple(current), runs=(*signature.runs, run), origin=origin)
+    return changed if normal is None else replace(changed, normal=normal)

@@ -19,11 +19,12 @@ from cdtool.plausible import PlausibleRanges
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.fitted_signature import known
+from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
 SCHEMA_VERSION = 4
-# Version 3 is without plausible ranges.
-_READ = (3, SCHEMA_VERSION)
+# Version 3 has no normal motions, plausible ranges and speed courses; all else is the same.
+_READABLE = (3, SCHEMA_VERSION)
 _KIND = "cdtool signature"
 # Every signature file begins with it: `_to_json` names its kind first.
 MARK = f'"kind": "{_KIND}"'.encode()
@@ -73,9 +74,10 @@ def read_signature(path: str | Path) -> SignatureFile:
         ) from fault
     if not isinstance(values, dict) or values.get("kind") != _KIND:
         raise SignatureError(f"{file}: not a signature file", "make one with cdtool learn-signature")
-    if values.get("schema_version") not in _READ:
+    if values.get("schema_version") not in _READABLE:
         raise SignatureError(
-            f"{file}: schema_version is {values.get('schema_version')}, this cdtool knows {SCHEMA_VERSION}",
+            f"{file}: schema_version is {values.get('schema_version')}, this cdtool knows "
+            f"{' and '.join(map(str, _READABLE))}",
             "learn it again with this version",
         )
     try:
@@ -121,6 +123,7 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "runs": [asdict(run) for run in signature.runs],
         "current": [fitted_to_dict(signature.rule, item) for item in signature.current],
         "first": [fitted_to_dict(signature.rule, item) for item in signature.first],
+        "normal_motion": None if signature.normal is None else [item.to_dict() for item in signature.normal],
     }
 
 
@@ -129,6 +132,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
     current, first = (tuple(fitted_from_dict(rule, item) for item in values[name]) for name in ("current", "first"))
     joints = tuple(map(str, values["joints"]))
     _check_fitted(current, first, joints)
+    normal = values.get("normal_motion") if values["schema_version"] > 3 else None
     return SignatureFile(
         machine=str(values["machine"]["name"]),
         machine_fingerprint=str(values["machine"]["fingerprint"]),
@@ -145,6 +149,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         operations=known("operations", values["operations"], HOW_TO_CUT),
         source=source,
         plausible=PlausibleRanges.from_dict(values["plausible"]) if values.get("plausible") else None,
+        normal=None if normal is None else tuple(NormalMotion.from_dict(item) for item in normal),
     )
 
 

@@ -16,6 +16,7 @@ from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.signature_store import read_signature, update_signature, write_signature
+from cdtool.thresholds.normal_motion import learn_normal_motion
 from cdtool.thresholds.signature import Signature
 
 RULE = Signature(position_step=0.02, position_window=0.1)
@@ -52,6 +53,40 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
     assert values["schema_version"] == 4 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+
+
+def test_what_normal_runs_look_like_is_stored_with_it(tmp_path, learned, simulated):
+    recordings = [simulated("none", seed) for seed in range(10, 14)]
+    normal = learn_normal_motion(recordings, learned.current[0].motion.without_course)
+    assert normal is not None
+    path = tmp_path / "s.json"
+    write_signature(path, replace(learned, normal=(normal,)))
+    (loaded,) = read_signature(path).normal or ()
+    one, other = (item.compare(recordings[0], "torque") for item in (normal, loaded))
+    assert (loaded.motion, loaded.runs, loaded.joints) == (normal.motion, 4, normal.joints)
+    assert (one.mean[3000], one.spread[3000]) == (other.mean[3000], other.spread[3000])
+
+
+def test_a_file_of_version_3_is_still_read_and_has_no_normal_motions(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    values = json.loads(path.read_text())
+    del values["normal_motion"]
+    path.write_text(json.dumps({**values, "schema_version": 3}))
+    loaded = read_signature(path)
+    assert loaded.normal is None and loaded.current[0].to_dict() == learned.current[0].to_dict()
+    write_signature(path, loaded)  # an update: version 4 from now on, and still nothing to compare with
+    assert json.loads(path.read_text())["schema_version"] == 4 and read_signature(path).normal is None
+
+
+def test_normal_motions_that_are_none_are_a_damaged_file(tmp_path, learned):
+    path = tmp_path / "s.json"
+    write_signature(path, learned)
+    values = json.loads(path.read_text())
+    for wrong in ([{}], [{"joints": ["a"], "channels": {"force": {}}}], 7):
+        path.write_text(json.dumps({**values, "normal_motion": wrong}))
+        with pytest.raises(SignatureError, match="damaged signature file"):
+            read_signature(path)
 
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):

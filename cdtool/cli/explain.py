@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,6 +30,7 @@ from cdtool.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.explanation.cause import Cause
     from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
     from cdtool.evaluation.explanation.margin import Moment
     from cdtool.workflows.explaining import Explained
@@ -172,6 +174,16 @@ def _alarm_as_json(item: AlarmExplanation) -> dict[str, Any]:
         "onset_s": item.contact.start if item.contact else None,
         "left_band_s": item.left,
         "missing_samples_skipped": item.skipped,
+        "likely_cause": _cause_as_json(item.cause),
+    }
+
+
+def _cause_as_json(cause: Cause) -> dict[str, Any]:
+    return {
+        "kind": str(cause.kind),
+        "shifts": [asdict(shift) for shift in cause.shifts],
+        "transient": asdict(cause.transient) if cause.transient else None,
+        "lost": asdict(cause.loss) if cause.loss else None,
     }
 
 
@@ -208,6 +220,8 @@ def _common(item: Explanation) -> dict[str, Any]:
         "debounce_samples": item.debounce,
         "words": words(item),
         "detector_reads": list(item.inputs),
+        "compared_with_runs": item.runs,
+        "not_compared_because": str(item.absent) if item.absent else None,
         "moved": [
             {
                 "channel": found.channel,
@@ -215,6 +229,11 @@ def _common(item: Explanation) -> dict[str, Any]:
                 "time_s": found.time,
                 "direction": found.direction or None,
                 "reason": found.reason or None,
+                "unit": found.unit or None,
+                "value": found.value,
+                "normal_mean": found.mean,
+                "normal_spread": found.spread,
+                "brief": found.brief,
             }
             for found in item.moved
         ],

@@ -8,6 +8,7 @@ that such a machine is plausible, not that it is the thesis's machine.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +20,7 @@ from cdtool.simulation import gate_kernel, sensors
 
 Array = npt.NDArray[np.float64]
 Impact = Literal["none", "stiff", "soft"]
+Friction = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -148,13 +150,18 @@ class GateRun:
 
 
 def simulate_gate_run(
-    parameters: GateParameters, rng: np.random.Generator, impact: Impact, substeps: int = 5
+    parameters: GateParameters,
+    rng: np.random.Generator,
+    impact: Impact,
+    substeps: int = 5,
+    added_friction: Friction | None = None,
 ) -> GateRun:
     """Simulate one stroke from rest, free or against a stiff or soft (bumper) obstacle.
 
     All random numbers are drawn before the integration, sample by sample: the same seed gives the same run up
     to the contact whatever `impact` is, and the same noise whatever `substeps` (of a log period) is. A free
-    stroke keeps nominal speed to the end of its log. Raises `UsageError` for unknown `impact`, `substeps` < 1.
+    stroke keeps nominal speed to the end of its log. `added_friction`: a force on the leaf against its travel [N], of
+    the log's time [s]. Raises `UsageError` for unknown `impact`, `substeps` < 1.
     """
     if impact not in gate_kernel.CONTACT_KINDS:
         raise UsageError(f"unknown impact {impact!r}", "Choose one of: none, stiff, soft.")
@@ -172,6 +179,8 @@ def simulate_gate_run(
     noise = rng.standard_normal((time.size, 5))
     reference_speed = parameters.reference_speed(time)
     disturbance = sensors.coloured_noise(noise[:, 0], parameters.disturbance_force, parameters.disturbance_rate, period)
+    if added_friction is not None:
+        disturbance -= added_friction(time)
     truth, first_contact = integrate_gate(parameters, np.zeros(7), reference_speed, disturbance, run, impact, substeps)
     return _measure(parameters, time, reference_speed, truth, noise, first_contact)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
@@ -34,6 +35,7 @@ from cdtool.workflows.benchmark_file import (
 )
 from cdtool.workflows.calibration import learn_thresholds, that_can_run
 from cdtool.workflows.gathering import Gathering
+from cdtool.workflows.normal_runs import normal_motions
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
 from cdtool.workflows.scoring import Scored, detect_with, score_log
 from cdtool.workflows.threshold_settings import set_by_hand
@@ -98,7 +100,11 @@ def benchmark(
     detect = detect_with(setup, used, learned.thresholds, learned.lacking, max(HOLD, longest))
     factors = _factors(setup, learned.thresholds)
     gathered = Gathering(
-        setup, setup.detectors, factors, {op.recording.digest: op.recording.name for op in learn.operations}
+        setup,
+        setup.detectors,
+        factors,
+        {op.recording.digest: op.recording.name for op in learn.operations},
+        NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS),
     )
     gathered.skipped += [*learn.skipped, *learned.skipped]
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.lacking.items()]

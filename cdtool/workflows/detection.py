@@ -11,6 +11,7 @@ import numpy as np
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.truth.matching import Matching, belongs, match, windows
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -33,6 +34,7 @@ class Detected:
     `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `threshold` says in
     words what was held against the signal, `activation` is what raised the alarms. `learned`: the signature was learned
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
+    `normals`: what impact-free runs look like, or why that is not known.
     """
 
     recording: Recording
@@ -43,6 +45,7 @@ class Detected:
     activation: Activation = field(default_factory=Activation)
     learned: bool = False
     window: float = 1.0
+    normals: NormalMotions = field(default_factory=NormalMotions)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -76,6 +79,7 @@ def detect(
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
+    normals = NormalMotions(absent=Absence.BY_HAND)
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
@@ -85,6 +89,7 @@ def detect(
         thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
+        normals = NormalMotions(stored.normal or (), Absence.OLDER_FILE if stored.normal is None else Absence.FEW_RUNS)
     else:
         if detector is None:
             raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
@@ -106,7 +111,15 @@ def detect(
         for item in detections
     )
     return Detected(
-        recording, detections, contacts, matchings, described, raised_by, recording.digest in learned, window
+        recording,
+        detections,
+        contacts,
+        matchings,
+        described,
+        raised_by,
+        recording.digest in learned,
+        window,
+        normals,
     )
 
 

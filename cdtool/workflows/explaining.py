@@ -12,6 +12,7 @@ from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
 from cdtool.workflows.detection import Detected, detect
+from cdtool.workflows.detector_inputs import inputs_of
 
 
 @dataclass(frozen=True)
@@ -59,14 +60,9 @@ def explain(
         window=window,
     )
     explanations = tuple(
-        explain_operation(detection, matching, found.activation, _inputs(detection.detector, machine_file))
+        explain_operation(
+            detection, matching, found.activation, inputs_of(detection.detector, machine_file), found.normals
+        )
         for detection, matching in zip(found.detections, found.matchings, strict=True)
     )
     return Explained(found, explanations)
-
-
-def _inputs(detector: str, machine_file: MachineFile) -> tuple[str, ...]:
-    """The channels that a detector reads: a model of coupled joints needs the pose as well."""
-    needs: tuple[str, ...] = machine_file.detector(detector).needs
-    posed = machine_file.machine.coupled and "speed" in needs and "position" not in needs
-    return (*needs, "position") if posed else needs

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from cdtool.activation import Activation
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.evaluation.explanation.explanation import explain_operation
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.words import words
 from cdtool.evaluation.force.verdict import ForceVerdict
 from cdtool.evaluation.results import CalibrationResult, RecordingResult, Results, Skipped
@@ -19,6 +19,7 @@ from cdtool.pipeline import Detection
 from cdtool.recording import Finding, FloatArray
 from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.counting import Exposure, SweepRows
+from cdtool.workflows.detector_inputs import inputs_of
 from cdtool.workflows.force_rows import point_rows
 from cdtool.workflows.impact_free import unchecked
 from cdtool.workflows.judged import Judged
@@ -28,15 +29,22 @@ from cdtool.workflows.scoring import Scored
 class Gathering:
     """The rows of a benchmark, log by log in the order of the file, and the traces that are kept.
 
-    `names` are the detectors; `learned` has the hashes of the logs learned from, with their names.
+    `names` are the detectors; `learned` has the hashes of the logs learned from, with their names; `normals` is what
+    these look like.
     """
 
     def __init__(
-        self, setup: BenchmarkFile, names: Sequence[str], factors: Mapping[str, FloatArray], learned: Mapping[str, str]
+        self,
+        setup: BenchmarkFile,
+        names: Sequence[str],
+        factors: Mapping[str, FloatArray],
+        learned: Mapping[str, str],
+        normals: NormalMotions = NormalMotions(absent=Absence.FEW_RUNS),  # noqa: B008
     ) -> None:
         self.setup = setup
         self.names = tuple(names)
         self.learned = learned
+        self.normals = normals
         self.scored: list[Scored] = []
         self.skipped: list[Skipped] = []
         self.findings: list[Skipped] = []
@@ -64,7 +72,7 @@ class Gathering:
                 self.units.setdefault(detection.detector, detection.statistic.unit)
                 self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
                 self._sweep.add(group, detection, swept, matching)
-            _offer(self._choice, self._logs - 1, judged, self.setup.activation)
+            _offer(self._choice, self._logs - 1, judged, self.setup, self.normals)
         for name in {detection.detector for judged in scored.judged for detection in judged.detections}:
             self._exposure[group, name].recordings += 1
         if scored.recording.point:
@@ -116,7 +124,7 @@ class Gathering:
             )
 
 
-def _offer(choice: TraceChoice, number: int, judged: Judged, activation: Activation) -> None:
+def _offer(choice: TraceChoice, number: int, judged: Judged, setup: BenchmarkFile, normals: NormalMotions) -> None:
     pairs = list(zip(judged.detections, judged.matchings, strict=True))
     missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
     false = [item.detector for item, made in pairs if made.false_alarms]
@@ -131,15 +139,17 @@ def _offer(choice: TraceChoice, number: int, judged: Judged, activation: Activat
             judged.contacts,
             judged.detections,
             judged.matchings,
-            [_explained(detection, matching, activation) for detection, matching in pairs],
+            [_explained(detection, matching, setup, normals) for detection, matching in pairs],
             why,
         )
 
     choice.offer(number, judged.group, len(judged.detections), "; ".join(words), slowest, make)
 
 
-def _explained(detection: Detection, matching: Matching, activation: Activation) -> list[str]:
+def _explained(detection: Detection, matching: Matching, setup: BenchmarkFile, normals: NormalMotions) -> list[str]:
     """Why each alarm came and each contact was missed; nothing of alarms that came from elsewhere."""
     if detection.threshold is None:
         return []
-    return [line for item in explain_operation(detection, matching, activation) for line in words(item)]
+    inputs = inputs_of(detection.detector, setup.machine_file)
+    found = explain_operation(detection, matching, setup.activation, inputs, normals)
+    return [line for item in found for line in words(item)]

@@ -19,6 +19,7 @@ from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.fitting import fitting, for_machine, signals_of
+from cdtool.workflows.normal_runs import normal_motions
 from cdtool.workflows.runs import Progress, check_joints, load_runs
 from cdtool.workflows.threshold_settings import set_by_hand
 
@@ -87,6 +88,7 @@ def learn_signature(
         runs=tuple(learned_run(operation) for operation in fitted.used),
         operations=operations,
         plausible=runs.ranges,
+        normal=normal_motions(fitted.used),
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)

@@ -27,6 +27,7 @@ from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.fitting import Pair, signals_of
 from cdtool.workflows.learning import learned_run
+from cdtool.workflows.normal_runs import with_operation
 from cdtool.workflows.runs import Progress, load_runs
 
 # The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
@@ -252,4 +253,5 @@ def _with_operation(
     recording = operation.recording.without_ground_truth()
     forget, cap, reserve = guard
     signal = run_detector(operation, machine, detector, file.joints)
-    return with_run(file, index, guarded(first, current, recording, signal, forget, cap, reserve), run)
+    updated = guarded(first, current, recording, signal, forget, cap, reserve)
+    return with_run(file, index, updated, run, with_operation(file, operation, cap, forget))

@@ -52,7 +52,10 @@ def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_firs
     assert "ms after the contact (onset at" in told and "load cell)" in told
     assert "gate: above its upper limit" in told and "needs 9 samples outside in succession" in told
     assert "Moved first: acceleration down" in told
-    assert "Within their usual range: reference_position, reference_speed." in told
+    assert "Likely cause: a contact: speed of gate" in told and "N where" in told
+    assert "Compared with 11 impact-free runs at the same place of the motion." in told
+    assert "References:" in told and "reference_speed within the usual range" in told
+    assert "speed down" in told and "speed" not in told.partition("Within their usual range")[2].partition(".")[0]
     rows = margins(done.out)
     assert [row[1] for row in rows if row[0] != 0.0] == pytest.approx([-100, -50, -20, -10, -5, 0])
     for _, _, signal, limit, margin, share in rows:
@@ -98,7 +101,31 @@ def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
     assert near["nearest"]["share_of_limit"] == pytest.approx(abs(near["nearest"]["statistic"]) / 30.0)
     assert near["outside_before_contact_from_s"] is None
     still = [item for item in missed["moved"] if item["time_s"] is None]
-    assert {item["reason"] for item in still} == {"within its usual range"}
+    assert {item["reason"] for item in still} == {"no departure found"}
+    assert missed["not_compared_because"] == "limits set by hand" and missed["compared_with_runs"] == 0
+
+
+def test_the_json_has_the_cause_and_what_every_channel_was_compared_with(explain, feekf_signature):
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    cause = alarm["likely_cause"]
+    assert cause["kind"] == "contact" and cause["transient"] is None and cause["lost"] is None
+    assert [shift["channel"] for shift in cause["shifts"]] == ["speed", "torque"]
+    assert alarm["not_compared_because"] is None and alarm["compared_with_runs"] > 5
+    for item in alarm["moved"]:
+        assert item["normal_spread"] > 0.0 and item["unit"]
+        if item["time_s"] is not None:
+            assert abs(item["value"] - item["normal_mean"]) > 3.0 * item["normal_spread"]
+
+
+def test_a_signature_file_of_before_says_how_to_learn_what_is_normal(explain, feekf_signature, tmp_path):
+    values = json.loads(feekf_signature.read_text())
+    del values["normal_motion"]
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps({**values, "schema_version": 3}))
+    told = " ".join(explain("stiff/01.csv", "-s", old).out.split())
+    assert "Compared with this log's own past alone: this signature file was written before" in told
+    assert "learn it again with cdtool learn-signature" in told
+    assert "usual range" not in told
 
 
 def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_folder):
@@ -214,3 +241,22 @@ def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
     monkeypatch.setenv("COLUMNS", "70")
     assert module.columns_to_fill() == 100
+
+
+def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feekf_signature, tmp_path):
+    copy = tmp_path / "gate.json"
+    copy.write_bytes(feekf_signature.read_bytes())
+    before = json.loads(copy.read_text())["normal_motion"][0]
+    done = cdtool("signature", "update", copy, gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml")
+    assert done.status == 0, done.err
+    after = json.loads(copy.read_text())["normal_motion"][0]
+    assert (before["runs"], after["runs"]) == (11, 12)
+    one, other = (item["channels"]["torque"]["samples"]["by_travel"]["mean"][50][0] for item in (before, after))
+    assert one != other and other == pytest.approx(one, rel=0.05)
+
+
+def test_a_benchmark_explains_its_events_against_the_runs_it_learned_from(gate_folder):
+    done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
+    told = [line for trace in done.traces for panel in trace.panels for line in panel.why]
+    assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]
+    assert any(line.startswith("Likely cause: a contact") for line in told)

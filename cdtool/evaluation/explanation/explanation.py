@@ -11,8 +11,11 @@ import numpy as np
 from cdtool.activation import Activation
 from cdtool.detection import Alarm
 from cdtool.errors import UsageError
+from cdtool.evaluation.explanation.cause import Cause
+from cdtool.evaluation.explanation.diagnosis import Event, diagnose_alarm, diagnose_contact
 from cdtool.evaluation.explanation.margin import Approach, JointMargin, Moment, joint_margins
 from cdtool.evaluation.explanation.movement import Movement, which_moved_first
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import GROUND_TRUTH, Contact
@@ -33,7 +36,9 @@ class AlarmExplanation:
     """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` samples in succession.
 
     `skipped` samples were missing among them. `contact` is the one that the alarm belongs to. `moved` are the channels
-    of the joint in the order in which they moved; `inputs` names those that the detector needs.
+    in the order in which they moved; `inputs` names those that the detector needs. `cause` is the likely one, of which
+    neither load cell nor labels were asked. `runs`: how many impact-free runs the channels were compared with; where
+    none, `absent` is why, and the log's own past had to do.
     """
 
     operation: str
@@ -48,7 +53,10 @@ class AlarmExplanation:
     skipped: int
     moments: tuple[Moment, ...]
     moved: tuple[Movement, ...]
-    inputs: tuple[str, ...] = ()
+    inputs: tuple[str, ...]
+    cause: Cause
+    runs: int = 0
+    absent: Absence | None = None
 
     @property
     def zero(self) -> float:
@@ -61,7 +69,8 @@ class MissExplanation:
     """Why a contact was missed, or could not be assessed (`reason`): how near each joint came, the nearest first.
 
     `watched` [s]: how long after the onset an alarm would have counted. `not_judged`: share of the samples there that
-    could not be judged, by reason. `joint` is the nearest one, of which `moments` and `moved` tell.
+    could not be judged, by reason. `joint` is the nearest one, of which `moments` and `moved` tell. `runs` and `absent`
+    are those of an alarm.
     """
 
     operation: str
@@ -77,7 +86,9 @@ class MissExplanation:
     approaches: tuple[Approach, ...]
     moments: tuple[Moment, ...]
     moved: tuple[Movement, ...]
-    inputs: tuple[str, ...] = ()
+    inputs: tuple[str, ...]
+    runs: int = 0
+    absent: Absence | None = None
 
     @property
     def zero(self) -> float:
@@ -89,20 +100,26 @@ Explanation = AlarmExplanation | MissExplanation
 
 
 def explain_operation(
-    detection: Detection, matching: Matching, activation: Activation, inputs: Sequence[str] = ()
+    detection: Detection,
+    matching: Matching,
+    activation: Activation,
+    inputs: Sequence[str] = (),
+    normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> tuple[Explanation, ...]:
     """Every alarm of an operation and every contact without one, in order of time.
 
-    `inputs` names the channels that the detector needs.
+    `inputs` names the channels that the detector needs; `normals` is what impact-free runs look like.
     """
     margins = joint_margins(detection)
     detecting = {item.alarm: item.contact for item in matching.matches if item.alarm}
     found: list[Explanation] = [
-        explain_alarm(detection, alarm, activation, *_belonging(alarm, detection, matching), inputs, margins)
+        explain_alarm(detection, alarm, activation, *_belonging(alarm, detection, matching), inputs, margins, normals)
         for alarm in {*detection.verdict.alarms, *detecting}
     ]
     found += [
-        explain_miss(detection, item, activation, inputs, margins) for item in matching.matches if item.alarm is None
+        explain_miss(detection, item, activation, inputs, margins, normals)
+        for item in matching.matches
+        if item.alarm is None
     ]
     return tuple(sorted(found, key=_order))
 
@@ -115,6 +132,7 @@ def explain_alarm(
     role: Role | None = None,
     inputs: Sequence[str] = (),
     margins: Sequence[JointMargin] = (),
+    normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> AlarmExplanation:
     """What led to an alarm of a detection; with the contact that it belongs to, if any, times are told from its onset.
 
@@ -129,13 +147,16 @@ def explain_alarm(
         raise UsageError(f"{detection.operation.name}: no alarm at {alarm.time:g} s", "give one of this detection")
     first = int(containing[0])
     debounce = activation.samples(detection.statistic.period)
+    left = float(margin.time[first])
     times = [alarm.time + step for step in _TO_ALARM]
+    recording = detection.operation.recording.without_ground_truth()
     if contact:
         times.append(contact.start)
         moved = _moved_at_contact(detection, margin.name, contact, alarm.time)
     else:
-        recording = detection.operation.recording
         moved = which_moved_first(recording, margin.name, alarm.time, lead=_LEAD_OF_ALARM, after=0.0)
+    event = Event(margin.name, left, alarm.time, tuple(inputs), detection.operation.motion)
+    diagnosis = diagnose_alarm(recording, event, normals, moved)
     return AlarmExplanation(
         operation=detection.operation.name,
         detector=detection.detector,
@@ -144,12 +165,15 @@ def explain_alarm(
         role=role or ("detection" if contact else "alarm"),
         alarm=alarm,
         contact=contact,
-        left=float(margin.time[first]),
+        left=left,
         debounce=debounce,
         skipped=at - first + 1 - debounce,
         moments=margin.moments(times),
-        moved=moved,
+        moved=diagnosis.moved,
         inputs=tuple(inputs),
+        cause=diagnosis.cause,
+        runs=diagnosis.runs,
+        absent=diagnosis.absent,
     )
 
 
@@ -159,6 +183,7 @@ def explain_miss(
     activation: Activation,
     inputs: Sequence[str] = (),
     margins: Sequence[JointMargin] = (),
+    normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> MissExplanation:
     """How near a contact without an alarm came to one, while an alarm would have counted (`match.watched`).
 
@@ -175,6 +200,10 @@ def explain_miss(
         margin, approach = near[0]
         times = [contact.start + step for step in _FROM_ONSET if step <= match.watched]
         moments = margin.moments([*times, approach.nearest.time])
+    own_past = _moved_at_contact(detection, joint, contact, contact.start)
+    recording = detection.operation.recording.without_ground_truth()
+    begin, until = contact.start - _LEAD_OF_ONSET - contact.uncertainty, contact.start + _AFTERMATH
+    diagnosis = diagnose_contact(recording, joint, begin, until, normals, own_past)
     return MissExplanation(
         operation=detection.operation.name,
         detector=detection.detector,
@@ -188,8 +217,10 @@ def explain_miss(
         not_judged=statistic.shares(contact.start, closes),
         approaches=tuple(approach for _, approach in near),
         moments=moments,
-        moved=_moved_at_contact(detection, joint, contact, contact.start),
+        moved=diagnosis.moved,
         inputs=tuple(inputs),
+        runs=diagnosis.runs,
+        absent=diagnosis.absent,
     )
 
 

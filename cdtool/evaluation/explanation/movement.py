@@ -33,13 +33,22 @@ _SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Movement:
-    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason."""
+    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason.
+
+    Compared with impact-free runs: its `value` where it was farthest off, with their `mean` and `spread` there, in
+    `unit`; NaN where the run's own past had to do. `brief`: it came back within a few samples.
+    """
 
     channel: str
     joint: str
     time: float
     direction: Literal["up", "down", ""] = ""
     reason: str = ""
+    unit: str = ""
+    value: float = math.nan
+    mean: float = math.nan
+    spread: float = math.nan
+    brief: bool = False
 
 
 def which_moved_first(
@@ -85,7 +94,7 @@ def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, beg
     outside = np.abs(off) > _MOVED * noise
     run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
     if not run.any():
-        return Movement(channel, joint, math.nan, reason="within its usual range")
+        return Movement(channel, joint, math.nan, reason="no departure found")
     first = int(np.argmax(run))
     upward = bool(off[first] > 0.0)
     calm = np.flatnonzero((off if upward else -off)[:first] <= _BACK_TO * noise[:first])

@@ -5,15 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from cdtool.evaluation.explanation.cause_words import cause_words
 from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
 from cdtool.evaluation.explanation.margin import Approach
 from cdtool.evaluation.explanation.movement import COMMANDS, Movement
+from cdtool.evaluation.explanation.normal_choice import Absence
+from cdtool.recording import REFERENCES
+
+_ABSENT = {
+    Absence.BY_HAND: "with limits set by hand nothing was learned to compare with",
+    Absence.OLDER_FILE: "this signature file was written before channels were learned; learn it again with cdtool "
+    "learn-signature",
+    Absence.FEW_RUNS: "too few impact-free runs of one class of motion have speed and position",
+    Absence.NO_CLASS: "no class of motion that was learned runs as fast as this one",
+    Absence.NO_CHANNELS: "without speed and position nobody knows where in its motion this run is",
+}
+_REASONS = (
+    ("outside since before", "Outside their normal band since before"),
+    ("within its usual range", "Within their usual range"),
+    ("no departure found", "No clear departure from their own past"),
+    ("too few samples", "Too few samples to tell"),
+    ("no normal band known here", "No normal band is known here for"),
+)
 
 
 def words(explanation: Explanation) -> list[str]:
     """What happened, how the limit was crossed or not, and what moved first: a sentence or two an entry."""
     if isinstance(explanation, AlarmExplanation):
-        return [_headline(explanation), *_crossing(explanation), *_movement(explanation)]
+        return [_headline(explanation), *_crossing(explanation), *cause_words(explanation), *_movement(explanation)]
     return [_miss(explanation), *_approaches(explanation), *_movement(explanation)]
 
 
@@ -81,33 +100,80 @@ def _approach(found: Approach, item: MissExplanation) -> str:
 
 
 def _movement(item: Explanation) -> list[str]:
-    moved = [found for found in item.moved if not math.isnan(found.time)]
+    lines = [_compared(item)]
+    learned = item.absent is None
+    # Against impact-free runs the references say what was asked for, and stand apart; a run's own past tells no command
+    # from an answer to it.
+    shown = [found for found in item.moved if not (learned and found.channel in REFERENCES)]
+    moved = [found for found in shown if not math.isnan(found.time)]
     end = item.alarm.time if isinstance(item, AlarmExplanation) else math.inf
     sooner, later = [found for found in moved if found.time <= end], [found for found in moved if found.time > end]
-    lines = []
+    band = "its normal band" if learned else "its course"
     if sooner:
         lines.append(f"Moved first: {_in_order(sooner, item)}.")
-        commanded = sooner[0].channel in COMMANDS
-        if commanded or (item.contact is None and any(found.channel in COMMANDS for found in sooner)):
-            order = "first" if commanded else "as well"
-            lines.append(f"The command moved {order}: that, not a contact, may be what the detector noticed.")
+        lines += [] if learned else _commands(sooner, item)
         lines += _first_input(sooner, item)
     else:
-        lines.append(f"No channel on its own had clearly left its course{' by then' if later else ''}.")
+        lines.append(f"No channel on its own had clearly left {band}{' by then' if later else ''}.")
     if later:
         lines.append(f"After the alarm: {_in_order(later, item)}.")
-    untold = (("within its usual range", "Within their usual range"), ("too few samples", "Too few samples to tell"))
-    for reason, told in untold:
-        names = [_channel(found, item) for found in item.moved if found.reason == reason]
-        if names and (moved or reason == "too few samples"):
+    if learned:
+        lines += _references(item)
+    return lines + _unmoved(shown, item)
+
+
+def _compared(item: Explanation) -> str:
+    """What the channels were compared with, or why with the log's own past alone and what to do about it."""
+    if item.absent is None:
+        return f"Compared with {item.runs} impact-free runs at the same place of the motion."
+    return f"Compared with this log's own past alone: {_ABSENT[item.absent]}."
+
+
+def _commands(sooner: Sequence[Movement], item: Explanation) -> list[str]:
+    commanded = sooner[0].channel in COMMANDS
+    if commanded or (item.contact is None and any(found.channel in COMMANDS for found in sooner)):
+        order = "first" if commanded else "as well"
+        return [f"The command moved {order}: that, not a contact, may be what the detector noticed."]
+    return []
+
+
+def _references(item: Explanation) -> list[str]:
+    """What was asked of the machine, against the impact-free runs."""
+    found = [each for each in item.moved if each.channel in REFERENCES]
+    moved = [each for each in found if not math.isnan(each.time)]
+    still = [_channel(each, item) for each in found if each.reason == "within its usual range"]
+    parts = [f"{_in_order(moved, item)}"] if moved else []
+    parts += [f"{', '.join(still)} within the usual range"] if still else []
+    return [f"References: {'; '.join(parts)}."] if parts else []
+
+
+def _unmoved(shown: Sequence[Movement], item: Explanation) -> list[str]:
+    moved = any(not math.isnan(found.time) for found in item.moved)
+    lines = []
+    for reason, told in _REASONS:
+        those = [found for found in shown if found.reason == reason]
+        if those and (moved or item.absent is None or reason == "too few samples"):
+            names = [f"{_channel(found, item)}{_numbers(found)}" for found in those]
             lines.append(f"{told}: {', '.join(names)}.")
     return lines
 
 
+def _numbers(found: Movement) -> str:
+    """The value against normal mean and spread, where they are known."""
+    if not math.isfinite(found.mean):
+        return ""
+    normal = f"{_figure(found.mean)} +- {_figure(found.spread)}{_unit(found.unit)}"
+    return f" ({_figure(found.value)} against {normal})"
+
+
 def _in_order(moved: Sequence[Movement], item: Explanation) -> str:
     """The channels with the time of each, the first in full."""
-    first = f"{_channel(moved[0], item)} {moved[0].direction} {_after_zero(moved[0], item)}"
-    return ", ".join([first, *(f"{_channel(found, item)} {found.direction} {_ms(found, item)}" for found in moved[1:])])
+
+    def told(found: Movement, when: str) -> str:
+        return f"{_channel(found, item)} {found.direction} {when}{_numbers(found)}"
+
+    first = told(moved[0], _after_zero(moved[0], item))
+    return ", ".join([first, *(told(found, _ms(found, item)) for found in moved[1:])])
 
 
 def _first_input(moved: Sequence[Movement], item: Explanation) -> list[str]:

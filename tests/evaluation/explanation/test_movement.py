@@ -53,7 +53,7 @@ def test_channels_come_in_the_order_of_their_known_changes_with_time_and_directi
     assert [item.channel for item in found] == ["acceleration", "speed", "torque", "reference_speed"]
     assert [item.direction for item in found] == ["down", "down", "up", ""]
     assert [item.time for item in found[:3]] == pytest.approx([3.01, 3.05, 3.12], abs=5e-3)
-    assert (found[3].reason, math.isnan(found[3].time)) == ("within its usual range", True)
+    assert (found[3].reason, math.isnan(found[3].time)) == ("no departure found", True)
 
 
 def test_a_change_outside_the_stretch_that_is_looked_at_is_not_told():

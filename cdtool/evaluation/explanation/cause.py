@@ -1,0 +1,223 @@
+"""The likely cause of an alarm: a contact, a change of friction, or a sensor that is wrong.
+
+Facts only: which kind, of which channel and joint, from when, by how much. Neither load cell nor labels are looked at.
+What is asked for, in this order:
+
+contact             the axis that leads the motion loses speed for good while its torque pushes on; or the torque of
+                    a joint that is held rises for good against a displacement
+changed command     the reference speed leaves its normal course before the alarm
+friction change     the torque of the leading joint departs for good, and the speed has come back
+speed glitch        the speed leaves its own course and returns within a few samples, and the position shows no motion
+torque spike        the torque does so, and the speed does not answer
+accelerometer knock the acceleration does so, or rings, and neither speed nor torque departs
+lost samples        nothing of all that, and samples are missing right before the alarm
+not clear           nothing of all that
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from cdtool.evaluation.explanation.departure import Track
+from cdtool.evaluation.explanation.transient import Loss, Transient, losses, shown_by_position, transients
+from cdtool.recording import Recording
+
+# Transients and lost samples this long before the signal left its band for good may be the cause [s].
+_SHORTLY = 0.3
+# What is there for good is there in the last of the time that is looked at [s].
+_AT_THE_END = 0.15
+# Share of the normal speed that a contact takes away for good.
+_STOPPED = 0.3
+# Share of the normal speed by which a reference has to depart in the mean of the time before the alarm.
+_COMMANDED = 0.1
+# Spreads by which a level has departed for good, at the end and at the alarm.
+_LASTING, _AT_ALARM = 3.0, 2.0
+# A channel's own noise is at least this share of the spread of the impact-free runs.
+_LEAST_NOISE = 0.25
+# A joint that is held is displaced and pushed back by at least so many spreads.
+_HELD = 5.0
+
+
+class CauseKind(StrEnum):
+    """What an alarm may come from."""
+
+    CONTACT = "contact"
+    COMMAND = "changed command"
+    FRICTION = "friction change"
+    SPEED_GLITCH = "speed glitch"
+    TORQUE_SPIKE = "torque spike"
+    KNOCK = "accelerometer knock"
+    LOST = "lost samples"
+    UNCLEAR = "not clear"
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A channel of a joint that is off for good: its level `value` against its `normal` level, both in `unit`."""
+
+    channel: str
+    joint: str
+    unit: str
+    value: float
+    normal: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """The likely cause with its evidence: what shifted for good, or the transient, or the samples that were lost."""
+
+    kind: CauseKind
+    shifts: tuple[Shift, ...] = ()
+    transient: Transient | None = None
+    loss: Loss | None = None
+
+    @property
+    def channel(self) -> str:
+        """The channel that is to blame; empty where several agree, or none."""
+        found = self.transient or self.loss
+        return found.channel if found else ""
+
+
+def likely_cause(
+    recording: Recording,
+    tracks: Sequence[Track],
+    leading: str,
+    direction: int,
+    left: float,
+    alarm: float,
+    end: float,
+    read: Sequence[str] = (),
+) -> Cause:
+    """The likely cause of an alarm at `alarm` [s] of a signal that left its band for good at `left` [s].
+
+    `tracks` reach to `end` [s]. `leading` is the joint that leads the motion, `direction` its sign. `read`: the
+    channels that the detector needs; samples of others may be lost without harm.
+    """
+    joints = list(dict.fromkeys(track.joint for track in tracks))
+    by_name = {(track.channel, track.joint): track for track in tracks}
+    ended = max(end - _AT_THE_END, alarm - 0.02), end
+    contact = _contact(by_name, joints, leading, direction, alarm, ended)
+    if contact:
+        return Cause(CauseKind.CONTACT, contact)
+    commanded = _commanded(by_name, leading, alarm)
+    if commanded:
+        return Cause(CauseKind.COMMAND, commanded)
+    friction = _friction(by_name, leading, alarm, ended)
+    if friction:
+        return Cause(CauseKind.FRICTION, friction)
+    window = left - _SHORTLY, alarm
+    found = {
+        channel: [
+            item
+            for name, track in by_name.items()
+            if name[0] == channel
+            for item in _transients(recording, track, window)
+        ]
+        for channel in ("speed", "torque", "acceleration")
+        # What the detector does not read cannot have raised its alarm.
+        if channel in read or not read
+    }
+    return _transient_cause(recording, found) or _lost(recording, tuple(read), left, alarm) or Cause(CauseKind.UNCLEAR)
+
+
+def _contact(
+    tracks: dict[tuple[str, str], Track],
+    joints: Sequence[str],
+    leading: str,
+    direction: int,
+    alarm: float,
+    ended: tuple[float, float],
+) -> tuple[Shift, ...]:
+    speed, torque = tracks.get(("speed", leading)), tracks.get(("torque", leading))
+    if speed is not None:
+        normal = speed.normal(*ended)
+        lost = -direction * speed.change(*ended)
+        pushes = torque is None or direction * _peak(torque, alarm - 0.3, ended[1], direction) >= _LASTING
+        if abs(normal) > 0.0 and lost >= _STOPPED * abs(normal) and pushes:
+            return tuple(_shift(track, ended) for track in (speed, torque) if track is not None)
+    for joint in joints:
+        torque, position = tracks.get(("torque", joint)), tracks.get(("position", joint))
+        if joint == leading or torque is None or position is None:
+            continue
+        pushed, displaced = torque.shift(*ended), position.shift(*ended)
+        if abs(pushed) >= _HELD and abs(displaced) >= _HELD and pushed * displaced < 0.0:
+            return _shift(torque, ended), _shift(position, ended)
+    return ()
+
+
+def _commanded(tracks: dict[tuple[str, str], Track], leading: str, alarm: float) -> tuple[Shift, ...]:
+    reference, speed = tracks.get(("reference_speed", leading)), tracks.get(("speed", leading))
+    if reference is None or speed is None or not len(reference.time):
+        return ()
+    shortly, first = (alarm - _SHORTLY, alarm), float(reference.time[0])
+    least = _COMMANDED * abs(speed.normal(*shortly))
+    # A reference that is off all along is another class of motion, not a change.
+    if abs(reference.change(*shortly)) > least > abs(reference.change(first, first + _SHORTLY)):
+        return (_shift(reference, shortly),)
+    return ()
+
+
+def _friction(
+    tracks: dict[tuple[str, str], Track], leading: str, alarm: float, ended: tuple[float, float]
+) -> tuple[Shift, ...]:
+    torque, speed = tracks.get(("torque", leading)), tracks.get(("speed", leading))
+    if torque is None:
+        return ()
+    at_end, at_alarm = torque.shift(*ended), torque.shift(alarm - 0.02, alarm + 0.1)
+    lasting = abs(at_end) >= _LASTING and at_end * at_alarm > 0.0 and abs(at_alarm) >= _AT_ALARM
+    if not lasting:
+        return ()
+    return tuple(_shift(track, ended) for track in (torque, speed) if track is not None)
+
+
+def _transients(recording: Recording, track: Track, window: tuple[float, float]) -> list[Transient]:
+    """What came and went in a channel: against its own running median, else against its normal course."""
+    series, column = recording[track.channel], recording.joints.index(track.joint)
+    spread = float(np.nanmedian(track.spread)) if np.isfinite(track.spread).any() else 0.0
+    found = transients(series, track.channel, track.joint, column, *window, _LEAST_NOISE * spread)
+    if found:
+        return found
+    brief = track.brief(*window)
+    return [brief] if brief else []
+
+
+def _transient_cause(recording: Recording, found: dict[str, list[Transient]]) -> Cause | None:
+    """A sensor that is wrong: the highest transient, if the other channels do not confirm it."""
+    speed = [
+        item
+        for item in found.get("speed", ())
+        if "position" not in recording
+        or not shown_by_position(item, recording["position"], recording.joints.index(item.joint))
+    ]
+    named = {
+        CauseKind.SPEED_GLITCH: speed,
+        CauseKind.TORQUE_SPIKE: found.get("torque", []),
+        CauseKind.KNOCK: found.get("acceleration", []),
+    }
+    best = max(
+        ((items[0].noises, kind, items[0]) for kind, items in named.items() if items),
+        key=lambda item: item[0],
+        default=None,
+    )
+    return Cause(best[1], transient=best[2]) if best else None
+
+
+def _lost(recording: Recording, read: tuple[str, ...], left: float, alarm: float) -> Cause | None:
+    channels = read or tuple(recording.channels)
+    found = losses(recording, channels, left - _SHORTLY, alarm)
+    return Cause(CauseKind.LOST, loss=found[0]) if found else None
+
+
+def _shift(track: Track, when: tuple[float, float]) -> Shift:
+    normal = track.normal(*when)
+    return Shift(track.channel, track.joint, track.unit, normal + track.change(*when), normal)
+
+
+def _peak(track: Track, start: float, end: float, direction: int) -> float:
+    part = direction * track.level[track.between(start, end)]
+    return direction * float(np.nanmax(part)) if np.isfinite(part).any() else math.nan

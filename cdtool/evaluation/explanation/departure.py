@@ -1,0 +1,242 @@
+"""How far each channel is from what is normal there, when it left that band first, and for how long.
+
+Conventions: a diagnosis after the fact, for people: it looks at the recording before and after the event, and no
+detector, no threshold and no latency depends on it. Times are seconds on the recording's own clock. Load cell and
+labels are never looked at. Departures count in normal spreads: of single samples, and of a channel's level, the mean
+over 50 ms, which shows a small lasting shift that single samples hide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.evaluation.explanation.movement import Movement
+from cdtool.evaluation.explanation.transient import Transient
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels
+
+# A channel has left its normal band where it is farther off the mean than impact-free runs go, by this factor (the runs
+# learned from keep closer to their own mean than others do), and at least so many spreads.
+_BEYOND, _LEAST_OUT = 1.5, 5.0
+# It began to leave it where it last was within this share of that.
+_BACK_TO = 0.4
+_SUCCESSION = 3
+# A run's own constant distance from the mean counts up to this many spreads; more is a departure.
+_OFFSET = 2.5
+# How many spreads off its own past a channel may go without having left it.
+_OWN_REACH = 5.0
+# What a run's own distance is taken from: this long up to the search [s].
+_BASELINE = 0.5
+_ENOUGH = 10
+# A departure is brief if it is over after this time [s], with so much calm behind it, back within so many spreads.
+_BRIEF, _CALM, _BACK = 0.15, 0.03, 3.5
+
+
+@dataclass(frozen=True)
+class Track:
+    """One channel of one joint along the time that is looked at, against what is normal there.
+
+    `samples` and `level` (n,) are distances from the normal mean in normal spreads, less the run's own constant
+    distance; NaN where nothing is known. `value`, `mean`, `spread` are in `unit`. `raw`: `samples` with that distance.
+    `out` and `level_out`: outside so many spreads it has left its normal band.
+    """
+
+    channel: str
+    joint: str
+    unit: str
+    time: FloatArray
+    value: FloatArray
+    mean: FloatArray
+    spread: FloatArray
+    raw: FloatArray
+    samples: FloatArray
+    level: FloatArray
+    level_off: FloatArray
+    level_mean: FloatArray
+    out: FloatArray
+    level_out: FloatArray
+
+    def between(self, start: float, end: float) -> slice:
+        """The samples from `start` to `end` [s]."""
+        first, after = np.searchsorted(self.time, start), np.searchsorted(self.time, end, side="right")
+        return slice(int(first), int(after))
+
+    def shift(self, start: float, end: float) -> float:
+        """The mean distance of the level from its normal, in spreads, from `start` to `end` [s]; NaN where unknown."""
+        return _mean(self.level[self.between(start, end)])
+
+    def change(self, start: float, end: float) -> float:
+        """The same in the channel's unit."""
+        return _mean(self.level_off[self.between(start, end)])
+
+    def normal(self, start: float, end: float) -> float:
+        """The normal mean from `start` to `end` [s]."""
+        return _mean(self.level_mean[self.between(start, end)])
+
+    def movement(self, begin: float, end: float) -> Movement:
+        """When and where to the channel left its normal band from `begin` to `end` [s], or that it did not."""
+        part = self.between(begin, end)
+        samples, level, raw = self.samples[part], self.level[part], self.raw[part]
+        if np.count_nonzero(np.isfinite(samples)) < _SUCCESSION:
+            return Movement(self.channel, self.joint, math.nan, reason="no normal band known here", unit=self.unit)
+        shares = samples / self.out[part], level / self.level_out[part]
+        at = _first_out(*shares)
+        if at is None:
+            first = _first(np.abs(raw) > self.out[part])
+            if first is None:
+                farthest = part.start + int(np.nanargmax(np.abs(raw)))
+                return self._told(math.nan, "", "within its usual range", farthest)
+            return self._told(math.nan, _side(raw[first]), "outside since before", part.start + first)
+        k, upward, of_level = at
+        sign = 1.0 if upward else -1.0
+        start = part.start + _began(sign * shares[of_level][: k + 1])
+        known = np.where(np.isfinite(samples), sign * samples, -np.inf)
+        farthest = part.start + k + int(np.argmax(known[k:]))
+        return self._told(float(self.time[start]), "up" if upward else "down", "", farthest)
+
+    def brief(self, begin: float, end: float) -> Transient | None:
+        """A departure that began from `begin` to `end` [s] and was over soon; None where none was."""
+        moved = self.movement(begin, end)
+        if math.isnan(moved.time):
+            return None
+        part = self.between(moved.time, moved.time + _BRIEF)
+        outside = np.flatnonzero(np.abs(self.samples[part]) > _BACK)
+        if not len(outside) or self.time[part][outside[-1]] > moved.time + _BRIEF - _CALM:
+            return None
+        last = part.start + int(outside[-1])
+        samples = self.samples[part.start : last + 1]
+        off = (self.value - self.mean)[part.start : last + 1]
+        k = int(np.nanargmax(np.abs(samples)))
+        height = float(off[k])
+        area = float(np.nansum(off[:-1] * np.diff(self.time[part.start : last + 1])))
+        rings = bool((off < -0.3 * abs(height)).any() and (off > 0.3 * abs(height)).any())
+        noises = float(abs(samples[k]))
+        end = float(self.time[last])
+        return Transient(self.channel, self.joint, self.unit, moved.time, end, height, noises, area, rings)
+
+    def _told(self, time: float, direction: str, reason: str, k: int) -> Movement:
+        return Movement(
+            self.channel,
+            self.joint,
+            time,
+            direction,  # type: ignore[arg-type]
+            reason,
+            self.unit,
+            float(self.value[k]),
+            float(self.mean[k]),
+            float(self.spread[k]),
+        )
+
+
+def tracks_of(
+    recording: Recording, normal: NormalMotion | None, joints: Sequence[str], begin: float, end: float
+) -> list[Track]:
+    """Every channel of the joints from `begin` to `end` [s] against impact-free runs.
+
+    Without a `normal` the run's own half second before `begin` has to do: its mean and its spread.
+    """
+    tracks = []
+    for channel in CHANNELS:
+        if channel not in recording or (normal is not None and channel not in normal.channels):
+            continue
+        compared = normal.compare(recording, channel) if normal is not None else _own_past(recording, channel, begin)
+        cut = slice(*np.searchsorted(compared.time, (begin - _BASELINE, end)))
+        quiet = np.searchsorted(compared.time[cut], begin)
+        for joint in joints:
+            tracks.append(_track(channel, joint, recording.joints.index(joint), compared, cut, int(quiet)))
+    return tracks
+
+
+def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, quiet: int) -> Track:
+    off = compared.value[cut, j] - compared.mean[cut, j]
+    level_off = compared.level[cut, j] - compared.level_mean[cut, j]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        raw, raw_level = off / compared.spread[cut, j], level_off / compared.level_spread[cut, j]
+    raw, raw_level = (np.where(np.isfinite(item), item, np.nan) for item in (raw, raw_level))
+    # Where the motion is taken to have begun shifts all of a position: only a change of its distance counts.
+    reach = math.inf if channel in POSITIONS else _OFFSET
+    own, own_level = (_own_offset(item[:quiet], reach) for item in (raw, raw_level))
+    if channel in POSITIONS:
+        raw = raw - own
+    return Track(
+        channel,
+        joint,
+        compared.unit,
+        compared.time[cut],
+        compared.value[cut, j],
+        compared.mean[cut, j],
+        compared.spread[cut, j],
+        raw,
+        raw - own,
+        raw_level - own_level,
+        level_off,
+        compared.level_mean[cut, j],
+        *(np.maximum(_BEYOND * item[cut, j], _LEAST_OUT) for item in (compared.reach, compared.level_reach)),
+    )
+
+
+def _own_past(recording: Recording, channel: str, begin: float) -> Comparison:
+    """The channel against its own half second before `begin`: constant mean and spread."""
+    series = recording[channel]
+    quiet = slice(*np.searchsorted(series.time, (begin - _BASELINE, begin)))
+    level = levels(series.time, series.values)
+    reach = np.full(series.values.shape, _OWN_REACH)
+    samples, means = (_own_normal(values, quiet) for values in (series.values, level))
+    return Comparison(series.unit, series.time, series.values, *samples, level, *means, reach, reach)
+
+
+def _own_normal(values: FloatArray, quiet: slice) -> tuple[FloatArray, FloatArray]:
+    past, shape = values[quiet], values.shape
+    if np.count_nonzero(np.isfinite(past).all(axis=1)) < _ENOUGH:
+        return np.full(shape, np.nan), np.full(shape, np.nan)
+    spread = np.maximum(np.nanstd(past, axis=0), 1e-3 * np.nanmax(np.abs(past), axis=0))
+    return np.broadcast_to(np.nanmean(past, axis=0), shape), np.broadcast_to(spread, shape)
+
+
+def _own_offset(past: FloatArray, reach: float) -> float:
+    """A run's own constant distance from the mean [spreads], up to `reach`.
+
+    Where too little is known it is 0, or unknown (NaN) if it may be as large as it likes.
+    """
+    known = past[np.isfinite(past)]
+    if len(known) < _ENOUGH:
+        return 0.0 if math.isfinite(reach) else math.nan
+    return float(np.clip(np.median(known), -reach, reach))
+
+
+def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool] | None:
+    """The first sample of a departure, whether it is upward, and whether it is the level's; outside is above 1."""
+    found = []
+    for values, of_level in ((samples, False), (level, True)):
+        for sign in (1.0, -1.0):
+            k = _first(sign * values > 1.0)
+            if k is not None:
+                found.append((k, sign > 0.0, of_level))
+    return min(found) if found else None
+
+
+def _first(outside: BoolArray) -> int | None:
+    """The first of the samples in succession that are outside; missing ones (False) break them."""
+    if len(outside) < _SUCCESSION:
+        return None
+    run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
+    return int(np.argmax(run)) if run.any() else None
+
+
+def _began(shares: FloatArray) -> int:
+    """Where a departure upward that is certain at the last sample began: followed back to `_BACK_TO` of its limit."""
+    within = np.flatnonzero(~(shares > _BACK_TO))
+    return min(int(within[-1]) + 1, len(shares) - 1) if len(within) else 0
+
+
+def _side(value: float) -> str:
+    return "up" if value > 0.0 else "down"
+
+
+def _mean(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan

@@ -1,0 +1,163 @@
+"""Which channels left their normal course, in which order, and what the alarm likely comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.detection import WHOLE_MACHINE
+from cdtool.evaluation.explanation.cause import Cause, CauseKind, likely_cause
+from cdtool.evaluation.explanation.departure import Track, tracks_of
+from cdtool.evaluation.explanation.movement import Movement
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.explanation.transient import Transient
+from cdtool.motion import MotionClass
+from cdtool.recording import REFERENCES, Recording
+from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
+
+# Departures are looked for from so long before the signal left its band for good [s]: a soft contact takes as long.
+_BEFORE = 0.9
+# Which class of motion a run is of is asked up to so long before it left the band [s].
+_LATEST = 0.1
+# After accelerating so much of the run says how far it is off anyway [s]; departures are looked for at least so long.
+_SETTLING, _LEAST_BEFORE = 0.3, 0.3
+# What follows an alarm tells a contact from friction: so long it is looked at [s].
+_AFTER = 0.5
+
+# Without impact-free runs a run has to have been steady: its speed within this share of its median.
+_STEADY, _ENOUGH = 0.3, 10
+# When a channel began to move is known to about this [s].
+_RESOLUTION = 0.02
+# Of channels that move at the same time the one that physically answers first comes first.
+_ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The channels in the order in which they left their course, and the likely cause (a contact's is known).
+
+    `absent`: why there were no impact-free runs to compare with; None where there were, `runs` of them.
+    """
+
+    moved: tuple[Movement, ...]
+    cause: Cause
+    absent: Absence | None
+    runs: int = 0
+
+
+@dataclass(frozen=True)
+class Event:
+    """An alarm at `alarm` [s] of a signal that left its band for good at `left` [s]; `inputs`: what its detector reads.
+
+    `joint` is the signal's: one of the machine's, or the whole machine. `motion` is the operation's.
+    """
+
+    joint: str
+    left: float
+    alarm: float
+    inputs: tuple[str, ...]
+    motion: MotionClass
+
+
+def diagnose_alarm(
+    recording: Recording, event: Event, normals: NormalMotions, own_past: Sequence[Movement]
+) -> Diagnosis:
+    """What led to an alarm.
+
+    `own_past`: the movements against the run's own past, which count where there are no impact-free runs.
+    """
+    found = normals.of(recording, event.left - _LATEST)
+    absent = None if isinstance(found, NormalMotion) else found
+    normal = found if isinstance(found, NormalMotion) else None
+    begin = event.left - _BEFORE if normal is None else _search_begin(recording, normal, event.left)
+    end = min(event.alarm + _AFTER, recording.end)
+    tracks = tracks_of(recording, normal, recording.joints, begin, end)
+    motion = normal.motion if normal is not None else event.motion
+    leading, direction = recording.joints[motion.joint], motion.direction or 1
+    cause = Cause(CauseKind.UNCLEAR)
+    if normal is not None or _steady(tracks, leading, begin):
+        cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
+    moved = list(own_past) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
+    if cause.transient is not None:
+        moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
+    return Diagnosis(in_order(moved, event.joint), cause, absent, normal.runs if normal is not None else 0)
+
+
+def diagnose_contact(
+    recording: Recording, joint: str, onset: float, until: float, normals: NormalMotions, own_past: Sequence[Movement]
+) -> Diagnosis:
+    """What a contact moved, from its onset less what that is uncertain by; its cause is known."""
+    normal = normals.of(recording, onset)
+    if not isinstance(normal, NormalMotion):
+        return Diagnosis(tuple(own_past), Cause(CauseKind.CONTACT), normal)
+    end = min(until, recording.end)
+    tracks = tracks_of(recording, normal, recording.joints, onset, end)
+    leading = recording.joints[normal.motion.joint]
+    return Diagnosis(
+        in_order(moved_channels(tracks, joint, onset, end, leading), joint), Cause(CauseKind.CONTACT), None, normal.runs
+    )
+
+
+def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str) -> list[Movement]:
+    """Every channel of the signal's joint, and those of other joints that left their normal band.
+
+    The position of the joint that leads the motion is where in the stroke it is: the others are compared at that place.
+    """
+    found = [track.movement(begin, end) for track in tracks if track.channel not in POSITIONS or track.joint != leading]
+    return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
+
+
+def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
+    """Whether the leading joint ran steadily up to `begin` [s]: only then its own past says what is normal."""
+    for track in tracks:
+        if (track.channel, track.joint) == ("speed", leading):
+            past = track.value[: track.between(begin, begin).start]
+            known = past[np.isfinite(past)]
+            middle = abs(float(np.median(known))) if len(known) >= _ENOUGH else 0.0
+            return middle > 0.0 and float(np.ptp(known)) < _STEADY * middle
+    return False
+
+
+def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:
+    """From where on departures are looked for [s]: not far into the acceleration, if that was shortly before."""
+    clock = recording["speed"].time
+    ran = clock[normal.progress(recording, clock).running]
+    settled = float(ran[0]) + _SETTLING if len(ran) else -math.inf
+    return max(left - _BEFORE, min(settled, left - _LEAST_BEFORE))
+
+
+def in_order(moved: Sequence[Movement], joint: str) -> tuple[Movement, ...]:
+    """By time, those that did not move behind them; not shortly before what they follow.
+
+    A position, an integral, follows its own speed; another joint follows the signal's.
+    """
+    speeds = {item.joint: item.time for item in moved if item.channel == "speed" and not math.isnan(item.time)}
+
+    def place(item: Movement) -> tuple[bool, float, int]:
+        time = item.time
+        if item.channel == "position" and 0.0 < speeds.get(item.joint, -math.inf) - time < _RESOLUTION:
+            time = speeds[item.joint]
+        if (joint,) != WHOLE_MACHINE and item.joint != joint:
+            time += _RESOLUTION
+        return math.isnan(time), time, _ORDER.index(item.channel)
+
+    return tuple(sorted(moved, key=place))
+
+
+def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequence[Track]) -> list[Movement]:
+    """The channel of the transient as moved when it began: it may have stayed within the spread of the runs."""
+    others = [item for item in moved if (item.channel, item.joint) != (found.channel, found.joint)]
+    told = Movement(found.channel, found.joint, found.start, "up" if found.height > 0.0 else "down", unit=found.unit)
+    for track in tracks:
+        if (track.channel, track.joint) == (found.channel, found.joint):
+            part = track.between(found.start, found.end)
+            k = part.start + int(abs(track.value[part] - track.mean[part]).argmax())
+            value, mean, spread = (float(part[k]) for part in (track.value, track.mean, track.spread))
+            told = replace(told, value=value, mean=mean, spread=spread)
+    return [*others, replace(told, brief=True)]
+
+
+__all__ = ["Absence", "CauseKind", "Diagnosis", "Event", "NormalMotions", "diagnose_alarm", "diagnose_contact"]

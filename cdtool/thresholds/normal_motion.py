@@ -1,0 +1,257 @@
+"""What every channel normally looks like along a stroke: mean and spread over impact-free runs of one class of motion.
+
+No detector and no threshold reads it: it is what an explanation compares a run with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from cdtool.motion import MotionClass
+from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
+from cdtool.thresholds.normal_curves import NormalCurves, signal_of
+from cdtool.thresholds.signature_curve import Curve, resample
+
+CHANNELS = (*MEASURED, *REFERENCES)
+# Their normal course is that over time: along the travel they are the travel itself.
+POSITIONS = ("position", "reference_position")
+# A level is the mean of a channel over this long before a sample [s].
+LEVEL_SECONDS = 0.05
+_FILLED = 0.8
+# Share of the runs [%] that stay within the largest distance: one faulty sample in one run does not widen it.
+_MOST = 80.0
+# Fewer runs tell no spread.
+LEAST_RUNS = 3
+
+# Grid and window over time while accelerating [s]; along the travel [s at the nominal speed]; of a position [s].
+_TIME, _TRAVEL, _POSITION = (0.01, 0.03), (0.05, 0.1), (0.05, 0.1)
+# Numbers are stored to so many digits of the largest.
+_DIGITS = 6
+# The time curve reaches this much beyond the slowest run's acceleration.
+_TIME_RESERVE = 1.5
+# A spread is at least this share of the largest mean: a channel that is computed may not vary at all, and a command
+# varies by no more than when the motion is taken to have begun.
+_SMALLEST_SPREAD, _SMALLEST_OF_COMMAND = 1e-3, 0.02
+
+
+@dataclass(frozen=True)
+class NormalChannel:
+    """One channel's samples and its level (see `LEVEL_SECONDS`), in `unit`; positions count from the motion's start."""
+
+    unit: str
+    samples: NormalCurves
+    level: NormalCurves
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A run's channel against its normal course, on the channel's clock `time` (n,) [s]; the others are (n, J).
+
+    `value` and `level` are the run's own, `mean` and `spread` those of the impact-free runs at the same place; NaN
+    before the motion begins and where too few runs have been. `reach` and `level_reach`: how many spreads off the mean
+    the impact-free runs themselves went.
+    """
+
+    unit: str
+    time: FloatArray
+    value: FloatArray
+    mean: FloatArray
+    spread: FloatArray
+    level: FloatArray
+    level_mean: FloatArray
+    level_spread: FloatArray
+    reach: FloatArray
+    level_reach: FloatArray
+
+
+@dataclass(frozen=True)
+class NormalMotion:
+    """The normal course of every channel of impact-free runs, for one class of motion; `runs`: how many there were."""
+
+    motion: MotionClass
+    joints: tuple[str, ...]
+    runs: int
+    channels: Mapping[str, NormalChannel]
+
+    def compare(self, recording: Recording, channel: str) -> Comparison:
+        """A recording's channel against its normal course; raises RecordingError without speed and position."""
+        series, normal = recording[channel], self.channels[channel]
+        where = self.progress(recording, series.time)
+        value = _from_start(channel, series.values, where)
+        level = levels(series.time, value)
+        least = _SMALLEST_OF_COMMAND if channel in REFERENCES else _SMALLEST_SPREAD
+        samples, means = normal.samples.at(where, least), normal.level.at(where, least)
+        reaches = normal.samples.reach(where), normal.level.reach(where)
+        return Comparison(normal.unit, series.time, value, *samples, level, *means, *reaches)
+
+    def serves(self, recording: Recording) -> bool:
+        """Whether a recording has these joints, and what says where in its stroke it is."""
+        return recording.joints == self.joints and "speed" in recording and "position" in recording
+
+    def progress(self, recording: Recording, clock: FloatArray) -> Progress:
+        """Where in its stroke a recording is at the times of `clock` [s]."""
+        return _progress(recording, clock, self.motion)
+
+    def with_run(self, recording: Recording, cap: float, forget: float | None = None) -> NormalMotion:
+        """With one more impact-free run, by Welford's update or by forgetting, clipped as a signature's run is."""
+        channels = dict(self.channels)
+        for name, normal in self.channels.items():
+            if name not in recording or recording[name].unit != normal.unit:
+                continue
+            clock = recording[name].time
+            where = self.progress(recording, clock)
+            value = _from_start(name, recording[name].values, where)
+            channels[name] = replace(
+                normal,
+                samples=normal.samples.updated(value, clock, where, cap, forget),
+                level=normal.level.updated(levels(clock, value), clock, where, cap, forget),
+            )
+        return replace(self, runs=self.runs + 1, channels=channels)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "direction": self.motion.direction,
+            "nominal_speed": self.motion.nominal_speed,
+            "leading_joint": self.motion.joint,
+            "joints": list(self.joints),
+            "runs": self.runs,
+            "channels": {
+                name: {"unit": item.unit, "samples": item.samples.to_dict(), "level": item.level.to_dict()}
+                for name, item in self.channels.items()
+            },
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`; raises ValueError for what is no course of these joints."""
+        joints = tuple(map(str, values["joints"]))
+        channels = {}
+        for name, item in values["channels"].items():
+            if name not in CHANNELS:
+                raise ValueError(f"a normal course of '{name}'")
+            samples, level = (NormalCurves.from_dict(item[part]) for part in ("samples", "level"))
+            for curve in (samples.by_time, samples.by_travel, level.by_time, level.by_travel):
+                if curve is not None and curve.mean.shape[1] != len(joints):
+                    raise ValueError(f"a normal course of {curve.mean.shape[1]} joints, not of {len(joints)}")
+            channels[name] = NormalChannel(str(item["unit"]), samples, level)
+        motion = MotionClass(int(values["direction"]), float(values["nominal_speed"]), int(values["leading_joint"]))
+        if motion.direction not in (-1, 1) or not 0 <= motion.joint < len(joints) or not motion.nominal_speed > 0.0:
+            raise ValueError(f"class of motion {motion}")
+        return cls(motion, joints, int(values["runs"]), channels)
+
+
+def learn_normal_motion(recordings: Sequence[Recording], motion: MotionClass) -> NormalMotion | None:
+    """Learn every channel's normal course from impact-free recordings of one class of motion.
+
+    None where fewer than `LEAST_RUNS` of them have speed and position, or where the class does not move.
+    """
+    usable = [item for item in recordings if "speed" in item and "position" in item]
+    usable = [item for item in usable if item.joints == usable[0].joints]
+    if motion.direction == 0 or len(usable) < LEAST_RUNS:
+        return None
+    channels: dict[str, NormalChannel] = {}
+    for name in CHANNELS:
+        having = [item for item in usable if name in item]
+        having = [item for item in having if item[name].unit == having[0][name].unit]
+        if len(having) >= LEAST_RUNS:
+            channels[name] = _learn_channel(name, having, motion)
+    return NormalMotion(motion, usable[0].joints, len(usable), channels)
+
+
+def levels(time: FloatArray, values: FloatArray) -> FloatArray:
+    """(n, J): at each sample the mean of the values over the `LEVEL_SECONDS` up to it.
+
+    NaN where more than a fifth of the samples that its clock usually has in that time are missing.
+    """
+    if len(time) < 2:
+        return values.copy()
+    usual = min(LEVEL_SECONDS / float(np.median(np.diff(time))), float(len(time)))
+    first = np.searchsorted(time, time - LEVEL_SECONDS, side="right")
+    here = np.arange(len(time)) + 1
+    present = np.isfinite(values)
+    counts = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(present, axis=0)))
+    about = np.nanmedian(values, axis=0) if present.any(axis=0).all() else np.zeros(values.shape[1])
+    sums = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(np.where(present, values - about, 0.0), axis=0)))
+    count = counts[here] - counts[first]
+    total = sums[here] - sums[first]
+    enough = count >= max(_FILLED * usual, 1.0)
+    mean: FloatArray = np.divide(total, count, out=np.full(values.shape, np.nan), where=enough) + about
+    return mean
+
+
+def _learn_channel(name: str, recordings: Sequence[Recording], motion: MotionClass) -> NormalChannel:
+    wheres = [_progress(item, item[name].time, motion) for item in recordings]
+    values = [_from_start(name, item[name].values, where) for item, where in zip(recordings, wheres, strict=True)]
+    means = [levels(item[name].time, value) for item, value in zip(recordings, values, strict=True)]
+    clocks = [item[name].time for item in recordings]
+    samples, level = (_learn_curves(name, motion, clocks, items, wheres) for items in (values, means))
+    return NormalChannel(recordings[0][name].unit, samples, level)
+
+
+def _learn_curves(
+    name: str,
+    motion: MotionClass,
+    clocks: Sequence[FloatArray],
+    values: Sequence[FloatArray],
+    wheres: Sequence[Progress],
+) -> NormalCurves:
+    over_time = name in POSITIONS
+    lasting = [where.elapsed if over_time else where.elapsed[~where.running] for where in wheres]
+    longest = max((float(np.nanmax(item, initial=0.0)) for item in lasting), default=0.0)
+    farthest = max((float(np.nanmax(where.travel, initial=0.0)) for where in wheres), default=0.0)
+    joints = values[0].shape[1]
+
+    def learned(curve: Curve, axes: Sequence[FloatArray]) -> Curve:
+        runs = [
+            resample(signal_of(clock, value), where, curve, axis)
+            for clock, value, where, axis in zip(clocks, values, wheres, axes, strict=True)
+        ]
+        return _rounded(curve.learned(np.array(runs)))
+
+    step, window = _POSITION if over_time else _TIME
+    reach = longest if over_time else _TIME_RESERVE * longest
+    by_time = learned(Curve.empty(step, window, reach, joints), [where.elapsed for where in wheres])
+    by_travel = None
+    if not over_time:
+        step, window = (motion.nominal_speed * seconds for seconds in _TRAVEL)
+        by_travel = learned(Curve.empty(step, window, farthest, joints), [where.travel for where in wheres])
+    curves = NormalCurves(by_time, by_travel, np.zeros(joints), np.zeros(joints))
+    distances = [curves.distances(value, where) for value, where in zip(values, wheres, strict=True)]
+    by_time_most, along_most = (np.percentile([item[i] for item in distances], _MOST, axis=0) for i in (0, 1))
+    return replace(curves, farthest_by_time=by_time_most, farthest_by_travel=along_most)
+
+
+def _rounded(curve: Curve) -> Curve:
+    """The same to `_DIGITS` digits: spreads are known far worse, and files are read by people."""
+
+    def short(values: FloatArray) -> FloatArray:
+        size = np.abs(values).max(initial=0.0)
+        decimals = _DIGITS - 1 - math.floor(math.log10(size)) if size > 0.0 else 0
+        return np.round(values, decimals)
+
+    return replace(curve, mean=short(curve.mean), squares=short(curve.squares))
+
+
+def _from_start(channel: str, values: FloatArray, where: Progress) -> FloatArray:
+    """Positions from where the motion began, other channels as they are."""
+    if channel not in POSITIONS:
+        return values
+    begun = np.flatnonzero(np.isfinite(where.elapsed))
+    result = np.full(values.shape, np.nan)
+    for j in range(values.shape[1] if len(begun) else 0):
+        known = begun[np.isfinite(values[begun, j])]
+        if len(known):
+            result[begun, j] = values[begun, j] - values[known[0], j]
+    return result
+
+
+def _progress(recording: Recording, clock: FloatArray, motion: MotionClass) -> Progress:
+    speed = motion.nominal_speed
+    return progress(recording, clock, motion.direction, START_SHARE * speed, RUNNING_SHARE * speed, motion.joint)
