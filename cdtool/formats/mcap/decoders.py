@@ -85,12 +85,12 @@ class Decoders:
         self.failed += count
         self.reason = self.reason or " ".join(reason.split())[:200]
 
-    def failure(self, topic: str, severity: str = "loss") -> list[Finding]:
+    def failure(self, topic: str) -> list[Finding]:
         """The finding about messages that could not be decoded."""
         if not self.failed:
             return []
         text = f"{self.failed} of {self.failed + self.decoded} messages cannot be decoded: {self.reason}"
-        return [Finding(text, topic, "warning" if severity == "warning" else "loss")]
+        return [Finding(text, topic, "loss")]
 
     def told(self, path: str, topic: str) -> list[Finding]:
         """The finding about messages that could not be decoded; raises RecordingError where none could."""

@@ -114,8 +114,8 @@ class TopicSurvey:
         return values
 
     def found(self) -> Iterator[Column | Finding]:
-        """Columns without rows, arrays whose length varies, messages that cannot be decoded, which is no loss here."""
-        yield from self.decoders.failure(self.topic, "warning")  # nobody asked for them
+        """Columns without rows, arrays whose length varies, messages that cannot be decoded."""
+        yield from self.decoders.failure(self.topic)
         yield from self._orders.findings()
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"

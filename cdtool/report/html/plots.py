@@ -14,7 +14,7 @@ from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.summary import latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import number, with_interval
+from cdtool.report.figure_text import number, spoken, with_interval
 from cdtool.report.html.recordings import Log, log_of, logs_of
 from cdtool.report.html.table import short, shown
 from cdtool.report.html.tables import part_of
@@ -158,7 +158,7 @@ def _force(results: Results, traces: Sequence[Trace]) -> list[dict[str, Any]]:
                 {
                     "trace": i,
                     "contact": place,
-                    "verdict": verdict.verdict,
+                    "verdict": spoken(verdict.verdict),
                     "peak": short(verdict.peak_n),
                     "budget": short(verdict.time_budget_ms),
                 }
