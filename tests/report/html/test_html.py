@@ -258,10 +258,10 @@ def test_misses_and_what_could_not_be_assessed_stand_beside_the_latencies(page):
 
 def test_the_verdict_names_broken_limits_first_and_folds_those_that_are_kept(made, page):
     outcomes = [row[0] for row in page.tables["limits-table"][1:]]
-    assert outcomes == ["broken"]
+    assert outcomes == ["violated"]
     assert len(page.tables["kept-table"]) - 1 == len(made[0].results.limits) - 1
-    assert "1 of 8 limits not kept (1 broken)" in page.text
-    assert page.text.index("limits not kept") < page.text.index("Mean and std are those of the detected contacts")
+    assert "1 of 8 limits not met (1 violated)" in page.text
+    assert page.text.index("limits not met") < page.text.index("Mean and std are those of the detected contacts")
     assert "not a certificate" in page.text
 
 
