@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import leave, plain, say, table
+from cdtool.cli.console import columns_to_fill, leave, plain, table
 from cdtool.cli.options import JsonOption
 from cdtool.exit_status import Fact
 from cdtool.plain_text import shorten
@@ -83,7 +84,7 @@ def _show(found: BuildComparison) -> None:
 
     for which, names in (("old", found.only_old), ("new", found.only_new)):
         for name in names:
-            say(f"only in {which}, not compared: {name}")
+            _say(f"only in {which}, not compared: {name}")
     heads = ("contacts", "latency\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
     columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
     figures: tuple[Figure, ...] = ("latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n")
@@ -97,15 +98,21 @@ def _show(found: BuildComparison) -> None:
         for row in found.rows
     ]
     table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
-    say("old / new; contacts: the same in both, unless two numbers stand there; n.a.: not assessable")
+    _say("old / new; contacts: the same in both, unless two numbers stand there; n.a.: not assessable")
     typer.echo()
     for row in found.rows:
-        say(f"{shorten(row.group, 2 * _LONGEST_GROUP)}, {shorten(row.detector, 2 * _LONGEST_DETECTOR)}: {row.words}")
+        _say(f"{shorten(row.group, 2 * _LONGEST_GROUP)}, {shorten(row.detector, 2 * _LONGEST_DETECTOR)}: {row.words}")
     typer.echo()
     for item in found.changed[:_SHOWN]:
-        say(f"differs: {item.key}: {item.old}, now {item.new}")
+        _say(f"differs: {item.key}: {item.old}, now {item.new}")
     if len(found.changed) > _SHOWN:
-        say(f"differs: and {len(found.changed) - _SHOWN} more settings")
+        _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
     for note in found.notes:
-        say(note)
-    say(found.words)
+        _say(note)
+    _say(found.words)
+
+
+def _say(text: str) -> None:
+    """A sentence in lines that fit the terminal; names that are longer than a line are cut into several."""
+    for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  "):
+        typer.echo(line)

@@ -162,18 +162,18 @@ def _force_words(verdicts: Counter[str], checks: Sequence[ForceCheck]) -> Iterat
         return
     of = _things(checks)
     if verdicts["fail"]:
-        yield f"{verdicts['fail']} of {of} {'violates its' if verdicts['fail'] == 1 else 'violate their'} force profile"
+        yield f"force profile violated by {verdicts['fail']} of {of}"
     if verdicts["not_assessable"]:
-        yield f"force of {verdicts['not_assessable']} of {of} not assessable"
+        yield f"force profile not assessable for {verdicts['not_assessable']} of {of}"
     if verdicts["pass"] == len(checks):
-        yield f"the force profile is met by {of}"
+        yield f"force profile met by {of}"
 
 
 def _things(checks: Sequence[ForceCheck]) -> str:
     points = sum(isinstance(item.row, PointResult) for item in checks)
-    parts = [counted(points, "test point")] if points else []
-    parts += [counted(len(checks) - points, "contact")] if len(checks) > points else []
-    return " and ".join(parts)
+    if points == len(checks):
+        return counted(points, "test point")
+    return f"{len(checks)} contacts and test points" if points else counted(len(checks), "contact")
 
 
 def _missed_words(missed: Sequence[Summary], forbidden: Sequence[Summary]) -> Iterator[str]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from cdtool.errors import ConfigurationError
-from cdtool.evaluation.limits import broken, check_limits, read_limits
+from cdtool.evaluation.limits import not_met, check_limits, read_limits
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
 from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.summary import FIGURES, summarise
@@ -60,10 +60,10 @@ def check(text: str):
 def test_a_short_name_a_group_and_a_figure_name_one_limit():
     (limit,) = check('"gm.stiff.mean_ms" = { max = 25.0 }')
     assert (limit.detector, limit.group, limit.value, limit.outcome) == ("momentum", "stiff", 25.0, "met")
-    assert broken([limit]) == []
+    assert not_met([limit]) == []
 
 
-def test_above_the_largest_and_below_the_least_are_broken_with_the_reason():
+def test_above_the_largest_and_below_the_least_are_not_met_with_the_reason():
     (high,) = check('"gm.stiff.max_ms" = { max = 39.9 }')
     assert high.outcome == "violated" and high.reason == "40 is more than 39.9"
     (low,) = check('"feekf.stiff.detected" = { min = 2 }')
@@ -90,7 +90,7 @@ def test_what_could_not_be_assessed_does_not_pass():
     (limit,) = check('"gm.soft.2.mean_ms" = { max = 100 }')
     assert limit.outcome == "not_assessable" and limit.value is None
     assert limit.reason == "none of 1 contacts could be assessed"
-    assert broken([limit]) == [limit]
+    assert not_met([limit]) == [limit]
 
 
 def test_a_quantile_that_is_not_reached_breaks_its_limit():

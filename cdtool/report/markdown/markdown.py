@@ -19,7 +19,7 @@ from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, verdict_wo
 # Room for the verdict and how to read the figures, whatever names there are.
 _LEAST = 4_000
 _LIMITS_NAMED = 5
-_REASONS_NAMED = 5
+_REASONS_NAMED = 4
 _LONGEST_NAME = 40
 
 
@@ -60,9 +60,9 @@ def _head(evaluated: Evaluated) -> str:
         parts.append(f"**Not met:** {named}{more}.")
     reasons = results.conclusion.reasons
     if reasons:
-        lines = [f"- {escape(reason)}" for reason in reasons[:_REASONS_NAMED]]
-        rest = [f"- and {len(reasons) - _REASONS_NAMED} more"] if len(reasons) > _REASONS_NAMED else []
-        parts.append("\n".join([*lines, *rest]))
+        lines = [escape(reason) for reason in reasons[:_REASONS_NAMED]]
+        lines += [f"and {len(reasons) - _REASONS_NAMED} more"] if len(reasons) > _REASONS_NAMED else []
+        parts.append(f"**Force, missed contacts, not assessable:** {'; '.join(lines)}.")
     if results.skipped:
         parts.append(f"**Left out or lost: {counted(len(results.skipped), 'item')}**, named below.")
     return "\n\n".join([*parts, NO_CERTIFICATE])

@@ -58,7 +58,7 @@ def rule(figure: str, most: float, detector: str = "momentum", group: str = "sti
 
 def test_without_limits_the_report_begins_with_what_was_found(evaluated):
     first, counts = to_markdown(evaluated).split("\n\n")[:2]
-    assert first == "# Collision detection: no limits are set"
+    assert first == "# Collision detection: 1 detection missed without a limit; no limits are set"
     assert counts == "34 contacts with 2 detectors: 35 detected, 1 missed, 1 not assessable; 1 false alarm."
 
 
@@ -384,7 +384,7 @@ def test_long_and_hostile_names_do_not_push_the_verdict_out(results, kind):
     name = HOSTILE[kind] * 40
     text = to_markdown(named(results, name), [Image("a.png", name, name)], most=4000)
     assert len(text) <= 4000
-    assert text.startswith("# Collision detection: 9 of 9 limits not met (9 violated)\n")
+    assert text.startswith("# Collision detection: 9 of 9 limits not met (9 violated); force profile violated by ")
     assert "and 4 more" in text
     whole_blocks(text)
 
@@ -397,5 +397,5 @@ def test_a_report_too_short_for_its_verdict_is_refused(evaluated):
 def test_results_of_nothing_say_so():
     nothing = Results({}, (), (), (), (), ())
     text = to_markdown(evaluate(nothing))
-    assert text.startswith("# Collision detection: no limits are set\n\nnothing was scored.\n")
+    assert text.startswith("# Collision detection: nothing was scored; no limits are set\n\nnothing was scored.\n")
     assert "(rule not stated)" in text
