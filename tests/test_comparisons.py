@@ -49,7 +49,7 @@ def test_the_way_back_is_better_and_nothing_is_no_change(builds):
 
 @pytest.mark.parametrize("paired", [True, False])
 def test_equal_builds_are_called_neither_worse_nor_better_in_at_least_nine_of_ten_comparisons(paired):
-    """A spread of a quarter and 30 contacts rule out a change of a half, not of a tenth: the words differ, not the test."""
+    """With a spread of a quarter, 30 contacts rule out a change of a half; a smaller one is inconclusive."""
     rng = np.random.default_rng(78)
 
     def drawn() -> list[Outcome]:

@@ -195,9 +195,10 @@ def test_a_better_build_with_an_open_question_is_not_enough_where_power_is_requi
     faster = {key: [x - 5.0 for x in items] for key, items in values.items()}
     old, new = written("old.json", build(values)), written("new.json", build(faster))
     assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
-    assert "better: " in cdtool("compare", old, new).out and "inconclusive in 1 of 2 rows" in cdtool(
-        "compare", old, new
-    ).out
+    assert (
+        "better: " in cdtool("compare", old, new).out
+        and "inconclusive in 1 of 2 rows" in cdtool("compare", old, new).out
+    )
 
 
 def test_worse_comes_before_inconclusive(written):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from cdtool.errors import ConfigurationError
-from cdtool.evaluation.limits import not_met, check_limits, read_limits
+from cdtool.evaluation.limits import check_limits, not_met, read_limits
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
 from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.summary import FIGURES, summarise

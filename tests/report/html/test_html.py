@@ -268,7 +268,7 @@ def test_the_verdict_names_violated_limits_first_and_folds_those_that_are_met(ma
 def test_without_limits_the_verdict_says_what_was_found():
     evaluated, traces = case(limits=False)
     found = parsed(to_html(evaluated, traces))
-    assert limits are set 24 contacts with 2 detectors: 44 detected, 2 missed, 2 not assessable" in found.text
+    assert "limits are set 24 contacts with 2 detectors: 44 detected, 2 missed, 2 not assessable" in found.text
     assert "limits-table" not in found.tables
 
 

@@ -370,7 +370,9 @@ def test_no_report_is_longer_than_it_may_be(five_thousand, most):
 
 def test_a_thousand_limits_are_cut_but_not_the_broken_ones(results):
     kept = [LimitResult(f"k{i}", "momentum", "stiff", "missed", 0.0, None, 1.0, "met") for i in range(1000)]
-    broken = LimitResult("b", "momentum", "stiff", "p95_ms", None, None, 50.0, "violated", "not reached is more than 50")
+    broken = LimitResult(
+        "b", "momentum", "stiff", "p95_ms", None, None, 50.0, "violated", "not reached is more than 50"
+    )
     text = to_markdown(evaluate(replace(results, limits=(*kept, broken))), most=20_000)
     assert len(text) <= 20_000
     assert rows(text)[2][:4] == ["**violated**", "momentum", "stiff", "p95_ms"]
