@@ -41,6 +41,9 @@ def init(
         )
     for name in drafted.left_out:
         typer.echo(f"warning: {name}: the log contradicts the guess: it stands in the file as a comment", err=True)
+    for finding in drafted.findings:
+        if finding.severity == "loss":
+            typer.echo(f"loss: {plain(finding)}", err=True)
     leave_with(drafted.findings)
 
 
