@@ -27,7 +27,7 @@ def compare(
     old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
     new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
     level: Annotated[
-        float, typer.Option("--level", help="Chance of a wrong worse or better anywhere in the comparison.")
+        float, typer.Option("--level", help="Family-wise error rate: chance of any wrong worse or better.")
     ] = 0.05,
     relevant_change: Annotated[
         float,

@@ -30,7 +30,7 @@ def score(
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Score the trigger times of any controller or program in the way of cdtool benchmark.
+    """Score the trigger times of any controller or program by the same rules as cdtool benchmark.
 
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """

@@ -196,7 +196,7 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("simulate arm", 2): ARM_RUN[1],
     ("simulate season", 0): SEASON[0],
     ("simulate season", 2): SEASON[1],
-    ("study sensors", 0): lambda f: cdtool(
+    ("study sensors", 0): lambda _: cdtool(
         "study", "sensors", "-m", GATE / "machine.toml", "--speed", 0.2, "--stiffness", 5e5
     ),
     ("study sensors", 2): lambda f: cdtool("study", "sensors", "-m", f.absent),

@@ -8,6 +8,7 @@ import pytest
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
+from tests.command import cdtool
 from tests.formats.mcap_files import JOINTS, STREAMS, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]
@@ -18,6 +19,7 @@ def test_one_broken_message_is_left_out_and_counted(by_hand):
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "x")))):
         assert source.columns["/a x"].values.tolist() == [1, 2]
         assert "/a: 4 of 6 messages cannot be decoded: JSONDecodeError" in str(source.findings[0])
+        assert source.findings[0].severity == "loss"
 
 
 @pytest.mark.parametrize(
@@ -41,6 +43,7 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     source = Mcap().columns(path)
     assert not source.columns
     assert "1 of 1 messages cannot be decoded" in str(source.findings[0])
+    assert source.findings[0].severity == "loss" and cdtool("info", path).status == 3
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
 
