@@ -64,8 +64,8 @@ def test_the_table_of_the_docs_is_that_of_the_code():
 
 def test_the_docs_say_which_command_has_which_status():
     text = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| ((?:`[a-z -]+`(?:, )?)+) \| ([\d, ]+) \|", text, re.MULTILINE)
-    documented = {name: numbers for names, numbers in rows for name in re.findall("`([^`]+)`", names)}
+    rows = re.findall(r"^\| ([\d, ]+) \| ((?:`[a-z -]+`(?:, )?)+) \|", text, re.MULTILINE)
+    documented = {name: numbers for numbers, names in rows for name in re.findall("`([^`]+)`", names)}
     assert documented == {name: ", ".join(str(int(item)) for item in sorted(of)) for name, of in STATUSES_OF.items()}
 
 
