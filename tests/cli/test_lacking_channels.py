@@ -55,7 +55,9 @@ def test_a_limit_on_it_is_not_met(folder):
     limit = '[limits]\n"pi.stiff.missed" = { max = 0 }\n"gm.stiff.missed" = { max = 0 }\n'
     done = benchmark(folder, '["gm", "pi"]', limits=limit)
     assert (
-        done.status == 1 and "limit not assessable: pure_inertia.stiff.missed" in done.out and "1 of 2 limits not met" in done.out
+        done.status == 1
+        and "limit not assessable: pure_inertia.stiff.missed" in done.out
+        and "1 of 2 limits not met" in done.out
     )
 
 
