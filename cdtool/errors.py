@@ -1,4 +1,4 @@
-"""Errors that a user can act on, and the exit statuses of every command.
+"""Errors that a user can act on.
 
 Conventions: one line that names the file, the row or key and the value, then a hint that names the next step.
 """
@@ -6,20 +6,10 @@ Conventions: one line that names the file, the row or key and the value, then a 
 from __future__ import annotations
 
 from difflib import get_close_matches
-from enum import IntEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-
-class ExitStatus(IntEnum):
-    """What a command's exit status tells a pipeline."""
-
-    OK = 0
-    LIMIT_BROKEN = 1
-    UNUSABLE = 2
-    INCOMPLETE = 3
 
 
 class CdtoolError(Exception):

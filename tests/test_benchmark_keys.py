@@ -63,9 +63,9 @@ def test_a_label_that_fits_recordings_of_two_groups_is_refused(gate):
 
 def test_limits_on_detectors_that_are_not_run_are_told_and_not_checked(gate):
     limits = '[limits]\n"feekf.stiff.max_ms" = { max = 1 }\n"*.missed" = { max = 0 }\n'
-    assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("broken") == 1
+    assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("violated") == 1
     done = run(gate, HEAD, LEARN, ONSET, STIFF, limits, detectors=["gm"])
-    assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "kept")]
+    assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "met")]
     assert any("1 of 2 limits are on detectors that were not run" in item.reason for item in done.results.findings)
 
 
@@ -137,7 +137,7 @@ def test_limits_become_rows(gate):
         STIFF,
         '[limits]\n"feekf.stiff.p95_ms" = { max = 50 }\n"gm.stiff.p95_ms" = { max = 50 }\n',
     )
-    assert [item.outcome for item in done.results.limits] == ["kept", "broken"]
+    assert [item.outcome for item in done.results.limits] == ["met", "violated"]
 
 
 def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):

@@ -108,7 +108,7 @@ def test_a_broken_limit_fails_the_job_and_the_reports_are_there_all_the_same(she
     (shell.folder / "broken.toml").write_text(text, encoding="utf-8")
     shell.environment["BENCHMARK"] = "broken.toml"
     done = shell(github_step("cdtool benchmark"))
-    assert done.returncode == 1 and "limit broken: pure_inertia.stiff.max_ms" in done.stdout
+    assert done.returncode == 1 and "limit violated: pure_inertia.stiff.max_ms" in done.stdout
     assert shell.names("out") == REPORTS
     assert ElementTree.parse(shell.folder / "out" / "junit.xml").findall(".//failure")
     assert shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0

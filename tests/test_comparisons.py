@@ -5,6 +5,7 @@ A small set; the full one is benchmarks/compare_builds.py.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,7 +48,8 @@ def test_the_way_back_is_better_and_nothing_is_no_change(builds):
 
 
 @pytest.mark.parametrize("paired", [True, False])
-def test_equal_builds_show_no_change_in_at_least_nine_of_ten_comparisons(paired):
+def test_equal_builds_are_called_neither_worse_nor_better_in_at_least_nine_of_ten_comparisons(paired):
+    """With a spread of a quarter, 30 contacts rule out a change of a half; a smaller one is inconclusive."""
     rng = np.random.default_rng(78)
 
     def drawn() -> list[Outcome]:
@@ -56,12 +58,14 @@ def test_equal_builds_show_no_change_in_at_least_nine_of_ten_comparisons(paired)
         return [float(x) if found else MISSED for x, found in zip(latencies, rng.random(30) > 0.05, strict=True)]
 
     other = {} if paired else {"bytes_of": "other", "names": "other-"}
-    quiet, tried = 0, 30
+    quiet, tried = Counter[str](), 30
     for _ in range(tried):
         false_alarms = [{key: int(rng.poisson(3.0)) for key in KEYS} for _ in range(2)]
         old = build({key: drawn() for key in KEYS}, false_alarms=false_alarms[0], force=None)
         new = build({key: drawn() for key in KEYS}, false_alarms=false_alarms[1], force=None, **other)
-        found = compare(old, new)
+        found = compare(old, new, relevant_change=0.5)
         assert {row.paired for row in found.rows} == {paired}
-        quiet += found.verdict == "no change shown"
-    assert quiet >= 0.9 * tried
+        quiet[found.verdict] += 1
+        if quiet.total() <= 3:
+            assert compare(old, new).verdict in (found.verdict, "inconclusive")
+    assert quiet["no change shown"] >= 0.9 * tried

@@ -28,36 +28,38 @@ from cdtool.cli.score import score
 from cdtool.cli.signature import signature
 from cdtool.cli.simulate import simulate
 from cdtool.cli.study import study
-from cdtool.errors import CdtoolError, ExitStatus
+from cdtool.errors import CdtoolError
+from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
 
 app = typer.Typer(
     name="cdtool",
-    help="How fast, how surely and at which force does a machine notice that it has hit something?",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",  # in its default the help loses what stands in brackets, such as units
 )
-app.command("info")(info)
-app.command("init")(init)
-app.command("learn-signature")(learn_signature)
-app.command("detect")(detect)
-app.command("explain")(explain)
-app.command("benchmark")(benchmark)
-app.command("report")(report)
-app.command("score")(score)
-app.command("compare")(compare)
-app.command("plan")(plan)
-app.command("convert")(convert)
-app.command("recover")(recover)
+for command in (
+    info,
+    init,
+    learn_signature,
+    detect,
+    explain,
+    benchmark,
+    report,
+    score,
+    compare,
+    plan,
+    convert,
+    recover,
+    list_known,
+):
+    name = "list" if command is list_known else command.__name__.replace("_", "-")
+    app.command(name, epilog=statuses_words(name))(command)
 app.add_typer(signature, name="signature")
 app.add_typer(simulate, name="simulate")
 app.add_typer(study, name="study")
-app.command("list")(list_known)
 
-
-# As a shell counts it: 128 and the number of the signal that Ctrl-C sends.
-_INTERRUPTED = 130
+_WHAT_FOR = "How fast, how surely and at which force does a machine notice that it has hit something?"
 
 
 def _show_version(wanted: bool) -> None:
@@ -68,17 +70,19 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+def _help() -> str:
+    """What cdtool is for, and the table of exit statuses."""
+    rows = "\n".join(f"- {int(status)}: {meaning}" for status, meaning in STATUSES.items())
+    return f"{_WHAT_FOR}\n\nExit status:\n\n{rows}\n\n{ORDER}"
+
+
+@app.callback(help=_help())
 def _options(
     version: Annotated[
         bool, typer.Option("--version", help="Show the version and end.", callback=_show_version, is_eager=True)
     ] = False,
 ) -> None:
-    """How fast, how surely and at which force does a machine notice that it has hit something?
-
-    Exit status: 0 done, 1 a limit is broken, 2 wrong usage or nothing usable, 3 done but some data was left out,
-    130 interrupted.
-    """
+    """Options of cdtool itself."""
 
 
 def _show_note(message: Warning | str, *_: object, **__: object) -> None:
@@ -97,27 +101,27 @@ def main() -> None:
         from cdtool.cli.console import print_error
 
         print_error(fault)
-        sys.exit(ExitStatus.UNUSABLE)
+        sys.exit(status_of([Fact.WRONG_USAGE]))
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
-        sys.exit(ExitStatus.OK)
+        sys.exit(status_of([]))
     except SystemExit as end:
-        if end.code == _INTERRUPTED:
+        if end.code == ExitStatus.INTERRUPTED:
             typer.echo("interrupted", err=True)
-        # click ends with 1 where the reader has gone; here 1 means a broken limit.
+        # click ends with 1 where the reader has gone; here 1 means a violated limit.
         if isinstance(end.__context__, OSError) and end.__context__.errno == errno.EPIPE:
-            sys.exit(ExitStatus.OK)
+            sys.exit(status_of([]))
         raise
     except OSError as fault:
         from cdtool.cli.console import print_error
 
         where = f"{fault.filename}: " if fault.filename else ""
         print_error(CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space"))
-        sys.exit(ExitStatus.UNUSABLE)
+        sys.exit(status_of([Fact.NOTHING_USABLE]))
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
-        sys.exit(_INTERRUPTED)
+        sys.exit(status_of([Fact.INTERRUPTED]))
     except Exception:
-        # Python would end with 1, which means a broken limit to a pipeline.
+        # Python would end with 1, which means a violated limit to a pipeline.
         traceback.print_exc()
-        sys.exit(ExitStatus.UNUSABLE)
+        sys.exit(status_of([Fact.INTERNAL_ERROR]))

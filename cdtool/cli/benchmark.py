@@ -9,7 +9,7 @@ import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import JobsOption, JsonOption, OutputOption, listed
-from cdtool.cli.summary_table import finish, show_limits, show_table
+from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
 
 
@@ -29,7 +29,7 @@ def benchmark(
 ) -> None:
     """Learn, detect and compare: latency, misses and false alarms of each detector in each group.
 
-    Ends with 1 where a figure breaks one of the limits that the file sets.
+    Ends with 1 where a limit or force profile that the file sets is violated.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
@@ -52,8 +52,8 @@ def benchmark(
     if as_json:
         typer.echo(to_json(done.results), nl=False)
     else:
+        show_conclusion(done.evaluated)
         show_table(done.evaluated)
-        show_limits(done.evaluated)
         for path in written:
             typer.echo(f"written: {plain(path)}")
     finish(done.evaluated)

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import plain, table
+from cdtool.cli.console import columns_to_fill, leave, plain, table
 from cdtool.cli.options import JsonOption
-from cdtool.errors import ExitStatus
+from cdtool.exit_status import Fact
 from cdtool.plain_text import shorten
 
 if TYPE_CHECKING:
     from cdtool.evaluation.builds.comparison import BuildComparison
     from cdtool.evaluation.builds.questions import Figure
 
-_WIDTH = 100
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 _SHOWN = 10
 # How each file of a comparison begins.
@@ -28,17 +27,33 @@ def compare(
     old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
     new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
     level: Annotated[
-        float, typer.Option("--level", help="Chance of a wrong worse or better anywhere in the comparison.")
+        float, typer.Option("--level", help="Family-wise error rate: chance of any wrong worse or better.")
     ] = 0.05,
+    relevant_change: Annotated[
+        float,
+        typer.Option(
+            "--relevant-change",
+            help="The smallest change for the worse that matters: share of the old mean latency and force, of the "
+            "contacts missed or not assessable, and of a false alarm per operation.",
+        ),
+    ] = 0.1,
+    require_power: Annotated[
+        bool,
+        typer.Option(
+            "--require-power",
+            help="End with 4 where these recordings could not have shown a relevant change, or the new file lacks "
+            "a detector or group.",
+        ),
+    ] = False,
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="Where to, repeatable: .md (a pull request), .json.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell a real change between two builds from noise: latency, misses, false alarms, force at the alarm.
+    """Compare two builds, a real change apart from noise: latency, misses, false alarms, force at the alarm.
 
-    Contacts that both files hold are compared one by one. Ends with 1 where anything is shown to be worse, with 0 where
-    nothing is, with 2 where the two cannot be compared.
+    Contacts that both files hold are compared one by one. Ends with 1 where anything is shown to be worse. Where
+    a relevant change could not have been shown, the answer is "inconclusive": status 0, or 4 with --require-power.
 
     Example: cdtool compare old.json new.json -o compare.md
     """
@@ -51,7 +66,7 @@ def compare(
     refuse_inputs(targets, (old, new))
     for target in targets:
         refuse_other_kind(target, _MARKS[target.suffix.lower()], "comparison of cdtool")
-    found = run(old, new, significance=level)
+    found = run(old, new, significance=level, relevant_change=relevant_change)
     write_outputs(found, targets)
     if as_json:
         typer.echo(to_json(found), nl=False)
@@ -59,8 +74,7 @@ def compare(
         _show(found)
         for path in targets:
             typer.echo(f"written: {plain(path)}")
-    if found.verdict in ("worse", "mixed"):
-        raise typer.Exit(ExitStatus.LIMIT_BROKEN)
+    leave(facts=found.facts if require_power else set(found.facts) & {Fact.WORSE})
 
 
 def _show(found: BuildComparison) -> None:
@@ -99,5 +113,6 @@ def _show(found: BuildComparison) -> None:
 
 
 def _say(text: str) -> None:
-    for line in wrap(plain(text), _WIDTH, subsequent_indent="  "):
+    """A sentence in lines that fit the terminal; names that are longer than a line are cut into several."""
+    for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  "):
         typer.echo(line)

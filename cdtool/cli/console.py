@@ -5,22 +5,25 @@ from __future__ import annotations
 import math
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.errors import CdtoolError, ExitStatus
+from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
+from cdtool.exit_status import Fact, status_of
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from cdtool.pipeline import Detection
+    from cdtool.recording import Finding
     from cdtool.workflows.runs import Progress
 
 _SHOWN = 10
@@ -50,16 +53,35 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), 
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 
 
-def leave(skipped: Sequence[Skipped]) -> None:
-    """End with status 3 where something was left out, or a log that was used is damaged."""
-    if not skipped:
-        return
+def leave(skipped: Sequence[Skipped] = (), facts: Iterable[Fact] = ()) -> None:
+    """End with the status of these facts, and of what was left out or is damaged; return where all is good."""
     left_out, damaged = _apart(skipped)
     logs = len({item.recording for item in damaged})
     parts = [f"{len(left_out)} {'item was' if len(left_out) == 1 else 'items were'} left out"] if left_out else []
     parts += [f"{logs} {'log is' if logs == 1 else 'logs are'} damaged"] if damaged else []
-    typer.echo(f"done, but {' and '.join(parts)}", err=True)
-    raise typer.Exit(ExitStatus.INCOMPLETE)
+    if parts:
+        typer.echo(f"done, but {' and '.join(parts)}", err=True)
+    found = [*facts, *([Fact.LEFT_OUT] if left_out else []), *([Fact.LOST] if damaged else [])]
+    status = status_of(found)
+    if status:
+        raise typer.Exit(status)
+
+
+def leave_with(findings: Iterable[Finding], facts: Iterable[Fact] = ()) -> None:
+    """End with the status of these facts, and of what findings call a loss; return where all is good."""
+    lost = any(finding.severity == "loss" for finding in findings)
+    leave(facts=[*facts, *([Fact.LOST] if lost else [])])
+
+
+def print_not_assessable(logs: Iterable[tuple[str, Sequence[Detection]]]) -> list[Fact]:
+    """On stderr each log of which no operation could be assessed, with its reasons; what follows for the status."""
+    facts: list[Fact] = []
+    for name, detections in logs:
+        if all(item.verdict.outcome == "not assessable" for item in detections):
+            reasons = dict.fromkeys(item.verdict.reason for item in detections)
+            typer.echo(f"not assessable: {plain(name)}: {plain('; '.join(reasons) or 'no operation in it')}", err=True)
+            facts.append(Fact.NOTHING_ASSESSABLE)
+    return facts
 
 
 def say(text: str, indent: str = "") -> None:

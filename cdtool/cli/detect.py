@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import leave, plain, print_error, print_json, print_skipped, progress
+from cdtool.cli.console import leave, plain, print_error, print_json, print_not_assessable, print_skipped, progress
 from cdtool.cli.detect_shown import as_rows, show_detected
 from cdtool.cli.options import (
     DebounceOption,
@@ -27,8 +27,9 @@ from cdtool.cli.options import (
     limits_of,
     listed,
 )
-from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
+from cdtool.errors import CdtoolError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
+from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
     from cdtool.workflows.contact_force import ForceSummary
@@ -107,7 +108,7 @@ def detect(
     if not done:
         for item in skipped:
             print_error(CdtoolError(item.reason))
-        raise typer.Exit(ExitStatus.UNUSABLE)
+        leave(facts=[Fact.NOTHING_USABLE])
     taught = "the signature was learned from it: no alarm here shows nothing"
     learned = [Skipped(str(log), taught) for log, found in done if found.learned]
     absent = [Skipped(str(log), str(item)) for log, found in done for item in absent_truth(found.recording)]
@@ -119,7 +120,7 @@ def detect(
         for log, _ in done:
             if log in plot_names:
                 typer.echo(f"plot written to {plain(plot_names[log])}")
-    leave(skipped)
+    leave(skipped, print_not_assessable((str(log), found.detections) for log, found in done))
 
 
 def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.cli.console import leave, number, plain, print_json, print_skipped, say, table
+from cdtool.cli.console import leave, number, plain, print_json, print_not_assessable, print_skipped, say, table
 from cdtool.cli.options import (
     DebounceOption,
     DetectorOption,
@@ -88,7 +88,7 @@ def explain(
     for path in _draw(explained, drawn, log.stem):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
-    leave(skipped)
+    leave(skipped, print_not_assessable([(str(log), explained.found.detections)]))
 
 
 def _show(explained: Explained) -> None:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import number, plain, print_error, print_json, table
+from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table
 from cdtool.cli.options import JsonOption
-from cdtool.errors import CdtoolError, ExitStatus
+from cdtool.errors import CdtoolError
+from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
     from cdtool.workflows.information import Info
@@ -30,21 +31,19 @@ def info(
     from cdtool.workflows.information import info as survey
 
     done: list[Info] = []
-    failed = 0
+    facts: list[Fact] = []
     for log in logs:
         try:
             done.append(survey(log, machine=machine))
         except CdtoolError as fault:
             print_error(fault)
-            failed += 1
+            facts.append(Fact.LEFT_OUT)
     if as_json:
         print_json([asdict(item) for item in done])
     else:
         for item in done:
             _show(item)
-    lossy = any(finding.severity == "loss" for item in done for finding in item.findings)
-    if failed or lossy:
-        raise typer.Exit(ExitStatus.INCOMPLETE if done else ExitStatus.UNUSABLE)
+    leave_with((finding for item in done for finding in item.findings), facts if done else [Fact.NOTHING_USABLE])
 
 
 def _show(item: Info) -> None:

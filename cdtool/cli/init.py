@@ -9,10 +9,9 @@ from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import plain, print_json
+from cdtool.cli.console import leave_with, plain, print_json
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
-from cdtool.errors import ExitStatus
 
 
 def init(
@@ -42,8 +41,10 @@ def init(
         )
     for name in drafted.left_out:
         typer.echo(f"warning: {name}: the log contradicts the guess: it stands in the file as a comment", err=True)
-    if any(finding.severity == "loss" for finding in drafted.findings):
-        raise typer.Exit(ExitStatus.INCOMPLETE)
+    for finding in drafted.findings:
+        if finding.severity == "loss":
+            typer.echo(f"loss: {plain(finding)}", err=True)
+    leave_with(drafted.findings)
 
 
 def _quoted(path: object) -> str:

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import plain
+from cdtool.cli.console import leave, plain
 from cdtool.cli.late_progress import late_progress
-from cdtool.errors import ExitStatus
+from cdtool.exit_status import Fact
 
 
 def recover(
@@ -37,5 +37,4 @@ def recover(
         typer.echo(f"{done.unverified} of them no checksum covers: in chunks without one")
     if done.left_out:
         typer.echo(f"left out: {done.left_out} messages that no checksum covers (--unverified keeps them)")
-    if not done.whole:
-        raise typer.Exit(ExitStatus.INCOMPLETE)
+    leave(facts=() if done.whole else [Fact.LOST])

@@ -9,7 +9,7 @@ import typer
 
 from cdtool.cli.console import plain, print_skipped
 from cdtool.cli.options import OutputOption
-from cdtool.cli.summary_table import finish, show_limits, show_table
+from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def report(
@@ -19,7 +19,7 @@ def report(
     """Make reports of a benchmark again, without its recordings.
 
     Traces are read from the file beside it (results.traces.json.gz); without it figures over time are left out. Ends
-    as the benchmark did: 1 where a limit is broken, 3 where something was left out.
+    as the benchmark did: the status stands in its conclusion.
 
     Example: cdtool report results.json -o report.html -o summary.md -o junit.xml
     """
@@ -33,8 +33,8 @@ def report(
         typer.echo(f"note: {plain(note)}", err=True)
     written = write_outputs(Report(evaluated, traces), targets)
     print_skipped(evaluated.results.skipped, evaluated.results.findings)
+    show_conclusion(evaluated)
     show_table(evaluated)
-    show_limits(evaluated)
     for path in written:
         typer.echo(f"written: {plain(path)}")
     finish(evaluated)

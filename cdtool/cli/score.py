@@ -9,7 +9,7 @@ import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import JobsOption, JsonOption, OutputOption
-from cdtool.cli.summary_table import finish, show_limits, show_table
+from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def score(
@@ -30,7 +30,7 @@ def score(
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Score the trigger times of any controller or program in the way of cdtool benchmark.
+    """Score the trigger times of any controller or program by the same rules as cdtool benchmark.
 
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """
@@ -48,8 +48,8 @@ def score(
     if as_json:
         typer.echo(to_json(results), nl=False)
     else:
+        show_conclusion(done.evaluated)
         show_table(done.evaluated)
-        show_limits(done.evaluated)
         for path in written:
             typer.echo(f"written: {plain(path)}")
     finish(done.evaluated)

@@ -10,7 +10,8 @@ import typer
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
 from cdtool.cli.options import JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
-from cdtool.errors import ExitStatus, UsageError
+from cdtool.errors import UsageError
+from cdtool.exit_status import Fact, statuses_words
 
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
@@ -35,7 +36,7 @@ CutOption = Annotated[
 PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw.")]
 
 
-@signature.command("show")
+@signature.command("show", epilog=statuses_words("signature show"))
 def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = False) -> None:
     """What a signature file holds: machine, detector, threshold, classes of motion, runs, and its drift since learned.
 
@@ -61,7 +62,7 @@ def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = Fals
             typer.echo(f"plot written to {plain(drawn)}")
 
 
-@signature.command("check")
+@signature.command("check", epilog=statuses_words("signature check"))
 def check(
     file: FileArgument,
     logs: Annotated[
@@ -117,12 +118,11 @@ def check(
         plot_drift(audit, path)
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
-    if all(item.coverage is None and item.drift is None for item in checked.classes):
-        raise typer.Exit(ExitStatus.UNUSABLE)
-    leave(checked.skipped)
+    nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
+    leave(checked.skipped, [Fact.NOTHING_USABLE] if nothing else ())
 
 
-@signature.command("update")
+@signature.command("update", epilog=statuses_words("signature update"))
 def update(
     file: FileArgument,
     logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings to add.", metavar="LOG...")],
@@ -170,9 +170,7 @@ def update(
         many = "run" if len(done.added) == 1 else "runs"
         counts = f"{len(done.refused)} refused; {len(done.file.runs)} in all"
         typer.echo(f"{len(done.added)} {many} added to {plain(file)}, {counts}")
-    if not done.added:
-        raise typer.Exit(ExitStatus.UNUSABLE)
-    leave(done.refused)
+    leave(done.refused, () if done.added else [Fact.NOTHING_USABLE])
 
 
 def _plot_names(plot: Path | None, checked: Checked) -> list[tuple[Path, DriftAudit]]:

@@ -10,6 +10,7 @@ import typer
 from cdtool.cli.console import plain, print_json, progress
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
+from cdtool.exit_status import statuses_words
 
 simulate = typer.Typer(
     help="Write simulated recordings with known contacts.", no_args_is_help=True, rich_markup_mode="markdown"
@@ -35,7 +36,7 @@ ReferenceOption = Annotated[
 OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")]
 
 
-@simulate.command("gate")
+@simulate.command("gate", epilog=statuses_words("simulate gate"))
 def gate(
     output: OutputOption,
     free: FreeOption = 14,
@@ -60,7 +61,7 @@ def gate(
     _report(output, written, seed, as_json)
 
 
-@simulate.command("arm")
+@simulate.command("arm", epilog=statuses_words("simulate arm"))
 def arm(
     output: OutputOption,
     trial: Annotated[int, typer.Option("--trial", min=1, max=2, help="1: the arm is hit; 2: the forearm.")] = 1,
@@ -88,7 +89,7 @@ def arm(
     _report(output, written, seed, as_json)
 
 
-@simulate.command("season")
+@simulate.command("season", epilog=statuses_words("simulate season"))
 def season(
     output: OutputOption,
     runs: Annotated[int, typer.Option("--runs", min=1, help="Impact-free runs, one after another.")] = 60,

@@ -10,6 +10,7 @@ import typer
 from cdtool.cli.console import number, plain, print_json, table
 from cdtool.cli.options import JsonOption, MachineOption
 from cdtool.errors import UsageError
+from cdtool.exit_status import statuses_words
 
 if TYPE_CHECKING:
     from cdtool.workflows.study import SensorStudy
@@ -26,7 +27,7 @@ def _study() -> None:
     """Study an impact before the machine is built."""
 
 
-@study.command("sensors")
+@study.command("sensors", epilog=statuses_words("study sensors"))
 def sensors(
     machine: MachineOption,
     file: Annotated[
@@ -74,7 +75,7 @@ def sensors(
         _show(done)
 
 
-@study.command("figures")
+@study.command("figures", epilog=statuses_words("study figures"))
 def figures(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
     as_json: JsonOption = False,

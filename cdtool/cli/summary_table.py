@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.console import leave, number, plain, say, table
-from cdtool.errors import ExitStatus
+from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
@@ -58,29 +58,40 @@ def show_table(evaluated: Evaluated) -> None:
     _show_forces(evaluated.results)
 
 
-def show_limits(evaluated: Evaluated) -> None:
-    """One line for each limit that is not kept, and how many are."""
-    from cdtool.evaluation.limits import broken
+def show_conclusion(evaluated: Evaluated) -> None:
+    """The first lines on screen: the conclusion, then what of limits, force profiles and contacts is not good."""
+    from cdtool.report.verdict_words import counts_words, verdict_words
+
+    conclusion = evaluated.results.conclusion
+    say(verdict_words(evaluated))
+    say(counts_words(evaluated), indent="  ")
+    for reason in conclusion.reasons[:_SHOWN]:
+        say(reason, indent="  ")
+    if len(conclusion.reasons) > _SHOWN:
+        typer.echo(f"  and {len(conclusion.reasons) - _SHOWN} more")
+    _show_limits(evaluated)
+    typer.echo()
+
+
+def _show_limits(evaluated: Evaluated) -> None:
+    """One line for each limit that is not met, and how many are."""
+    from cdtool.evaluation.limits import not_met
 
     limits = evaluated.results.limits
     if not limits:
         return
-    failed = broken(limits)
+    failed = not_met(limits)
     for item in failed[:_SHOWN]:
         name = f"{item.detector}.{item.group}.{item.figure}"
-        typer.echo(f"limit {item.outcome}: {plain(name)}: {plain(item.reason)} (limit {plain(item.limit)})")
+        outcome = item.outcome.replace("_", " ")
+        say(f"limit {outcome}: {name}: {item.reason} (limit {item.limit})", indent="  ")
     if len(failed) > _SHOWN:
-        typer.echo(f"limits not kept: and {len(failed) - _SHOWN} more")
-    typer.echo(f"limits: {len(limits) - len(failed)} of {len(limits)} kept")
+        typer.echo(f"  limits not met: and {len(failed) - _SHOWN} more")
 
 
 def finish(evaluated: Evaluated) -> None:
-    """End with 1 where a limit is not kept, else with 3 where something was left out."""
-    from cdtool.evaluation.limits import broken
-
-    if broken(evaluated.results.limits):
-        raise typer.Exit(ExitStatus.LIMIT_BROKEN)
-    leave(evaluated.results.skipped)
+    """End with the status that follows from the results' conclusion."""
+    leave(evaluated.results.skipped, [Fact[name.upper()] for name in evaluated.results.conclusion.facts])
 
 
 def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
@@ -168,10 +179,13 @@ def _show_forces(results: Any) -> None:
     for item in results.forces:
         counted.setdefault((item.group, item.profile), []).append(item.verdict)
     for (group, profile), verdicts in counted.items():
-        counts = ", ".join(f"{verdicts.count(word)} {word}" for word in ("pass", "fail", "not assessable"))
+        counts = ", ".join(
+            f"{verdicts.count(word)} {word.replace('_', ' ')}" for word in ("pass", "fail", "not_assessable")
+        )
         typer.echo(f"force, {plain(group)}, {plain(profile)}: {counts}")
     for where, item in rows:
         reason = f": {item.reason}" if item.reason else ""
-        typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {item.verdict} ({plain(item.note)}){plain(reason)}")
+        verdict = item.verdict.replace("_", " ")
+        typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {verdict} ({plain(item.note)}){plain(reason)}")
     if results.forces:
         typer.echo("force verdicts are evidence about recordings, not a certificate")

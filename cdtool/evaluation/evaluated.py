@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from cdtool.evaluation.comparison import Comparison, compare_detectors
+from cdtool.evaluation.conclusion import conclude
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.summary import Summary, summarise
@@ -23,9 +24,12 @@ class Evaluated:
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     """Derive the statistics; `limits` are checked and become rows of the results, else those in them stay.
 
+    What follows from all of it becomes their conclusion.
+
     Raises ConfigurationError where a limit names no figure of these results.
     """
     summaries = tuple(summarise(results))
     if limits:
         results = replace(results, limits=check_limits(limits, summaries))
+    results = replace(results, conclusion=conclude(results, summaries))
     return Evaluated(results, summaries, tuple(compare_detectors(results)))

@@ -1,7 +1,7 @@
 """[limits]: what a figure may be at most or at least, so that a pipeline can act on it.
 
-Conventions: a key is detector.group.figure, or detector.figure for every group; `*` stands for all. A limit is kept,
-broken, or not assessable, which does not count as kept: nothing passes because nothing was measured.
+Conventions: a key is detector.group.figure, or detector.figure for every group; `*` stands for all. A limit is met,
+violated, or not assessable, which does not count as met: nothing passes because nothing was measured.
 """
 
 from __future__ import annotations
@@ -69,18 +69,18 @@ def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tu
     return tuple(found)
 
 
-def broken(limits: Sequence[LimitResult]) -> list[LimitResult]:
-    """Those that are not kept."""
-    return [item for item in limits if item.outcome != "kept"]
+def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:
+    """Those that are violated or could not be assessed."""
+    return [item for item in limits if item.outcome != "met"]
 
 
 def _check(rule: LimitRule, summary: Summary) -> LimitResult:
     value = FIGURES[rule.figure](summary)
-    outcome, reason = "kept", None
+    outcome, reason = "met", None
     if math.isnan(value):
-        outcome, reason = "not assessable", summary.why_undefined(rule.figure)
+        outcome, reason = "not_assessable", summary.why_undefined(rule.figure)
     elif not rule.least <= value <= rule.largest:
-        outcome = "broken"
+        outcome = "violated"
         reason = f"{_text(value)} is {'more' if value > rule.largest else 'less'} than {_text(_crossed(rule, value))}"
     return LimitResult(
         limit=rule.key,

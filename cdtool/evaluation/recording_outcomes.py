@@ -1,8 +1,8 @@
-"""What became of each recording with each detector, and its part in broken limits.
+"""What became of each recording with each detector, and its part in violated limits.
 
-Conventions: a recording has a part in a broken limit where a contact or a false alarm of it is what the limit counts
+Conventions: a recording has a part in a violated limit where a contact or a false alarm of it is what the limit counts
 (missed, false alarms, forces failed), or is itself beyond what the limit allows (latencies, forces). A limit can be
-broken without any such recording: the upper end of an interval lies beyond every single latency.
+violated without any such recording: the upper end of an interval lies beyond every single latency.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class RecordingOutcome:
-    """One recording and one detector: contacts, false alarms, and its part in broken limits in words.
+    """One recording and one detector: contacts, false alarms, and its part in violated limits in words.
 
     `judged` is False where the detector gave nothing for it: its contacts have no row, or it did not run in the group.
     """
@@ -89,11 +89,11 @@ def _log_of(operation: str, logs: Mapping[str, None]) -> str:
 
 
 def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:
-    """The limits that a single recording can have broken, by group and detector."""
+    """The limits that a single recording can have violated, by group and detector."""
     found: dict[tuple[str, str], list[LimitResult]] = {}
     for limit in limits:
         above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
-        if limit.outcome == "broken" and above != (limit.figure == "detected"):
+        if limit.outcome == "violated" and above != (limit.figure == "detected"):
             found.setdefault((limit.group, limit.detector), []).append(limit)
     return found
 

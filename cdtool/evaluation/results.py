@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 def meant(meaning: str, **default: Any) -> Any:
@@ -97,7 +97,7 @@ class ForceStepResult:
     at_most_n: float = meant("largest force allowed")
     peak_n: float | None = meant("largest force in the step; of a point: what its tests come to")
     time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
-    verdict: str = meant("pass, fail or not assessable")
+    verdict: str = meant("pass, fail or not_assessable")
     reason: str | None = meant("why it is no pass", default=None)
 
 
@@ -109,7 +109,7 @@ class ForceResult:
     group: str = meant("the benchmark's group")
     contact: int = meant("number of the contact in its recording, from 1")
     profile: str = meant("name of the profile in the limits file")
-    verdict: str = meant("pass, fail or not assessable")
+    verdict: str = meant("pass, fail or not_assessable")
     peak_n: float | None = meant("largest force of the contact, corrected for the mass before the cell")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     point: str | None = meant("test point", default=None)
@@ -127,7 +127,7 @@ class PointResult:
     group: str = meant("the benchmark's group")
     profile: str = meant("name of the profile in the limits file")
     tests: int = meant("contacts at the point")
-    verdict: str = meant("pass, fail or not assessable")
+    verdict: str = meant("pass, fail or not_assessable")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     note: str = meant("how many tests were averaged")
     reason: str | None = meant("why it is no pass", default=None)
@@ -174,8 +174,22 @@ class LimitResult:
     value: float | None = meant("the figure; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")
     largest: float | None = meant("largest value allowed")
-    outcome: str = meant("kept, broken or not assessable")
-    reason: str | None = meant("why it is not kept", default=None)
+    outcome: str = meant("met, violated or not_assessable")
+    reason: str | None = meant("why it is not met", default=None)
+
+
+@dataclass(frozen=True)
+class ConclusionResult:
+    """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
+
+    outcome: str = meant(
+        "violated, not_assessable, met, or not_asked without limits and force profiles", default="not_asked"
+    )
+    headline: str = meant("the conclusion in one line, as every report shows it", default="no limits are set")
+    reasons: tuple[str, ...] = meant("what is not good beside the limits, line by line, worst first", default=())
+    missed_without_limit: int = meant("missed detections that no limit is about", default=0)
+    facts: tuple[str, ...] = meant("what decides the exit status", default=())
+    exit_status: int = meant("exit status of the benchmark with these results", default=0)
 
 
 @dataclass(frozen=True)
@@ -204,4 +218,7 @@ class Results:
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
     skipped: tuple[Skipped, ...] = meant("what was left out", default=())
     findings: tuple[Skipped, ...] = meant("what is odd about recordings that were used", default=())
+    conclusion: ConclusionResult = field(
+        default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
+    )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)

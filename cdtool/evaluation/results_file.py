@@ -18,6 +18,9 @@ from cdtool.strict_json import strict_json
 Row = TypeVar("Row")
 # Rows of a detector, of a group or of both.
 _TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
+# The version before: "kept", "broken", "not assessable".
+_SPACED_WORDS = 2
+_RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
 
@@ -45,17 +48,40 @@ def read_results(path: Path) -> Results:
         raise _no_results(path, str(fault)) from fault
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "no schema_version in it")
-    if values["schema_version"] != SCHEMA_VERSION:
+    if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
+        known = f"this cdtool knows {_SPACED_WORDS} and {SCHEMA_VERSION}"
         raise RecordingError(
-            f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
+            f"{path}: schema_version is {values['schema_version']}, {known}",
             "run cdtool benchmark again with this version",
         )
     try:
+        if values["schema_version"] == _SPACED_WORDS:
+            values = migrated(values)
         results = build(Results, values, "results")
         _refuse_strangers(results)
     except ValueError as fault:
         raise _no_results(path, str(fault)) from fault
     return results
+
+
+def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of schema_version 2 as those of version 3: other words for verdicts, no conclusion yet."""
+
+    def renamed(rows: Any, name: str) -> Any:
+        if not isinstance(rows, list):
+            return rows
+        made = []
+        for row in rows:
+            if isinstance(row, dict) and isinstance(row.get(name), str):
+                row = {**row, name: _RENAMED.get(row[name], row[name])}
+            if isinstance(row, dict) and "steps" in row:
+                row = {**row, "steps": renamed(row["steps"], name)}
+            made.append(row)
+        return made
+
+    tables = {name: renamed(values[name], "verdict") for name in ("forces", "points") if name in values}
+    tables |= {"limits": renamed(values["limits"], "outcome")} if "limits" in values else {}
+    return {**values, **tables, "schema_version": SCHEMA_VERSION}
 
 
 def build(kind: type[Row], values: Any, where: str) -> Row:

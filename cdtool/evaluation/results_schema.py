@@ -12,14 +12,15 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from cdtool.evaluation.results import SCHEMA_VERSION, ContactResult, LimitResult, Results
+from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
 
 _NAMES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 # What text may be, where it is one of a few words: for one class, or for every one that has the field.
 WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
     (ContactResult, "outcome"): ("detected", "missed", "not_assessable"),
-    (LimitResult, "outcome"): ("kept", "broken", "not assessable"),
-    "verdict": ("pass", "fail", "not assessable"),
+    (LimitResult, "outcome"): ("met", "violated", "not_assessable"),
+    (ConclusionResult, "outcome"): ("violated", "not_assessable", "met", "not_asked"),
+    "verdict": ("pass", "fail", "not_assessable"),
     "side": ("above", "below"),
 }
 

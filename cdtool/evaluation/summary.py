@@ -228,5 +228,5 @@ def _summary(
 def _failed(forces: Sequence[ForceResult]) -> float:
     """Contacts above their force limits; NaN where none was judged, or none failed and one could not be assessed."""
     failed = sum(item.verdict == "fail" for item in forces)
-    unknown = any(item.verdict == "not assessable" for item in forces)
+    unknown = any(item.verdict == "not_assessable" for item in forces)
     return math.nan if not forces or (unknown and not failed) else float(failed)

@@ -35,7 +35,8 @@ def to_markdown(comparison: BuildComparison) -> str:
     parts = [
         f"**cdtool compare: {escape(comparison.words)}**",
         _table(_HEADS, [_cells(row) for row in comparison.rows]),
-        f"{_HOW_TO_READ} {NO_CERTIFICATE}",
+        f"{_HOW_TO_READ} *Inconclusive*: these recordings could not have shown a change for the worse of "
+        f"{100.0 * comparison.relevant_change:g} %. {NO_CERTIFICATE}",
     ]
     if comparison.changed:
         rows = [tuple(escape(text) for text in (item.key, item.old, item.new)) for item in comparison.changed]

@@ -13,6 +13,12 @@ NOTHING = "–"
 NOT_REACHED = "not reached"
 NOT_ASSESSABLE = "not assessable"
 
+
+def spoken(word: str) -> str:
+    """A word of the data as people read it: "not assessable"."""
+    return word.replace("_", " ")
+
+
 # What rounding leaves of equal numbers is no figure of its own: below this, or this share of the interval's width.
 _ZERO_BELOW = 1e-12
 _ZERO_SHARE = 1e-9

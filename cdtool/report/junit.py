@@ -1,8 +1,9 @@
 """JUnit XML: every limit and every recording as a test case, so that a CI system shows which one broke the build.
 
-Conventions: a failure is a limit that is not kept, or a recording's part in one; so there is a failure exactly where
-the exit status is 1. What was left out is an error, what could not be assessed is skipped. `time` is 0: a latency is
-no running time. Text from files is plain, so that every XML 1.0 parser reads it.
+Conventions: a failure is a limit or force profile that is not met, or a recording's part in one; so there is a failure
+exactly where the exit status is 1. What was left out is an error, and so is a force profile that could not be assessed
+and a detector that could assess nothing of a group; what else could not be assessed is skipped. `time` is 0: a latency
+is no running time. Text from files is plain, so that every XML 1.0 parser reads it.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
+from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
 from cdtool.evaluation.results import ContactResult, LimitResult, Skipped
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import number
+from cdtool.report.figure_text import number, spoken
 from cdtool.report.verdict_words import allowed, value_of
 
 _COUNTED = {"failures": "failure", "errors": "error", "skipped": "skipped"}
@@ -38,12 +40,18 @@ def _suites(evaluated: Evaluated) -> Iterator[ElementTree.Element]:
     results = evaluated.results
     if results.limits:
         yield _suite("limits", [_limit(item) for item in results.limits])
+    checks = force_checks(results)
+    if checks:
+        yield _suite("force", [_force(item) for item in checks])
     if results.skipped:
         yield _suite("left out", [_left_out(item) for item in results.skipped])
+    blind = {(item.detector, item.group) for item in nothing_assessed(evaluated.summaries)}
+    forbidden = {(item.detector, item.group) for item in force_missed(results, evaluated.summaries)}
     outcomes = recording_outcomes(results)
     for (detector, group), items in groupby(outcomes, key=lambda item: (item.detector, item.group)):
         name = f"{detector}.{group}"
-        yield _suite(name, [_recording(name, item) for item in items])
+        nothing, strict = (detector, group) in blind, (detector, group) in forbidden
+        yield _suite(name, [_recording(name, item, nothing, strict) for item in items])
     if not outcomes:
         yield _suite("benchmark", [_case("benchmark", "scored", "error", "nothing was scored")])
 
@@ -51,23 +59,35 @@ def _suites(evaluated: Evaluated) -> Iterator[ElementTree.Element]:
 def _limit(item: LimitResult) -> ElementTree.Element:
     name = f"{item.limit} ({item.detector}, {item.group})"
     words = f"{item.figure} is {value_of(item)}, {allowed(item)} allowed"
-    if item.outcome == "kept":
+    if item.outcome == "met":
         return _case("limits", name, lines=[words])
-    return _case("limits", name, "failure", f"{item.outcome}: {words}; {item.reason}")
+    return _case("limits", name, "failure", f"{spoken(item.outcome)}: {words}; {item.reason}")
+
+
+def _force(item: ForceCheck) -> ElementTree.Element:
+    name = f"{item.group}: {item.name}"
+    if item.verdict == "pass":
+        return _case("force", name, lines=[f"{item.profile}: pass"])
+    kind = "failure" if item.verdict == "fail" else "error"
+    return _case("force", name, kind, f"{item.profile}: {spoken(item.verdict)}: {item.reason}")
 
 
 def _left_out(item: Skipped) -> ElementTree.Element:
     return _case("left out", item.recording, "error", item.reason)
 
 
-def _recording(suite: str, item: RecordingOutcome) -> ElementTree.Element:
+def _recording(suite: str, item: RecordingOutcome, nothing: bool, strict: bool) -> ElementTree.Element:
+    """`nothing`: the detector could assess nothing of the group; `strict`: a missed contact violates its profile."""
     lines = [_contact(contact) for contact in item.contacts]
     lines += [f"false alarm at {alarm.time_s:.3f} s on {alarm.joint}" for alarm in item.false_alarms]
-    if item.breaks:
-        return _case(suite, item.recording, "failure", "; ".join(item.breaks), lines)
+    missed = [contact.contact for contact in item.contacts if strict and contact.outcome == "missed"]
+    breaks = [*item.breaks, *(f"contact {number} is missed where a force profile is set" for number in missed)]
+    if breaks:
+        return _case(suite, item.recording, "failure", "; ".join(breaks), lines)
     if item.blind:
         why = "; ".join(dict.fromkeys(contact.reason or "" for contact in item.contacts))
-        return _case(suite, item.recording, "skipped", f"not assessable: {why or 'the detector gave no result'}", lines)
+        kind = "error" if nothing else "skipped"
+        return _case(suite, item.recording, kind, f"not assessable: {why or 'the detector gave no result'}", lines)
     return _case(suite, item.recording, lines=lines or ["no contact and no alarm"])
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.limits import broken
 from cdtool.evaluation.results import LimitResult
 from cdtool.report.figure_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, counted
 
@@ -11,17 +10,18 @@ NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety.
 
 
 def verdict_words(evaluated: Evaluated) -> str:
-    """Whether the limits are kept."""
-    limits = evaluated.results.limits
-    if not limits:
-        return "no limits are set"
-    failing = broken(limits)
-    if not failing:
-        return f"all {len(limits)} limits are kept" if len(limits) > 1 else "the limit is kept"
-    unknown = sum(item.outcome == "not assessable" for item in failing)
-    kinds = [f"{len(failing) - unknown} broken"] if len(failing) > unknown else []
-    kinds += [f"{unknown} not assessable"] if unknown else []
-    return f"{len(failing)} of {counted(len(limits), 'limit')} not kept ({', '.join(kinds)})"
+    """Limits, force profiles, missed contacts and what could not be assessed, in one line."""
+    return evaluated.results.conclusion.headline
+
+
+def tone(evaluated: Evaluated) -> str:
+    """Whether that line is good, bad or unknown; empty where nothing was asked for."""
+    conclusion = evaluated.results.conclusion
+    if conclusion.outcome == "violated":
+        return "bad"
+    if conclusion.outcome == "not_assessable" or conclusion.missed_without_limit:
+        return "unknown"
+    return "good" if conclusion.outcome == "met" else ""
 
 
 def counts_words(evaluated: Evaluated) -> str:
@@ -45,7 +45,7 @@ def counts_words(evaluated: Evaluated) -> str:
 def value_of(limit: LimitResult) -> str:
     """A limit's figure; one that was checked and has no number is infinite, in as many digits as its reason."""
     if limit.value is None:
-        return NOTHING if limit.outcome == "not assessable" else NOT_REACHED
+        return NOTHING if limit.outcome == "not_assessable" else NOT_REACHED
     return f"{limit.value:.6g}"
 
 

@@ -222,7 +222,7 @@ def test_a_broken_limit_ends_with_1_before_what_was_left_out(gate_folder, tmp_pa
         (gate_folder / "limits.toml").write_text(text + limits)
         done = cdtool("benchmark", gate_folder / "limits.toml")
         assert done.status == 1
-        assert "limit broken: pure_torque.stiff.mean_ms:" in done.out and "limits: 1 of 2 kept" in done.out
+        assert "limit violated: pure_torque.stiff.mean_ms:" in done.out and "1 of 2 limits not met" in done.out
         assert "broken.csv" in done.err
         (gate_folder / "limits.toml").write_text(text + limits.replace("20", "900"))
         assert cdtool("benchmark", gate_folder / "limits.toml").status == 3

@@ -49,6 +49,7 @@ def written(tmp_path: Path) -> Written:
 def test_the_exit_status_is_1_where_anything_is_worse_and_the_last_line_says_it(written, new, status, last):
     done = cdtool("compare", written("old.json", build(OLD)), written("new.json", build(new)))
     assert (done.status, done.err) == (status, "")
+    assert "inconclusive" not in done.out
     assert done.out.splitlines()[-1] == last
 
 
@@ -175,18 +176,55 @@ def test_the_default_debounce_is_told_as_what_it_is(written):
     assert "differs: debounce_samples: default (9 ms), now 14" in done.out
 
 
-def test_misses_are_told_where_no_contact_has_a_latency_in_both(written):
+def test_every_contact_missed_that_was_detected_ends_with_1_and_its_probability(written):
     old = written("old.json", build({("momentum", "stiff"): LATENCIES[:4]}))
     done = cdtool("compare", old, written("new.json", build({("momentum", "stiff"): [MISSED] * 4})))
-    assert done.status == 0
-    assert "missed 4 instead of 0: not shown, too few recordings" in " ".join(done.out.split())
+    assert done.status == 1
+    words = " ".join(done.out.split())
+    assert "misses every contact: 4 of 4, before 0 of 4 (by chance alone with a probability of 0.0625)" in words
 
 
-def test_misses_that_could_have_been_shown_are_told_with_how_many(written):
+@pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
+def test_misses_that_are_too_few_to_be_shown_are_inconclusive(written, option, status):
     old = written("old.json", build({("momentum", "stiff"): [*LATENCIES[:5], *[MISSED] * 20]}))
-    new = written("new.json", build({("momentum", "stiff"): [*[MISSED] * 5, *[MISSED] * 20]}))
-    done = cdtool("compare", old, new)
-    assert "missed 25 instead of 20: not shown" in " ".join(done.out.split())
+    new = written("new.json", build({("momentum", "stiff"): [*[MISSED] * 4, LATENCIES[4], *[MISSED] * 20]}))
+    done = cdtool("compare", old, new, *option)
+    assert done.status == status
+    words = " ".join(done.out.split())
+    assert "missed 20 to 24, up to 33 % more not ruled out" in words and "no change" not in words
+
+
+def test_latencies_four_times_as_long_of_four_contacts_are_inconclusive(written):
+    old = written("old.json", build({("momentum", "stiff"): LATENCIES[:4]}))
+    new = written("new.json", build({("momentum", "stiff"): [4.0 * x for x in LATENCIES[:4]]}))
+    assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
+    done = cdtool("compare", old, new, "--require-power", "--json")
+    assert json.loads(done.out)["verdict"] == "inconclusive" and done.status == 4
+    assert cdtool("compare", old, new).out.splitlines()[-1].startswith("inconclusive: this sample is too small")
+
+
+def test_a_better_build_with_an_open_question_is_not_enough_where_power_is_required(written):
+    values = {("momentum", "stiff"): LATENCIES, ("momentum", "soft"): LATENCIES[:3]}
+    faster = {key: [x - 5.0 for x in items] for key, items in values.items()}
+    old, new = written("old.json", build(values)), written("new.json", build(faster))
+    assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
+    assert (
+        "better: " in cdtool("compare", old, new).out
+        and "inconclusive in 1 of 2 rows" in cdtool("compare", old, new).out
+    )
+
+
+def test_worse_comes_before_inconclusive(written):
+    old = written("old.json", build({**OLD, ("momentum", "soft"): LATENCIES[:3]}))
+    new = written("new.json", build({**SLOWER, ("momentum", "soft"): LATENCIES[1:4]}))
+    assert cdtool("compare", old, new, "--require-power").status == 1
+
+
+@pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
+def test_a_detector_that_is_gone_is_incomplete_where_power_is_required(written, option, status):
+    old = written("old.json", build(OLD))
+    new = written("new.json", build({("momentum", "stiff"): LATENCIES}))
+    assert cdtool("compare", old, new, *option).status == status
 
 
 def test_a_detector_that_is_gone_is_said_on_top_and_with_the_verdict(written, tmp_path):

@@ -51,11 +51,13 @@ def test_the_others_go_on_and_its_contacts_are_not_assessable_with_the_reason(fo
     assert "1 not assessable" in (folder / "r.md").read_text(encoding="utf-8")
 
 
-def test_a_limit_on_it_is_not_kept(folder):
+def test_a_limit_on_it_is_not_met(folder):
     limit = '[limits]\n"pi.stiff.missed" = { max = 0 }\n"gm.stiff.missed" = { max = 0 }\n'
     done = benchmark(folder, '["gm", "pi"]', limits=limit)
     assert (
-        done.status == 1 and "limit not assessable: pure_inertia.stiff.missed" in done.out and "1 of 2 kept" in done.out
+        done.status == 1
+        and "limit not assessable: pure_inertia.stiff.missed" in done.out
+        and "1 of 2 limits not met" in done.out
     )
 
 

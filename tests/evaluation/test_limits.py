@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from cdtool.errors import ConfigurationError
-from cdtool.evaluation.limits import broken, check_limits, read_limits
+from cdtool.evaluation.limits import check_limits, not_met, read_limits
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, Results
 from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.summary import FIGURES, summarise
@@ -59,24 +59,24 @@ def check(text: str):
 
 def test_a_short_name_a_group_and_a_figure_name_one_limit():
     (limit,) = check('"gm.stiff.mean_ms" = { max = 25.0 }')
-    assert (limit.detector, limit.group, limit.value, limit.outcome) == ("momentum", "stiff", 25.0, "kept")
-    assert broken([limit]) == []
+    assert (limit.detector, limit.group, limit.value, limit.outcome) == ("momentum", "stiff", 25.0, "met")
+    assert not_met([limit]) == []
 
 
-def test_above_the_largest_and_below_the_least_are_broken_with_the_reason():
+def test_above_the_largest_and_below_the_least_are_not_met_with_the_reason():
     (high,) = check('"gm.stiff.max_ms" = { max = 39.9 }')
-    assert high.outcome == "broken" and high.reason == "40 is more than 39.9"
+    assert high.outcome == "violated" and high.reason == "40 is more than 39.9"
     (low,) = check('"feekf.stiff.detected" = { min = 2 }')
-    assert low.outcome == "broken" and low.reason == "1 is less than 2"
+    assert low.outcome == "violated" and low.reason == "1 is less than 2"
 
 
 def test_a_star_stands_for_every_detector_and_every_group_with_contacts():
     limits = check('"*.*.missed" = { max = 0 }')
     assert [(item.detector, item.group, item.outcome) for item in limits] == [
-        ("momentum", "stiff", "kept"),
-        ("friction_ekf", "stiff", "broken"),
-        ("momentum", "soft.2", "not assessable"),
-        ("friction_ekf", "soft.2", "kept"),
+        ("momentum", "stiff", "met"),
+        ("friction_ekf", "stiff", "violated"),
+        ("momentum", "soft.2", "not_assessable"),
+        ("friction_ekf", "soft.2", "met"),
     ]
 
 
@@ -88,19 +88,19 @@ def test_two_parts_mean_every_group_and_a_groups_name_may_hold_dots():
 
 def test_what_could_not_be_assessed_does_not_pass():
     (limit,) = check('"gm.soft.2.mean_ms" = { max = 100 }')
-    assert limit.outcome == "not assessable" and limit.value is None
+    assert limit.outcome == "not_assessable" and limit.value is None
     assert limit.reason == "none of 1 contacts could be assessed"
-    assert broken([limit]) == [limit]
+    assert not_met([limit]) == [limit]
 
 
 def test_a_quantile_that_is_not_reached_breaks_its_limit():
     (limit,) = check('"feekf.stiff.p95_ms" = { max = 1000 }')
-    assert limit.outcome == "broken" and limit.value is None and "not reached" in limit.reason
+    assert limit.outcome == "violated" and limit.value is None and "not reached" in limit.reason
 
 
 def test_false_alarms_are_counted_in_groups_without_contacts():
     (limit,) = check('"gm.holdout.false_alarms_per_hour" = { max = 1.9 }')
-    assert limit.value == 2.0 and limit.outcome == "broken"
+    assert limit.value == 2.0 and limit.outcome == "violated"
     (bound,) = check('"feekf.holdout.false_alarms_per_hour_at_most" = { max = 6.0 }')
     assert bound.value == pytest.approx(-math.log(0.05) / 0.5)
 
@@ -141,7 +141,7 @@ def test_what_was_watched_nowhere_has_no_false_alarms_and_does_not_pass():
     summaries = [item for item in summarise(blind) if item.detector == "friction_ekf" and item.group == "holdout"]
     for figure in ("false_alarms", "false_alarms_per_operation_at_most", "false_alarms_per_hour"):
         (limit,) = check_limits(rules(f'"feekf.holdout.{figure}" = {{ max = 9 }}'), summaries)
-        assert limit.outcome == "not assessable" and limit.reason == "nothing was watched"
+        assert limit.outcome == "not_assessable" and limit.reason == "nothing was watched"
     assert FIGURES["operations"](summaries[0]) == 0
 
 
@@ -152,18 +152,18 @@ def test_the_bound_of_a_rate_counts_its_alarms():
 
 def test_force_limits_do_not_pass_without_a_verdict():
     (limit,) = check('"gm.stiff.force_failed" = { max = 0 }')
-    assert limit.outcome == "not assessable" and "force profile" in limit.reason
+    assert limit.outcome == "not_assessable" and "force profile" in limit.reason
 
 
 def test_a_group_of_which_no_log_could_be_scored_does_not_pass():
     empty = replace(results(), contacts=(), exposure=(), false_alarms=())
     (limit,) = check_limits(rules('"gm.stiff.p95_ms" = { max = 50 }'), summarise(empty))
-    assert limit.outcome == "not assessable" and limit.reason == "no recording of the group was scored"
+    assert limit.outcome == "not_assessable" and limit.reason == "no recording of the group was scored"
 
 
 def test_a_missed_contact_makes_the_largest_force_at_the_alarm_infinite():
     (limit,) = check('"feekf.stiff.force_at_alarm_max_n" = { max = 1e9 }')
-    assert limit.outcome == "broken"
+    assert limit.outcome == "violated"
 
 
 @pytest.mark.parametrize("figure", FIGURES)

@@ -63,7 +63,7 @@ FULL = replace(
     points=(PointResult("edge", "stiff", "gap", 3, "fail", (STEP,), "mean of 3", "too much"),),
     sweep=(SweepResult("momentum", "stiff", 5.5, 0, 9, 0.5, 3, 1, 1, 30.0, None),),
     calibration=(CalibrationResult("momentum", "1/1000op", 6.0, 3000, 5.0, 1),),
-    limits=(LimitResult("momentum.*.missed", "momentum", "stiff", "missed", 1.0, None, 0.0, "broken", "1 is more"),),
+    limits=(LimitResult("momentum.*.missed", "momentum", "stiff", "missed", 1.0, None, 0.0, "violated", "1 is more"),),
     findings=(Skipped("a.csv", "a gap"),),
 )
 
@@ -140,9 +140,9 @@ def test_another_version_is_named_with_the_way_out(tmp_path):
             r"contacts\[3\]\.outcome is .mised., none of detected, missed, not_assessable$",
         ),
         (
-            '"outcome": "broken"',
+            '"outcome": "violated"',
             '"outcome": "brokn"',
-            r"limits\[0\]\.outcome is .brokn., none of kept, broken",
+            r"limits\[0\]\.outcome is .brokn., none of met, violated",
         ),
         (
             '"detector": "momentum"',

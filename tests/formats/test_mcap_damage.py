@@ -8,6 +8,7 @@ import pytest
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
+from tests.command import cdtool
 from tests.formats.mcap_files import JOINTS, STREAMS, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]
@@ -41,7 +42,8 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
     source = Mcap().columns(path)
     assert not source.columns
-    assert "1 of 1 messages cannot be decoded" in str(source.findings[0]) and source.findings[0].severity == "loss"
+    assert "1 of 1 messages cannot be decoded" in str(source.findings[0])
+    assert source.findings[0].severity == "loss" and cdtool("info", path).status == 3
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
 

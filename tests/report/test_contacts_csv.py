@@ -76,7 +76,7 @@ def test_hostile_names_stay_in_their_cell_and_control_nothing(results, kind):
 def with_forces(results: Results, name: str) -> Results:
     steps = (
         ForceStepResult(name, 0.0, 400.0, 500.0, 12.0, "fail", name),
-        ForceStepResult("static", 0.75, 150.0, None, None, "not assessable", "the record ends"),
+        ForceStepResult("static", 0.75, 150.0, None, None, "not_assessable", "the record ends"),
     )
     return replace(results, forces=(ForceResult(name, name, 1, name, "fail", 500.0, steps, name, 12.0, name),))
 
@@ -86,7 +86,7 @@ def test_forces_have_a_row_for_each_contact_and_step(results):
     assert (first["recording"], first["verdict"], first["peak_n"], first["point"]) == ("gap", "fail", "500.0", "gap")
     assert (first["step"], first["step_at_most_n"], first["step_time_budget_ms"]) == ("gap", "400.0", "12.0")
     assert (second["step"], second["step_peak_n"], second["step_time_budget_ms"]) == ("static", "", "")
-    assert (second["step_verdict"], second["step_reason"]) == ("not assessable", "the record ends")
+    assert (second["step_verdict"], second["step_reason"]) == ("not_assessable", "the record ends")
 
 
 @pytest.mark.parametrize("kind", HOSTILE)

@@ -53,7 +53,7 @@ def test_each_suffix_gets_its_content(done, tmp_path):
     names = ("a.json", "a.md", "a.csv", "a.xml", "a.html", "a.png", "a.SVG", "a.pdf")
     targets = [tmp_path / name for name in names]
     assert write_outputs(done, targets) == targets
-    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 2
+    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 3
     assert encode_traces(read_traces(tmp_path / "a.traces.json.gz")) == encode_traces(done.traces)
     assert targets[1].read_text(encoding="utf-8") == to_markdown(done.evaluated)
     assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.evaluated.results)

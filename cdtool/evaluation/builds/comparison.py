@@ -2,37 +2,49 @@
 
 Conventions: a change is new less old. Contacts that both files hold are compared one by one. All questions are
 corrected together (Holm): that anything is wrongly called worse or better has the chance `significance` at most. "No
-change shown" is not "no change": every question says which change would have been shown.
+change shown" is said only where a relevant change would have been shown; elsewhere the answer is "inconclusive". A
+change that is complete, such as every contact missed that was detected before, needs no test.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.builds.configuration import Changed, changed_settings, refuse_other_rules
 from cdtool.evaluation.builds.pairs import pair_recordings
-from cdtool.evaluation.builds.rows import NOTHING_SHOWN, Build, BuildRow, answer, ask
+from cdtool.evaluation.builds.rows import (
+    INCONCLUSIVE,
+    NOTHING_SHOWN,
+    RELEVANT_CHANGE,
+    Build,
+    BuildRow,
+    Outcome,
+    answer,
+    ask,
+)
 from cdtool.evaluation.builds.words import gone_words, overall_words, pairing_words, row_words
 from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
-
-Verdict = Literal["worse", "better", "mixed", "no change shown"]
+from cdtool.exit_status import Fact
 
 
 @dataclass(frozen=True)
 class BuildComparison:
     """All questions asked of two builds, the verdict over them, and what else differs.
 
-    `asked` questions were corrected together. `only_old`, `only_new`: detectors, groups, or a detector in a group that
-    one file alone holds. `changed`: settings under test that differ. `notes`: recordings without a partner.
+    `relevant_change`: the smallest one that matters. `inconclusive`: rows in which some question could not have shown
+    it, whatever else they show. `asked` questions were corrected together. `only_old`, `only_new`: detectors, groups,
+    or a detector in a group that one file alone holds. `changed`: settings under test that differ. `notes`: recordings
+    without a partner.
     """
 
-    verdict: Verdict
+    verdict: Outcome
     words: str
     significance: float
+    relevant_change: float
+    inconclusive: int
     asked: int
     rows: tuple[BuildRow, ...]
     changed: tuple[Changed, ...]
@@ -40,16 +52,29 @@ class BuildComparison:
     only_new: tuple[str, ...]
     notes: tuple[str, ...]
 
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        """What the exit status of a comparison depends on where a conclusion is required."""
+        found = [Fact.WORSE] if self.verdict in ("worse", "mixed") else []
+        found += [Fact.INCONCLUSIVE] if self.inconclusive else []
+        return (*found, *([Fact.INCOMPLETE] if self.only_old else []))
 
-def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT) -> BuildComparison:
+
+def compare_builds(
+    old: Results, new: Results, significance: float = SIGNIFICANT, relevant_change: float = RELEVANT_CHANGE
+) -> BuildComparison:
     """Compare every detector and group that both results hold.
 
+    `relevant_change`: the smallest change for the worse that matters, as a share of the old mean latency and force, of
+    the contacts missed or not assessable, and of a false alarm per operation.
     Latency and force: `paired_difference` by recording or campaign, else `unpaired_difference`; misses and contacts not
     assessable: McNemar, else Fisher; false alarms: `poisson_difference_p` on counts and hours.
     Raises ConfigurationError, naming the key, where something differs that decides how figures come about; UsageError
     where nothing is common.
     """
     check_significance(significance)
+    if not 0.0 < relevant_change <= 1.0:
+        raise UsageError(f"relevant change is {relevant_change:g}", "a share above 0 and up to 1, such as 0.1")
     groups = [group for group in old.groups if group in new.groups]
     detectors = [name for name in old.detectors if name in new.detectors]
     builds = (Build(old), Build(new))
@@ -60,14 +85,16 @@ def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT
     refuse_other_rules(old.provenance, new.provenance, groups)
     pairings = pair_recordings(old, new)
     asked = [ask(name, group, builds, pairings[group], 1.0 - significance) for name, group in held]
-    answered, count = answer(asked, significance)
+    answered, count = answer(asked, significance, relevant_change)
     rows = tuple(replace(row, words=row_words(row, count)) for row in answered)
     verdict = _verdict(rows)
     only_old = tuple(_alone(old, new, builds))
     return BuildComparison(
         verdict=verdict,
-        words=overall_words(verdict, rows, count, significance) + gone_words(only_old),
+        words=overall_words(verdict, rows, count, significance, relevant_change) + gone_words(only_old),
         significance=significance,
+        relevant_change=relevant_change,
+        inconclusive=sum(item.inconclusive for item in rows),
         asked=count,
         rows=rows,
         changed=tuple(changed_settings(old.provenance, new.provenance, detectors)),
@@ -77,11 +104,13 @@ def compare_builds(old: Results, new: Results, significance: float = SIGNIFICANT
     )
 
 
-def _verdict(rows: Sequence[BuildRow]) -> Verdict:
+def _verdict(rows: Sequence[BuildRow]) -> Outcome:
     outcomes = {item.outcome for row in rows for item in row.questions}
     if {"worse", "better"} <= outcomes:
         return "mixed"
-    return "worse" if "worse" in outcomes else "better" if "better" in outcomes else NOTHING_SHOWN
+    if "worse" in outcomes:
+        return "worse"
+    return "better" if "better" in outcomes else INCONCLUSIVE if INCONCLUSIVE in outcomes else NOTHING_SHOWN
 
 
 def _alone(one: Results, other: Results, builds: Sequence[Build]) -> list[str]:

@@ -13,6 +13,7 @@ from cdtool.evaluation.builds.questions import (
     Asked,
     Figure,
     Labels,
+    Watched,
     ask_blind_operations,
     ask_false_alarms,
     ask_mean,
@@ -25,6 +26,11 @@ from cdtool.evaluation.statistics.paired import holm
 from cdtool.evaluation.summary import campaigns
 
 NOTHING_SHOWN: Final = "no change shown"
+INCONCLUSIVE: Final = "inconclusive"
+Outcome = Literal["worse", "better", "mixed", "no change shown", "inconclusive"]
+# The smallest change for the worse that matters: a tenth of the old mean latency or force, of the contacts (missed, not
+# assessable), or of a false alarm per operation.
+RELEVANT_CHANGE = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,10 +41,13 @@ class Question:
     `change` is new less old, of counts a share or a rate without an interval. `p` of no change and `corrected_p` (Holm)
     are NaN where there was nothing to ask; `reason` says why. `detectable`: the least change of a mean that would have
     been shown with 80 % power, or the new count from which on it would have been; infinite where none could.
+    `left_open`: the largest change for the worse that these recordings do not rule out, as a share of the old mean, of
+    the contacts, or per operation; NaN where there was nothing to ask. `same`: every pair has the same figure.
+    `complete_change_p`: the exact probability of a change so complete that it needs no test; NaN where it is not.
     """
 
     figure: Figure
-    outcome: Literal["worse", "better", "no change shown", "not asked"]
+    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not asked"]
     old: float
     old_of: float
     new: float
@@ -48,6 +57,9 @@ class Question:
     corrected_p: float
     detectable: float
     reason: str
+    left_open: float
+    same: bool
+    complete_change_p: float
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,22 @@ class BuildRow:
     one_not_assessable: int
     questions: tuple[Question, ...] = ()
     words: str = ""
+
+    @property
+    def outcome(self) -> Outcome:
+        """What is shown; else whether a relevant change would have been."""
+        found = {item.outcome for item in self.questions}
+        if {"worse", "better"} <= found:
+            return "mixed"
+        for outcome in ("worse", "better", INCONCLUSIVE):
+            if outcome in found:
+                return outcome
+        return NOTHING_SHOWN
+
+    @property
+    def inconclusive(self) -> bool:
+        """Whether a relevant change of some figure could not have been shown."""
+        return any(item.outcome == INCONCLUSIVE for item in self.questions)
 
     def question(self, figure: Figure) -> Question | None:
         """The question about a figure; None where the group has none of it."""
@@ -95,9 +123,11 @@ class Build:
         """The contacts, seen by a detector."""
         return self._contacts.get((detector, group), [])
 
-    def false_alarms(self, detector: str, group: str) -> tuple[int, float]:
-        """How many, in how many hours."""
-        return self._false_alarms.get((detector, group), 0), self._watched(detector, group).hours
+    def false_alarms(self, detector: str, group: str) -> Watched:
+        """How many, in how many hours and operations."""
+        watched = self._watched(detector, group)
+        judged = watched.operations - watched.not_assessable
+        return Watched(self._false_alarms.get((detector, group), 0), watched.hours, judged)
 
     def blind_operations(self, detector: str, group: str) -> tuple[int, int]:
         """How many could be judged nowhere, of how many."""
@@ -117,42 +147,68 @@ def ask(
     pairs = pairs_of_contacts(pairing, old, new)
     before, after = ([a for a, _ in pairs], [b for _, b in pairs]) if paired else (old, new)
     labels = (_shared_labels(builds, pairing) if paired else builds[0].labels, builds[1].labels)
+    # Counts of other logs that happen to be equal say less.
+    same_logs = paired and not pairing.old_alone and not pairing.new_alone
+    watched = builds[0].false_alarms(detector, group), builds[1].false_alarms(detector, group)
     if old or new:
         asked = [
             ask_mean("latency_ms", before, after, labels, paired, level),
             ask_missed(before, after, paired),
             ask_not_assessable(before, after, paired),
-            ask_false_alarms(*(build.false_alarms(detector, group) for build in builds)),
+            ask_false_alarms(*watched, same_logs),
             ask_mean("force_at_alarm_n", before, after, labels, paired, level),
         ]
     else:
+        blind = builds[0].blind_operations(detector, group), builds[1].blind_operations(detector, group)
         asked = [
-            ask_blind_operations(*(build.blind_operations(detector, group) for build in builds)),
-            ask_false_alarms(*(build.false_alarms(detector, group) for build in builds)),
+            ask_blind_operations(*blind, same_logs),
+            ask_false_alarms(*watched, same_logs),
         ]
     apart = sum((a.outcome == "not_assessable") != (b.outcome == "not_assessable") for a, b in pairs)
     return BuildRow(detector, group, paired, len(old), len(new), len(pairs), apart), asked
 
 
-def answer(asked: Sequence[tuple[BuildRow, Sequence[Asked]]], significance: float) -> tuple[list[BuildRow], int]:
-    """The rows with their questions, corrected together over all rows (Holm), and how many were asked."""
+def answer(
+    asked: Sequence[tuple[BuildRow, Sequence[Asked]]], significance: float, relevant_change: float = RELEVANT_CHANGE
+) -> tuple[list[BuildRow], int]:
+    """The rows with their questions, corrected together over all rows (Holm), and how many were asked.
+
+    A question that shows nothing is inconclusive where it leaves more than `relevant_change` open, unless every figure
+    of its row is the same, contact by contact.
+    """
     p = [item.p for _, items in asked for item in items]
     count = sum(not math.isnan(value) for value in p)
     corrected = iter(holm(p).tolist())
-    rows = [
-        replace(row, questions=tuple(_answered(item, next(corrected), significance, count) for item in items))
-        for row, items in asked
-    ]
+    rows = []
+    unchanged = all(_all_same(items, significance) for _, items in asked)
+    for row, items in asked:
+        # Counts alone can agree by chance; where every latency agrees, or the whole files do, nothing has changed.
+        timed = any(item.figure == "latency_ms" and item.same for item in items)
+        same = unchanged or (timed and _all_same(items, significance))
+        tolerated = math.inf if same else relevant_change
+        questions = tuple(_answered(item, next(corrected), significance, count, tolerated) for item in items)
+        rows.append(replace(row, questions=questions))
     return rows, count
 
 
-def _answered(asked: Asked, corrected: float, significance: float, count: int) -> Question:
-    outcome: Literal["worse", "better", "no change shown", "not asked"] = NOTHING_SHOWN
-    if math.isnan(corrected):
-        outcome = "not asked"
-    elif corrected < significance:
+def _all_same(items: Sequence[Asked], significance: float) -> bool:
+    """Whether no figure of a row differs in any contact: a fact about these recordings, not a question of power."""
+    known = [item for item in items if item.same or not math.isnan(item.left_open(significance))]
+    return bool(known) and all(item.same for item in known)
+
+
+def _answered(asked: Asked, corrected: float, significance: float, count: int, tolerated: float) -> Question:
+    # What is not asked here would have counted as one more question.
+    alpha = significance / (count + math.isnan(asked.p))
+    left_open = asked.left_open(alpha)
+    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not asked"]
+    if not math.isnan(asked.complete_p) or corrected < significance:
         # Latency, force, misses, blind contacts, false alarms: less is better of each.
         outcome = "worse" if asked.change.value > 0.0 else "better"
+    elif left_open > tolerated:
+        outcome = INCONCLUSIVE
+    else:
+        outcome = "not asked" if math.isnan(corrected) else NOTHING_SHOWN
     return Question(
         figure=asked.figure,
         outcome=outcome,
@@ -163,9 +219,11 @@ def _answered(asked: Asked, corrected: float, significance: float, count: int) -
         change=asked.change,
         p=asked.p,
         corrected_p=corrected,
-        # What is not asked here would have counted as one more question.
-        detectable=asked.detectable(significance / (count + math.isnan(asked.p))),
+        detectable=asked.detectable(alpha),
         reason=asked.reason,
+        left_open=left_open,
+        same=asked.same,
+        complete_change_p=asked.complete_p,
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cdtool.evaluation.builds.pairs import Pairing
 from cdtool.evaluation.builds.questions import Figure
-from cdtool.evaluation.builds.rows import NOTHING_SHOWN, BuildRow, Question
+from cdtool.evaluation.builds.rows import INCONCLUSIVE, NOTHING_SHOWN, BuildRow, Question
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.plain_text import shorten
 
@@ -21,24 +21,34 @@ def row_words(row: BuildRow, asked: int) -> str:
     `asked`: questions that were corrected together.
     """
     words = [_SHOWN[item.figure](item) for item in row.questions if item.outcome in ("worse", "better")]
-    words = words or [f"{NOTHING_SHOWN} ({_would_have_been(row, asked)})"]
+    if row.inconclusive:
+        opened = ", ".join(_open(item, asked) for item in _unresolved(row))
+        words.append(f"{INCONCLUSIVE} in the rest" if words else f"{INCONCLUSIVE}: {opened}")
+    words = words or [f"{NOTHING_SHOWN} ({_would_have_been(row)})"]
     if row.one_not_assessable:
         words.append(f"{row.one_not_assessable} of {row.pairs} contacts apart: one build could not assess them")
     return "; ".join(words)
 
 
-def overall_words(verdict: str, rows: Sequence[BuildRow], asked: int, significance: float) -> str:
+def overall_words(
+    verdict: str, rows: Sequence[BuildRow], asked: int, significance: float, relevant_change: float
+) -> str:
     """The verdict in one sentence."""
     counts = [sum(item.outcome == way for row in rows for item in row.questions) for way in ("worse", "better")]
-    if verdict == NOTHING_SHOWN and asked and not any(_could_show(row) for row in rows):
-        return f"{NOTHING_SHOWN}, and none could have been: too few recordings for {asked} questions"
-    if not asked:
-        return f"{NOTHING_SHOWN}: nothing could be tested"
+    unresolved = sum(row.inconclusive for row in rows)
+    relevant = f"a change of {100.0 * relevant_change:g} %"
+    if verdict == INCONCLUSIVE:
+        if not any(_could_show(row) for row in rows):
+            return f"{INCONCLUSIVE}: this sample is too small to detect any change"
+        return f"{INCONCLUSIVE}: in {unresolved} of {len(rows)} rows this sample is too small to rule out {relevant}"
+    if verdict == NOTHING_SHOWN and not asked:
+        return f"{NOTHING_SHOWN}: every outcome is the same"
     how = f"of {asked} questions at a level of {significance:g} for all together"
     if verdict == NOTHING_SHOWN:
         return f"no change shown ({how})"
     ways = [f"{count} {way}" for count, way in zip(counts, ("worse", "better"), strict=True) if count]
-    return f"{verdict}: {' and '.join(ways)} {how}"
+    open_rows = f"; {INCONCLUSIVE} in {unresolved} of {len(rows)} rows" if unresolved else ""
+    return f"{verdict}: {' and '.join(ways)} {how}{open_rows}"
 
 
 def gone_words(only_old: Sequence[str]) -> str:
@@ -75,10 +85,20 @@ def _force(item: Question) -> str:
 
 
 def _missed(item: Question) -> str:
+    if not math.isnan(item.complete_change_p):
+        what = "misses every contact" if item.outcome == "worse" else "detects every contact of a group that was missed"
+        return f"{what}: {_counts(item)}{_by_chance(item)}"
     return f"misses {'more' if item.outcome == 'worse' else 'fewer'}: {_counts(item)}"
 
 
+def _by_chance(item: Question) -> str:
+    return f" (by chance alone with a probability of {item.complete_change_p:.3g})"
+
+
 def _not_assessable(item: Question) -> str:
+    if not math.isnan(item.complete_change_p):
+        what = "nothing is assessable" if item.outcome == "worse" else "all is assessable"
+        return f"{what}: not assessable {_counts(item)}{_by_chance(item)}"
     return f"{'more' if item.outcome == 'worse' else 'fewer'} not assessable: {_counts(item)}"
 
 
@@ -96,25 +116,42 @@ _SHOWN: dict[Figure, Callable[[Question], str]] = {
 }
 
 
-def _would_have_been(row: BuildRow, asked: int) -> str:
+def _unresolved(row: BuildRow) -> list[Question]:
+    """The questions that leave a relevant change open; a force only where the latency does not."""
+    found = [item for item in row.questions if item.outcome == INCONCLUSIVE]
+    latency = any(item.figure == "latency_ms" for item in found)
+    missed = any(item.figure == "missed" for item in found)
+    shadowed = {"force_at_alarm_n"} if latency else set()
+    shadowed |= {item.figure for item in found if item.figure == "not_assessable" and missed and not item.new}
+    return [item for item in found if item.figure not in shadowed]
+
+
+def _open(item: Question, asked: int) -> str:
+    """What of a figure these recordings cannot tell."""
+    if item.figure in ("latency_ms", "force_at_alarm_n"):
+        what, unit = ("latency", "ms") if item.figure == "latency_ms" else ("force at the alarm", "N")
+        seen = f"{what} {figure(item.old)} {unit} to {figure(item.new)} {unit}"
+        if item.detectable == math.inf or math.isnan(item.detectable):
+            return f"{seen}, {item.reason or f'too few recordings for {asked} questions'}"
+        return f"{seen}, only a change of {figure(item.detectable)} {unit} would have been shown"
+    what = {"missed": "missed", "not_assessable": "not assessable", "false_alarms": "false alarms"}[item.figure]
+    seen = f"{what} {item.old:g} to {item.new:g}"
+    if item.left_open == math.inf:
+        return f"{seen}, {item.reason or 'nothing was judged'}"
+    if item.figure == "false_alarms":
+        return f"{seen}, up to {item.left_open:.2g} more per operation not ruled out"
+    return f"{seen}, up to {100.0 * item.left_open:.2g} % more not ruled out"
+
+
+def _would_have_been(row: BuildRow) -> str:
     latency, alarms = row.question("latency_ms"), row.question("false_alarms")
     if latency is None:
         return _least_alarms(alarms) if alarms else "nothing could be tested"
-    if latency.outcome == "not asked":
-        return f"latency: {latency.reason}{_missed_unseen(row.question('missed'))}"
-    if latency.detectable == math.inf:
-        return f"none could have been in latency: too few recordings for {asked} questions"
-    if latency.detectable == 0.0:
+    if latency.same:
         return "every latency is the same"
+    if latency.outcome == "not asked":
+        return f"latency: {latency.reason}"
     return f"a change of {figure(latency.detectable)} ms would have been"
-
-
-def _missed_unseen(item: Question | None) -> str:
-    """Misses that differ without being shown to."""
-    if item is None or item.old == item.new:
-        return ""
-    why = "too few recordings" if item.detectable == math.inf else f"{item.detectable:g} would have been"
-    return f"; missed {item.new:g} instead of {item.old:g}: not shown, {why}"
 
 
 def _least_alarms(item: Question) -> str:

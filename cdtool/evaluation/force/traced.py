@@ -17,7 +17,7 @@ from cdtool.recording import FloatArray
 
 # Onsets of a trace and of its row are the same number; a file may have rounded one.
 _SAME_ONSET = 1e-6
-_OUTCOMES: tuple[Outcome, ...] = ("pass", "fail", "not assessable")
+_OUTCOMES: tuple[Outcome, ...] = ("pass", "fail", "not_assessable")
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _verdict(row: ForceResult, time: FloatArray, force: FloatArray) -> ForceVerd
         steps.append(
             StepVerdict(
                 step=ForceStep(step.from_s, step.at_most_n, step.name),
-                outcome=next((outcome for outcome in _OUTCOMES if outcome == step.verdict), "not assessable"),
+                outcome=next((outcome for outcome in _OUTCOMES if outcome == step.verdict), "not_assessable"),
                 peak=step.peak_n if step.peak_n is not None and known else math.nan,
                 peak_at=float(time[inside[np.argmax(force[inside])]]) if known else math.nan,
                 time_budget=math.inf if step.time_budget_ms is None else 1e-3 * step.time_budget_ms,

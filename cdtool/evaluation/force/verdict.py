@@ -18,7 +18,7 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 
-Outcome = Literal["pass", "fail", "not assessable"]
+Outcome = Literal["pass", "fail", "not_assessable"]
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdic
     if not len(inside):
         nan = float("nan")
         why = _unseen(course, step, ends) or "no load-cell sample while the limit holds"
-        return StepVerdict(step, "not assessable", nan, nan, float("inf"), why)
+        return StepVerdict(step, "not_assessable", nan, nan, float("inf"), why)
     highest = inside[int(np.argmax(course.force[inside]))]
     peak, peak_at = float(course.force[highest]), float(course.time[highest])
     above = inside[course.force[inside] > step.at_most_n]
@@ -140,7 +140,7 @@ def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdic
     reason = _unseen(course, step, ends)
     if not reason and course.clipped[inside].any():
         reason = f"the load cell was at its stop, {peak:.4g} N, below the limit of {step.at_most_n:g} N"
-    return StepVerdict(step, "not assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
+    return StepVerdict(step, "not_assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
 
 
 def _unseen(course: ForceCourse, step: ForceStep, ends: float) -> str:
@@ -178,14 +178,14 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
     above = sum(test.outcome == "fail" for test in tests)
     if len(tests) < average_of:
         reason = f"{len(tests)} of the {average_of} tests that are averaged" if tests else "no test"
-        return PointStep(step, "not assessable", force, above, reason)
+        return PointStep(step, "not_assessable", force, above, reason)
     if force > step.at_most_n:
         word = "mean" if average_of > 1 else "highest"
         reason = f"{word} of {len(tests)} peaks {force:.4g} N where {step.at_most_n:g} N are allowed"
         return PointStep(step, "fail", force, above, reason)
-    blind = next((test for test in tests if test.outcome == "not assessable"), None)
+    blind = next((test for test in tests if test.outcome == "not_assessable"), None)
     if blind:
-        return PointStep(step, "not assessable", force, above, blind.reason)
+        return PointStep(step, "not_assessable", force, above, blind.reason)
     return PointStep(step, "pass", force, above)
 
 
@@ -198,7 +198,7 @@ def _counted(tests: int, average_of: int) -> str:
 
 
 def _worst(outcomes: Sequence[Outcome]) -> Outcome:
-    order: tuple[Outcome, ...] = ("fail", "not assessable", "pass")
+    order: tuple[Outcome, ...] = ("fail", "not_assessable", "pass")
     return min(outcomes, key=order.index)
 
 

@@ -80,6 +80,37 @@ def binomial_at_most(count: int, n: int, level: float = 0.95) -> float:
     return float(stats.beta.ppf(level, count + 1, n - count))
 
 
+def binomial_increase_at_most(count_a: int, n_a: int, count_b: int, n_b: int, level: float = 0.95) -> float:
+    """How much larger the share behind a may be than that behind b, one-sided.
+
+    Newcombe's (1998) hybrid of the two exact one-sided bounds: d + sqrt((u_a - p_a)^2 + (p_b - l_b)^2) with d = p_a -
+    p_b. 0 of 30 after 0 of n: the bound of 0 of 30 alone, 9.5 %. At most 1; 1 where a set is empty. Raises UsageError
+    as `binomial_share`.
+    """
+    if not n_a or not n_b:
+        return 1.0
+    above = binomial_at_most(count_a, n_a, level) - count_a / n_a
+    below = count_b / n_b - (1.0 - binomial_at_most(n_b - count_b, n_b, level))
+    return min(1.0, count_a / n_a - count_b / n_b + math.hypot(above, below))
+
+
+def poisson_increase_at_most(
+    count_a: int, exposure_a: float, count_b: int, exposure_b: float, level: float = 0.95
+) -> float:
+    """How much larger the rate behind a may be than that behind b, one-sided: as `binomial_increase_at_most`.
+
+    None in either: -ln(1 - level) / T_a, 3.0 / T_a. Infinite without exposure. Raises UsageError as `poisson_rate`.
+    """
+    if not exposure_a or not exposure_b:
+        return math.inf
+    from scipy import stats
+
+    check_level(level)
+    above = poisson_at_most(count_a, exposure_a, level) - count_a / exposure_a
+    least = 0.5 * float(stats.chi2.ppf(1.0 - level, 2 * count_b)) / exposure_b if count_b else 0.0
+    return count_a / exposure_a - count_b / exposure_b + math.hypot(above, count_b / exposure_b - least)
+
+
 def poisson_difference_p(count_a: int, exposure_a: float, count_b: int, exposure_b: float) -> float:
     """Exact two-sided p of two equal rates, such as false alarms per hour of two builds.
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, Results
-from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.figure_text import NOTHING, number, spoken
 from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, shown
 from cdtool.report.html.tables import outcome_cell, tone_of
 
@@ -68,7 +68,7 @@ def _force_count(key: tuple[str, str], forces: Sequence[ForceResult]) -> Row:
     peaks = [item.peak_n for item in forces if item.peak_n is not None]
     verdicts = [
         Cell(str(counts[verdict]), key=counts[verdict], tone=tone_of(verdict) if counts[verdict] else "")
-        for verdict in ("pass", "fail", "not assessable")
+        for verdict in ("pass", "fail", "not_assessable")
     ]
     return (*(Cell(shown(name)) for name in key), *verdicts, figure_cell(max(peaks, default=None)))
 
@@ -86,7 +86,9 @@ def _point_row(item: PointResult) -> Row:
 
 
 def _steps(steps: Sequence[ForceStepResult]) -> str:
-    return "; ".join(f"{item.name} {number(item.peak_n)} of {item.at_most_n:g} N: {item.verdict}" for item in steps)
+    return "; ".join(
+        f"{item.name} {number(item.peak_n)} of {item.at_most_n:g} N: {spoken(item.verdict)}" for item in steps
+    )
 
 
 def _budget_key(item: ForceResult) -> float:

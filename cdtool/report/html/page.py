@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.limits import broken
-from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import NOTHING, counted, number
@@ -28,13 +26,15 @@ from cdtool.report.html.recordings import not_judged_table, reasons_table, recor
 from cdtool.report.html.table import Table, seen
 from cdtool.report.html.tables import calibration_table, comparisons_table, limits_table, summary_table
 from cdtool.report.html.traces import plot_height, trace_data
-from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, verdict_words
+from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, tone, verdict_words
 
 if TYPE_CHECKING:
     from jinja2 import Template
     from markupsafe import Markup
 
 _FOLDER = Path(__file__).with_name("page_files")
+# Lines under the headline.
+_REASONS = 10
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.
 _SCRIPTS = ("scales.js", "chart.js", "legend.js", "plots.js", "forces.js", "trace.js", "tables.js", "report.js")
@@ -65,7 +65,9 @@ def to_html(evaluated: Evaluated, traces: Sequence[Trace]) -> str:
         plots=plots,
         verdict=verdict_words(evaluated),
         counts=counts_words(evaluated),
-        tone=_tone(results),
+        tone=tone(evaluated),
+        reasons=results.conclusion.reasons[:_REASONS],
+        more_reasons=max(len(results.conclusion.reasons) - _REASONS, 0),
         certificate=NO_CERTIFICATE,
         lines=_lines(evaluated, traces),
         version=results.provenance.get("tool_version", ""),
@@ -78,8 +80,8 @@ def _tables(evaluated: Evaluated, opens: dict[tuple[str, str], list[int]]) -> di
     """The tables by what the template calls them; None where there are no rows."""
     results = evaluated.results
     made = {
-        "limits": limits_table(results, kept=False),
-        "kept": limits_table(results, kept=True),
+        "limits": limits_table(results, met=False),
+        "met": limits_table(results, met=True),
         "figures": summary_table(evaluated),
         "comparisons": comparisons_table(evaluated),
         "force_counts": force_counts(results),
@@ -109,15 +111,6 @@ def _lines(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, str]:
         "kept": f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
         "skipped": counted(len(results.skipped), "entry") if results.skipped else "",
     }
-
-
-def _tone(results: Results) -> str:
-    failing = broken(results.limits)
-    if any(item.outcome == "broken" for item in failing):
-        return "bad"
-    if failing:
-        return "unknown"
-    return "good" if results.limits else ""
 
 
 def _policy(script: str, style: str) -> str:

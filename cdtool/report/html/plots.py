@@ -16,7 +16,7 @@ from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.report.few_contacts import draws_no_interval
-from cdtool.report.figure_text import number, with_interval
+from cdtool.report.figure_text import number, spoken, with_interval
 from cdtool.report.html.recordings import Log, log_of, logs_of
 from cdtool.report.html.table import short, shown
 from cdtool.report.html.tables import part_of
@@ -167,7 +167,7 @@ def _force(results: Results, traces: Sequence[Trace]) -> list[dict[str, Any]]:
                 {
                     "trace": i,
                     "contact": place,
-                    "verdict": verdict.verdict,
+                    "verdict": spoken(verdict.verdict),
                     "peak": short(verdict.peak_n),
                     "budget": short(verdict.time_budget_ms),
                 }

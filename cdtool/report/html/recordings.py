@@ -19,7 +19,7 @@ _OPERATION = re.compile(r"#\d+\Z")
 _CONTACTS_TOLD = 3
 _DIGEST = 12
 _NOT_SEEN = "not assessable"
-_FORCE_ORDER = ("fail", "not assessable", "pass")
+_FORCE_ORDER = ("fail", "not_assessable", "pass")
 
 
 @dataclass

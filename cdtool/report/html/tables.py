@@ -22,14 +22,15 @@ from cdtool.report.figure_text import (
     missed,
     number,
     rate,
+    spoken,
     with_interval,
 )
 from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, nothing, shown
 from cdtool.report.verdict_words import allowed, value_of
 
-_TONES = {"kept": "good", "pass": "good", "broken": "bad", "fail": "bad", "not assessable": "unknown"}
+_TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
 _OPEN_END = f" to {NOT_REACHED}"
-_WORST_FIRST = ("broken", "not assessable", "kept")
+_WORST_FIRST = ("violated", "not_assessable", "met")
 
 
 def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -46,7 +47,7 @@ def detector_cell(results: Results, detector: str) -> Cell:
 
 def outcome_cell(outcome: str) -> Cell:
     """A verdict in words with its tone."""
-    return Cell(outcome, tone=tone_of(outcome))
+    return Cell(spoken(outcome), tone=tone_of(outcome))
 
 
 def tone_of(outcome: str) -> str:
@@ -54,8 +55,8 @@ def tone_of(outcome: str) -> str:
     return _TONES.get(outcome, "")
 
 
-def limits_table(results: Results, *, kept: bool) -> Table:
-    """The limits that are kept, or those that are not, the broken ones first."""
+def limits_table(results: Results, *, met: bool) -> Table:
+    """The limits that are met, or those that are not, the violated ones first."""
     columns = (
         Column("outcome", choice=True),
         Column("detector"),
@@ -66,9 +67,9 @@ def limits_table(results: Results, *, kept: bool) -> Table:
         Column("why"),
         Column("limit"),
     )
-    meant = [item for item in results.limits if (item.outcome == "kept") == kept]
+    meant = [item for item in results.limits if (item.outcome == "met") == met]
     ordered = sorted(meant, key=lambda item: _WORST_FIRST.index(item.outcome))
-    caption = f"{counted(len(meant), 'limit')} {'' if kept else 'not '}kept"
+    caption = f"{counted(len(meant), 'limit')} {'' if met else 'not '}met"
     rows = [
         (
             outcome_cell(item.outcome),
@@ -82,7 +83,7 @@ def limits_table(results: Results, *, kept: bool) -> Table:
         )
         for item in ordered
     ]
-    return Table("kept-table" if kept else "limits-table", caption, columns, rows)
+    return Table("met-table" if met else "limits-table", caption, columns, rows)
 
 
 def summary_table(evaluated: Evaluated) -> Table:

@@ -45,7 +45,7 @@ def details(results: Results) -> list[Section]:
         _folded("False alarms", _ALARM, _false_alarm_rows(results), "false_alarms"),
         _folded("Contacts not assessable", _CONTACT, [_contact_row(results, item) for item in blind], "contacts"),
         _folded("What could not be judged", _NOT_JUDGED, _not_judged(results), "exposure"),
-        _folded("Force limits not kept", _FORCE, _force_rows(results), "forces"),
+        _folded("Force limits not met", _FORCE, _force_rows(results), "forces"),
         _folded("Left out", ("recording", "reason"), _reasons(alike(results.skipped)), "skipped"),
         _folded("Findings", ("recording", "finding"), _reasons(alike(results.findings)), "findings"),
         _folded("False-alarm budget", _BUDGET, _calibration(results), "calibration"),

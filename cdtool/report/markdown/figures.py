@@ -21,6 +21,7 @@ from cdtool.report.figure_text import (
     missed,
     number,
     rate,
+    spoken,
     with_interval,
 )
 from cdtool.report.markdown.text import Section, Table, escape
@@ -31,7 +32,7 @@ _FALSE_ALARMS = ("false alarms", "per hour", "per operation")
 _FORCE = "force at alarm, largest [N]"
 # More rows of limits than this would push the figures out of sight.
 _LIMITS_OPEN = 12
-_WORST_FIRST = ("broken", "not assessable", "kept")
+_WORST_FIRST = ("violated", "not_assessable", "met")
 
 
 def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -47,22 +48,22 @@ def named(results: Results, detector: str) -> str:
 
 
 def limit_sections(results: Results) -> tuple[list[Section], list[Section]]:
-    """The limits, broken ones first; where they are many, those that are kept apart and folded."""
+    """The limits, violated ones first; where they are many, those that are met apart and folded."""
     ordered = sorted(results.limits, key=lambda item: _WORST_FIRST.index(item.outcome))
-    failing = [item for item in ordered if item.outcome != "kept"]
+    failing = [item for item in ordered if item.outcome != "met"]
     if len(ordered) <= _LIMITS_OPEN:
         return ([Section("Limits", table=_limits_table(results, ordered), source="limits")] if ordered else []), []
-    kept = ordered[len(failing) :]
-    folded = Section(f"Limits kept ({len(kept)})", table=_limits_table(results, kept), folded=True, source="limits")
-    opened = Section("Limits not kept", table=_limits_table(results, failing), source="limits")
-    return ([opened] if failing else []), ([folded] if kept else [])
+    met = ordered[len(failing) :]
+    folded = Section(f"Limits met ({len(met)})", table=_limits_table(results, met), folded=True, source="limits")
+    opened = Section("Limits not met", table=_limits_table(results, failing), source="limits")
+    return ([opened] if failing else []), ([folded] if met else [])
 
 
 def _limits_table(results: Results, limits: Sequence[LimitResult]) -> Table:
     headings = ("outcome", "detector", "group", "figure", "value", "allowed", "why")
     rows = [
         (
-            item.outcome if item.outcome == "kept" else f"**{escape(item.outcome)}**",
+            item.outcome if item.outcome == "met" else f"**{escape(spoken(item.outcome))}**",
             named(results, item.detector),
             escape(item.group),
             escape(item.figure),
@@ -148,7 +149,7 @@ def steps_words(steps: Sequence[ForceStepResult]) -> str:
 
 def force_verdict(verdict: str) -> str:
     """A verdict, bold where it is no pass."""
-    return verdict if verdict == "pass" else f"**{escape(verdict)}**"
+    return verdict if verdict == "pass" else f"**{escape(spoken(verdict))}**"
 
 
 def time_budget(item: ForceResult | ForceStepResult) -> str:
@@ -209,7 +210,7 @@ def _force_row(key: tuple[str, str], forces: Sequence[ForceResult]) -> tuple[obj
     first = min(exceeded, key=lambda item: item.time_budget_ms or 0.0, default=forces[0])
     return (
         *map(escape, key),
-        *(counts[verdict] for verdict in ("pass", "fail", "not assessable")),
+        *(counts[verdict] for verdict in ("pass", "fail", "not_assessable")),
         number(max((item.peak_n for item in forces if item.peak_n is not None), default=None)),
         time_budget(first),
     )

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.limits import broken
+from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.results import LimitResult, Results
 from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import counted
@@ -20,6 +20,7 @@ from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, verdict_wo
 # Room for the verdict and how to read the figures, whatever names there are.
 _LEAST = 4_000
 _LIMITS_NAMED = 5
+_REASONS_NAMED = 4
 _LONGEST_NAME = 40
 
 
@@ -53,11 +54,16 @@ def to_markdown(evaluated: Evaluated, images: Sequence[Image] = (), most: int = 
 def _head(evaluated: Evaluated) -> str:
     results = evaluated.results
     parts = [f"# Collision detection: {verdict_words(evaluated)}", f"{counts_words(evaluated)}."]
-    failing = broken(results.limits)
+    failing = not_met(results.limits)
     if failing:
         named = "; ".join(_limit_words(item) for item in failing[:_LIMITS_NAMED])
         more = f"; and {len(failing) - _LIMITS_NAMED} more" if len(failing) > _LIMITS_NAMED else ""
-        parts.append(f"**Not kept:** {named}{more}.")
+        parts.append(f"**Not met:** {named}{more}.")
+    reasons = results.conclusion.reasons
+    if reasons:
+        lines = [escape(reason) for reason in reasons[:_REASONS_NAMED]]
+        lines += [f"and {len(reasons) - _REASONS_NAMED} more"] if len(reasons) > _REASONS_NAMED else []
+        parts.append(f"**Force, missed contacts, not assessable:** {'; '.join(lines)}.")
     if results.skipped:
         parts.append(f"**Left out or lost: {counted(len(results.skipped), 'item')}**, named below.")
     return "\n\n".join([*parts, NO_CERTIFICATE])

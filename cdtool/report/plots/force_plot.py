@@ -34,7 +34,7 @@ _ALARMS_TOLD = 4
 _WHOLE = 0.99
 _PIXELS = 700
 _UNSEEN = HATCHES[Status.GAP]
-_ORDER = ("fail", "not assessable", "pass")
+_ORDER = ("fail", "not_assessable", "pass")
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,9 @@ def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
     """Right of a panel: how many contacts keep the limits, and what became of the worst, step by step."""
     worst = curves[0]
     outcomes = [curve.verdict.outcome for curve in curves]
-    counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in _ORDER if outcome in outcomes)
+    counts = ", ".join(
+        f"{outcomes.count(outcome)} {outcome.replace('_', ' ')}" for outcome in _ORDER if outcome in outcomes
+    )
     lines = [f"{len(curves)} {'contact' if len(curves) == 1 else 'contacts'}:", *fill(counts, 30).splitlines()]
     lines.append(f"worst: {label(worst.label, 26)}")
     lines += [_told(step) for step in worst.verdict.steps]
@@ -205,7 +207,7 @@ def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
 
 def _told(step: StepVerdict) -> str:
     name = label(step.step.name, 22)
-    if step.outcome == "not assessable":
+    if step.outcome == "not_assessable":
         return f"{name}: not assessable"
     return f"{name}: {step.peak:.0f} of {step.step.at_most_n:g} N"
 

@@ -144,7 +144,7 @@ def test_a_pair_that_one_build_cannot_assess_is_counted_apart():
 def test_a_build_that_has_become_blind_is_worse():
     found = compare_builds(single(latencies()), single([BLIND] * 30))
     assert found.verdict == "worse"
-    assert "more not assessable: 30 of 30, before 0 of 30" in row_of(found).words
+    assert "nothing is assessable: not assessable 30 of 30, before 0 of 30" in row_of(found).words
     assert asked(found, "latency_ms").outcome == "not asked"
     assert asked(found, "latency_ms").reason == "no contact has it in both"
 
@@ -170,14 +170,14 @@ def test_an_impact_free_group_says_how_many_false_alarms_would_have_been_shown()
         ).verdict
         for count in (least - 1, least)
     }
-    assert shown == {least - 1: "no change shown", least: "worse"}
+    assert shown == {least - 1: "inconclusive", least: "worse"}
 
 
 def test_the_false_alarms_that_would_have_been_shown_are_more_than_before():
     old = single(latencies(), false_alarms={KEY: 20}, hours=2.0)
     least = int(asked(compare_builds(old, old), "false_alarms").detectable)
     assert least > 20
-    for count, outcome in ((least - 1, "no change shown"), (least, "worse")):
+    for count, outcome in ((least - 1, "inconclusive"), (least, "worse")):
         new = single(latencies(), false_alarms={KEY: count}, hours=2.0)
         assert asked(compare_builds(old, new), "false_alarms").outcome == outcome, count
 
@@ -188,7 +188,7 @@ def test_the_misses_that_would_have_been_shown_are_the_least_that_are(other):
     found = compare_builds(old, single([*latencies(10), MISSED, *latencies(29)], force=None, **other))
     least = int(asked(found, "missed").detectable)
     assert found.asked == 2
-    for count, outcome in ((least - 1, "no change shown"), (least, "worse")):
+    for count, outcome in ((least - 1, "inconclusive"), (least, "worse")):
         new = single(latencies(10) + [MISSED] * count + latencies(30 - count), force=None, **other)
         assert asked(compare_builds(old, new), "missed").outcome == outcome, count
 
@@ -208,7 +208,7 @@ def test_operations_that_one_build_cannot_judge_count_where_there_are_no_contact
     new = replace(old, exposure=tuple(replace(item, not_assessable=40) for item in old.exposure))
     found = compare_builds(old, new)
     assert found.verdict == "worse"
-    assert row_of(found).words == "more not assessable: 40 of 40, before 0 of 40"
+    assert row_of(found).words.startswith("nothing is assessable: not assessable 40 of 40, before 0 of 40 (by chance")
 
 
 def test_all_questions_are_corrected_together():
@@ -242,7 +242,7 @@ def test_a_stricter_level_shows_less():
     old = latencies(12)
     new = [a + b for a, b in zip(old, latencies(12, 2.2, 3.0, 9), strict=True)]
     verdicts = [compare_builds(single(old), single(new), level).verdict for level in (0.2, 0.001)]
-    assert verdicts == ["worse", "no change shown"]
+    assert verdicts == ["worse", "inconclusive"]
     with pytest.raises(UsageError, match="significance level is 1"):
         compare_builds(single(old), single(new), 1.0)
 
@@ -251,10 +251,9 @@ def test_a_stricter_level_shows_less():
 def test_too_few_recordings_to_show_anything_are_said_to_be_so(unpaired, n):
     other = {"bytes_of": "other", "names": "x"} if unpaired else {}
     found = compare_builds(single(latencies(n)), single([x + 100.0 for x in latencies(n)], **other))
-    assert found.words == "no change shown, and none could have been: too few recordings for 2 questions"
-    assert (
-        row_of(found).words == "no change shown (none could have been in latency: too few recordings for 2 questions)"
-    )
+    assert found.words == "inconclusive: this sample is too small to detect any change"
+    assert "too few recordings for 2 questions" in row_of(found).words
+    assert row_of(found).words.startswith("inconclusive: latency ")
     assert asked(found, "latency_ms").detectable == math.inf
 
 
@@ -265,9 +264,9 @@ def test_recordings_of_one_campaign_count_as_one():
     campaigns = [f"day {i % 3}" for i in range(12)]
     for named in ({}, {"campaigns": campaigns}):
         found = compare_builds(single(old, campaigns=campaigns), single(new, **named))
-        assert found.verdict == "no change shown", named
+        assert found.verdict == "inconclusive", named
         assert asked(found, "latency_ms").p == pytest.approx(2 / 2**3)
-    assert compare_builds(single(old), single(new, campaigns=campaigns)).verdict == "no change shown"
+    assert compare_builds(single(old), single(new, campaigns=campaigns)).verdict == "inconclusive"
 
 
 def test_the_same_bytes_are_paired_under_any_name():

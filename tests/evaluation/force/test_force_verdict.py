@@ -21,7 +21,7 @@ GAP = profile_of(read_force_limits(), "en_12453_reducing_gap")
 WIDE = profile_of(read_force_limits(), "en_12453_wide_gap")
 RATE, PEAK = float(np.sqrt(500e3 / 620.0)), 0.2 * float(np.sqrt(500e3 * 620.0))
 TIME = np.arange(6001) * 1e-3
-ORDER = ("fail", "not assessable", "pass")
+ORDER = ("fail", "not_assessable", "pass")
 
 
 def course(force: FloatArray, time: FloatArray = TIME, clipped: FloatArray | None = None) -> ForceCourse:
@@ -72,8 +72,8 @@ def test_a_limit_that_comes_to_hold_under_load_is_exceeded_from_that_moment():
 def test_a_record_that_ends_early_is_not_assessable_where_it_is_silent():
     short = TIME <= 1.2
     verdict = judge(course(pressing(100.0).force[short], TIME[short]), GAP)
-    assert outcomes(verdict) == ["pass", "not assessable", "not assessable"]
-    assert verdict.outcome == "not assessable"
+    assert outcomes(verdict) == ["pass", "not_assessable", "not_assessable"]
+    assert verdict.outcome == "not_assessable"
     assert verdict.reason == "static: the record ends 1.2 s after the onset, the limit holds until 5 s"
     assert "before 5 s" in verdict.steps[2].reason
     assert np.isnan(verdict.steps[2].peak)
@@ -93,14 +93,14 @@ def test_what_is_exceeded_fails_although_the_record_ends_and_samples_are_missing
 def test_missing_samples_make_a_step_not_assessable_and_only_that_one():
     kept = (TIME < 2.0) | (TIME > 2.1)
     verdict = judge(course(pressing(100.0).force[kept], TIME[kept]), GAP)
-    assert outcomes(verdict) == ["pass", "not assessable", "pass"]
+    assert outcomes(verdict) == ["pass", "not_assessable", "pass"]
     assert verdict.steps[1].reason == "load-cell samples are missing for 102 ms"
 
 
 def test_samples_that_are_missing_over_a_boundary_concern_both_steps():
     kept = (TIME < 0.7) | (TIME > 0.8)
     verdict = judge(course(pressing(100.0).force[kept], TIME[kept]), GAP)
-    assert outcomes(verdict) == ["not assessable", "not assessable", "pass"]
+    assert outcomes(verdict) == ["not_assessable", "not_assessable", "pass"]
 
 
 def test_behind_missing_samples_the_time_budget_is_counted_from_where_they_begin():
@@ -110,7 +110,7 @@ def test_behind_missing_samples_the_time_budget_is_counted_from_where_they_begin
 
 def test_a_cell_at_its_stop_below_the_limit_is_not_assessable_and_above_it_fails():
     true = leaf(0.3)  # 1056 N
-    for stop, expected in ((800.0, "not assessable"), (3000.0, "pass")):
+    for stop, expected in ((800.0, "not_assessable"), (3000.0, "pass")):
         force = np.minimum(true.force, stop)
         verdict = judge(course(force, clipped=force >= stop), WIDE)
         assert outcomes(verdict) == [expected, "pass", "pass"]
@@ -124,7 +124,7 @@ def test_a_step_between_two_samples_is_not_assessable():
         "n", "n", "n", True, (ForceStep(0.0, 9.0, "a"), ForceStep(1.2e-3, 9.0, "b"), ForceStep(1.8e-3, 9.0, "c"))
     )
     verdict = judge(pressing(1.0), narrow)
-    assert outcomes(verdict) == ["pass", "not assessable", "pass"]
+    assert outcomes(verdict) == ["pass", "not_assessable", "pass"]
     assert "no load-cell sample" in verdict.reason
 
 
@@ -195,14 +195,14 @@ def test_three_tests_are_averaged_step_by_step():
 def test_fewer_tests_than_are_averaged_are_not_assessable_and_more_are_all_averaged():
     one = judge(pressing(900.0), GAP)
     few = averaged([one, one], GAP)
-    assert few.outcome == "not assessable"
+    assert few.outcome == "not_assessable"
     assert few.reason == "dynamic: 2 of the 3 tests that are averaged"
     assert few.note == "mean of 2 tests where the profile averages 3"
     many = averaged([judge(pressing(force), GAP) for force in (100.0, 200.0, 300.0, 1200.0)], GAP)
     assert many.steps[0].force == pytest.approx(450.0)
     assert many.note == "mean of 4 tests where the profile averages 3"
     assert many.outcome == "fail"
-    assert averaged([], GAP).outcome == "not assessable"
+    assert averaged([], GAP).outcome == "not_assessable"
 
 
 def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails():
@@ -210,13 +210,13 @@ def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails()
     cut = judge(course(pressing(100.0, 600.0).force[short], TIME[short]), with_limits([400.0, 700.0, 25.0]))
     whole = judge(pressing(100.0, 100.0), with_limits([400.0, 700.0, 25.0]))
     point = averaged([whole, whole, cut], with_limits([400.0, 700.0, 25.0]))
-    assert [item.outcome for item in point.steps] == ["pass", "not assessable", "not assessable"]
+    assert [item.outcome for item in point.steps] == ["pass", "not_assessable", "not_assessable"]
     assert "the record ends" in point.reason
     assert np.isnan(point.steps[2].force)
     lower = with_limits([400.0, 650.0, 25.0])
     loud = judge(pressing(100.0, 900.0), lower)
     cut = judge(course(pressing(100.0, 600.0).force[short], TIME[short]), lower)
-    assert cut.steps[1].outcome == "not assessable"
+    assert cut.steps[1].outcome == "not_assessable"
     assert averaged([loud, loud, cut], lower).steps[1].outcome == "fail"
 
 

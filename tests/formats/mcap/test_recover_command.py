@@ -6,7 +6,8 @@ import typer
 from typer.testing import CliRunner
 
 from cdtool.cli.recover import recover
-from cdtool.errors import ExitStatus, UsageError
+from cdtool.errors import UsageError
+from cdtool.exit_status import ExitStatus
 from tests.formats.mcap.small_files import small_file
 
 APP = typer.Typer()
@@ -29,11 +30,11 @@ def test_a_cut_file_ends_with_status_3_and_says_what_is_lost_and_left_out(tmp_pa
     whole = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: whole.index(sent[-1][2])])
     done = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap")
-    assert done.exit_code == ExitStatus.INCOMPLETE
+    assert done.exit_code == ExitStatus.LOST
     assert "loss: damaged at byte" in done.output
     assert "(--unverified keeps them)" in done.output
     kept = run(tmp_path / "cut.mcap", "-o", tmp_path / "out.mcap", "--unverified", "--force")
-    assert kept.exit_code == ExitStatus.INCOMPLETE
+    assert kept.exit_code == ExitStatus.LOST
     assert f"{len(sent) - 1} messages" in kept.output
     assert "left out" not in kept.output
 

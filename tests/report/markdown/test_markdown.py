@@ -63,26 +63,26 @@ def rule(figure: str, most: float, detector: str = "momentum", group: str = "sti
 
 def test_without_limits_the_report_begins_with_what_was_found(evaluated):
     first, counts = to_markdown(evaluated).split("\n\n")[:2]
-    assert first == "# Collision detection: no limits are set"
+    assert first == "# Collision detection: 1 detection missed without a limit; no limits are set"
     assert counts == "34 contacts with 2 detectors: 35 detected, 1 missed, 1 not assessable; 1 false alarm."
 
 
 def test_kept_limits_are_the_first_thing_said(results):
     text = to_markdown(limited(results, rule("missed", 1), rule("median_ms", 80)))
-    assert text.startswith("# Collision detection: all 2 limits are kept\n")
+    assert text.startswith("# Collision detection: all 2 limits are met\n")
     assert "Not kept" not in text
-    assert to_markdown(limited(results, rule("missed", 1))).startswith("# Collision detection: the limit is kept\n")
+    assert to_markdown(limited(results, rule("missed", 1))).startswith("# Collision detection: the limit is met\n")
 
 
 def test_limits_that_are_not_kept_are_named_first_and_lead_their_table(results):
     rules = (rule("missed", 1), rule("mean_ms", 50), rule("peak_force_n", 400, group="holdout"))
     limits = limited(results, *rules[:2]).results.limits
-    unknown = LimitResult("a", "momentum", "stiff", "force_at_alarm_n", None, None, 9, "not assessable", "no load cell")
+    unknown = LimitResult("a", "momentum", "stiff", "force_at_alarm_n", None, None, 9, "not_assessable", "no load cell")
     text = to_markdown(evaluate(replace(results, limits=(*limits, unknown))))
-    assert text.startswith("# Collision detection: 2 of 3 limits not kept (1 broken, 1 not assessable)\n")
+    assert text.startswith("# Collision detection: 2 of 3 limits not met (1 violated, 1 not assessable)\n")
     head = text.split("## ")[0]
     assert "momentum, stiff, mean_ms: 65 is more than 50; momentum, stiff, force_at_alarm_n: no load cell." in head
-    assert [row[0] for row in rows(text)[2:5]] == ["**broken**", "**not assessable**", "kept"]
+    assert [row[0] for row in rows(text)[2:5]] == ["**violated**", "**not assessable**", "met"]
     assert rows(text)[2][3:6] == ["mean_ms", "65", "at most 50"]
     assert text.index("## Limits") < text.index("## stiff")
 
@@ -229,7 +229,7 @@ def test_force_verdicts_say_what_was_exceeded_when_and_against_which_source(resu
     assert ["stiff", "reducing gap", "1", "1", "0", "500", "12.0 ms after the onset"] in found
     assert any(row[3:5] == ["**fail**", "mean of 3 tests"] for row in found)
     assert any("reducing gap 500 of 400 N, static not seen, 150 N" in row for row in found)
-    assert "Force limits not kept" in folded(text)
+    assert "Force limits not met" in folded(text)
 
 
 def test_images_are_linked_by_relative_name_below_their_group(evaluated):
@@ -241,7 +241,7 @@ def test_images_are_linked_by_relative_name_below_their_group(evaluated):
 def named(results: Results, name: str) -> Evaluated:
     """Results in which everything that may come from a file is this name."""
     made, points = forces(name)
-    limit = LimitResult(name, name, name, name, 1.0, None, 0.0, "broken", name)
+    limit = LimitResult(name, name, name, name, 1.0, None, 0.0, "violated", name)
     changed = replace(
         results,
         groups=(name,),
@@ -354,8 +354,8 @@ def whole_blocks(text: str) -> None:
 def test_a_report_of_5000_recordings_fits_a_comment_and_says_what_it_left_out(five_thousand):
     text = to_markdown(five_thousand)
     assert 50_000 < len(text) <= 60_000
-    assert text.startswith("# Collision detection: 5 of 15 limits not kept (5 broken)\n")
-    assert len([row for row in rows(text) if row[0] in ("kept", "**broken**")]) == 15
+    assert text.startswith("# Collision detection: 5 of 15 limits not met (5 violated)\n")
+    assert len([row for row in rows(text) if row[0] in ("met", "**violated**")]) == 15
     assert "## stiff" in text and "## holdout" in text and "## Comparisons" in text
     missed = re.search(r"Cut here: (\d+) of 6250 rows; all of them are in results.json \(`contacts`\)", text)
     assert missed and int(missed[1]) == sum("no alarm in its window" in row for row in rows(text)) > 10
@@ -368,19 +368,21 @@ def test_a_report_of_5000_recordings_fits_a_comment_and_says_what_it_left_out(fi
 def test_no_report_is_longer_than_it_may_be(five_thousand, most):
     text = to_markdown(five_thousand, most=most)
     assert len(text) <= most
-    assert text.startswith("# Collision detection: 5 of 15 limits not kept")
-    assert "| **broken** | feekf | stiff | missed | 1250 | at most 0 |" in text
+    assert text.startswith("# Collision detection: 5 of 15 limits not met")
+    assert "| **violated** | feekf | stiff | missed | 1250 | at most 0 |" in text
     assert most > 5_000 or "of this report left out for its length; results.json has everything" in text
     whole_blocks(text)
 
 
 def test_a_thousand_limits_are_cut_but_not_the_broken_ones(results):
-    kept = [LimitResult(f"k{i}", "momentum", "stiff", "missed", 0.0, None, 1.0, "kept") for i in range(1000)]
-    broken = LimitResult("b", "momentum", "stiff", "p95_ms", None, None, 50.0, "broken", "not reached is more than 50")
+    kept = [LimitResult(f"k{i}", "momentum", "stiff", "missed", 0.0, None, 1.0, "met") for i in range(1000)]
+    broken = LimitResult(
+        "b", "momentum", "stiff", "p95_ms", None, None, 50.0, "violated", "not reached is more than 50"
+    )
     text = to_markdown(evaluate(replace(results, limits=(*kept, broken))), most=20_000)
     assert len(text) <= 20_000
-    assert rows(text)[2][:4] == ["**broken**", "momentum", "stiff", "p95_ms"]
-    assert "## Limits not kept" in text
+    assert rows(text)[2][:4] == ["**violated**", "momentum", "stiff", "p95_ms"]
+    assert "## Limits not met" in text
     assert re.search(r"of 1000 rows; all of them are in results.json \(`limits`\)", text)
     whole_blocks(text)
 
@@ -390,7 +392,7 @@ def test_long_and_hostile_names_do_not_push_the_verdict_out(results, kind):
     name = HOSTILE[kind] * 40
     text = to_markdown(named(results, name), [Image("a.png", name, name)], most=4000)
     assert len(text) <= 4000
-    assert text.startswith("# Collision detection: 9 of 9 limits not kept (9 broken)\n")
+    assert text.startswith("# Collision detection: 9 of 9 limits not met (9 violated); force profile violated by ")
     assert "and 4 more" in text
     whole_blocks(text)
 
@@ -403,5 +405,5 @@ def test_a_report_too_short_for_its_verdict_is_refused(evaluated):
 def test_results_of_nothing_say_so():
     nothing = Results({}, (), (), (), (), ())
     text = to_markdown(evaluate(nothing))
-    assert text.startswith("# Collision detection: no limits are set\n\nnothing was scored.\n")
+    assert text.startswith("# Collision detection: nothing was scored; no limits are set\n\nnothing was scored.\n")
     assert "(rule not stated)" in text

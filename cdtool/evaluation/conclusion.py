@@ -1,0 +1,233 @@
+"""What a benchmark concludes: limits, force profiles, missed contacts and what could not be assessed, taken together.
+
+Conventions: a force profile that is set for a group decides. The test points with their verdicts count, and each
+contact that belongs to none. A missed contact is a violation where a force profile is set, unless a limit of that
+detector and group says how many may be missed: then the limit decides. What nothing was measured for is not met.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from cdtool.evaluation.limits import not_met
+from cdtool.evaluation.recording_outcomes import MISSES
+from cdtool.evaluation.results import ConclusionResult, ContactResult, ForceResult, PointResult, Results
+from cdtool.evaluation.summary import Summary
+from cdtool.exit_status import Fact, status_of
+from cdtool.plain_text import counted, plain
+
+# Limits on these figures say how many contacts may be missed.
+_ON_MISSES = MISSES | {"detected", "max_ms"}
+_REASONS = 3
+
+Pair = tuple[str, str]
+"""Detector and group."""
+
+
+@dataclass(frozen=True)
+class ForceCheck:
+    """The verdict of one contact, or of one test point, that decides about a group's force profile."""
+
+    group: str
+    profile: str
+    name: str
+    verdict: str
+    reason: str
+    row: ForceResult | PointResult | None
+
+
+def force_checks(results: Results) -> list[ForceCheck]:
+    """Return what decides about every force profile that is set: test points, then the contacts that belong to none.
+
+    A contact without any load-cell force to compare is not assessable; so is a profile of a group without contacts that
+    were scored.
+    """
+    found = []
+    for group, profile in _profiles(results).items():
+        points = [item for item in results.points if item.group == group]
+        named = {item.point for item in points}
+        rows = [item for item in results.forces if item.group == group]
+        alone = [item for item in rows if item.point not in named]
+        found += [
+            ForceCheck(group, item.profile, f"test point {item.point}", item.verdict, item.reason or "", item)
+            for item in points
+        ]
+        found += [
+            ForceCheck(
+                group, item.profile, f"{item.recording}, contact {item.contact}", item.verdict, item.reason or "", item
+            )
+            for item in alone
+        ]
+        known = {(item.recording, item.contact) for item in rows}
+        contacts = {(item.recording, item.contact) for item in results.contacts if item.group == group}
+        unseen = [f"{name}, contact {number}" for name, number in sorted(contacts - known)]
+        if not contacts and not rows and not points:
+            unseen = ["every contact"]
+        found += [ForceCheck(group, profile, name, "not_assessable", "no load-cell force", None) for name in unseen]
+    return found
+
+
+def missed_unasked(results: Results, summaries: Sequence[Summary]) -> list[Summary]:
+    """Return the summaries with missed contacts where no limit says how many may be missed."""
+    asked = {(item.detector, item.group) for item in results.limits if item.figure in _ON_MISSES}
+    return [item for item in summaries if item.missed and (item.detector, item.group) not in asked]
+
+
+def nothing_assessed(summaries: Sequence[Summary]) -> list[Summary]:
+    """Return the summaries of detectors that could assess nothing at all in their group."""
+    return [
+        item
+        for item in summaries
+        if (item.contacts and not item.assessable) or (item.operations and not item.judged_operations)
+    ]
+
+
+def force_missed(results: Results, summaries: Sequence[Summary]) -> list[Summary]:
+    """Return the summaries whose missed contacts are violations, since their group has a force profile."""
+    profiles = _profiles(results)
+    return [item for item in missed_unasked(results, summaries) if item.group in profiles]
+
+
+def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult:
+    """Return headline, reasons and exit status of these results; `limits` of the results are checked already."""
+    checks = force_checks(results)
+    verdicts = Counter(item.verdict for item in checks)
+    failing = not_met(results.limits)
+    missed = missed_unasked(results, summaries)
+    forbidden = force_missed(results, summaries)
+    blind = nothing_assessed(summaries)
+    facts = set()
+    if failing:
+        facts.add(Fact.LIMIT_VIOLATED)
+    if verdicts["fail"] or forbidden:
+        facts.add(Fact.FORCE_VIOLATED)
+    if results.skipped:
+        facts.add(Fact.LEFT_OUT)
+    scored = any(item.contacts or item.operations for item in summaries)
+    if blind or not scored or (checks and verdicts["not_assessable"] == len(checks)):
+        facts.add(Fact.NOTHING_ASSESSABLE)
+    elif verdicts["not_assessable"]:
+        facts.add(Fact.INCOMPLETE)
+    violated = bool(verdicts["fail"] or forbidden) or any(item.outcome == "violated" for item in failing)
+    unknown = bool(failing or blind or not scored or verdicts["not_assessable"])
+    asked = bool(results.limits or checks)
+    outcome = "violated" if violated else "not_assessable" if unknown else "met" if asked else "not_asked"
+    nothing = [] if scored else ["nothing was scored"]
+    parts = [
+        *nothing,
+        *_force_words(verdicts, checks),
+        *_missed_words(missed, forbidden),
+        *_blind_words(blind, summaries),
+    ]
+    limits = limits_words(results)
+    headline = [limits, *parts] if failing else [*parts, limits] if outcome != "met" else [limits, *parts]
+    return ConclusionResult(
+        outcome=outcome,
+        headline="; ".join(headline),
+        reasons=tuple(_reasons(results, checks, missed, forbidden, blind)),
+        missed_without_limit=sum(item.missed for item in missed),
+        facts=tuple(sorted(fact.name.lower() for fact in facts)),
+        exit_status=int(status_of(facts)),
+    )
+
+
+def limits_words(results: Results) -> str:
+    """Return whether the limits are met, in a few words."""
+    limits = results.limits
+    if not limits:
+        return "no limits are set"
+    failing = not_met(limits)
+    if not failing:
+        return f"all {len(limits)} limits are met" if len(limits) > 1 else "the limit is met"
+    unknown = sum(item.outcome == "not_assessable" for item in failing)
+    kinds = [f"{len(failing) - unknown} violated"] if len(failing) > unknown else []
+    kinds += [f"{unknown} not assessable"] if unknown else []
+    return f"{len(failing)} of {counted(len(limits), 'limit')} not met ({', '.join(kinds)})"
+
+
+def _profiles(results: Results) -> dict[str, str]:
+    """The name of the profile of each group that has one: of the provenance, which a file may hold anything in."""
+    listed = results.provenance.get("force_profiles")
+    found = {item.group: item.profile for item in results.forces}
+    if isinstance(listed, Mapping):
+        named = {str(group): item for group, item in listed.items() if isinstance(item, Mapping)}
+        found |= {group: str(item.get("name", "")) for group, item in named.items() if group in results.groups}
+    return found
+
+
+def _force_words(verdicts: Counter[str], checks: Sequence[ForceCheck]) -> Iterator[str]:
+    if not checks:
+        return
+    of = _things(checks)
+    if verdicts["fail"]:
+        yield f"force profile violated by {verdicts['fail']} of {of}"
+    if verdicts["not_assessable"]:
+        yield f"force profile not assessable for {verdicts['not_assessable']} of {of}"
+    if verdicts["pass"] == len(checks):
+        yield f"force profile met by {of}"
+
+
+def _things(checks: Sequence[ForceCheck]) -> str:
+    points = sum(isinstance(item.row, PointResult) for item in checks)
+    if points == len(checks):
+        return counted(points, "test point")
+    return f"{len(checks)} contacts and test points" if points else counted(len(checks), "contact")
+
+
+def _missed_words(missed: Sequence[Summary], forbidden: Sequence[Summary]) -> Iterator[str]:
+    count, violations = sum(item.missed for item in missed), sum(item.missed for item in forbidden)
+    if violations:
+        yield f"{counted(violations, 'detection')} missed under a force profile"
+    if count > violations:
+        yield f"{counted(count - violations, 'detection')} missed without a limit"
+
+
+def _blind_words(blind: Sequence[Summary], summaries: Sequence[Summary]) -> Iterator[str]:
+    if not blind:
+        return
+    if len(blind) == len([item for item in summaries if item.operations or item.contacts]):
+        yield "nothing could be assessed"
+    else:
+        pairs = "detector and group" if len(blind) == 1 else "detectors and groups"
+        yield f"nothing could be assessed in {len(blind)} of {len(summaries)} pairs of {pairs}"
+
+
+def _reasons(
+    results: Results,
+    checks: Sequence[ForceCheck],
+    missed: Sequence[Summary],
+    forbidden: Sequence[Summary],
+    blind: Sequence[Summary],
+) -> Iterator[str]:
+    """What is not good about these results beside the limits, line by line, worst first."""
+    parts: dict[Pair, list[ForceCheck]] = {}
+    for item in checks:
+        parts.setdefault((item.group, item.profile), []).append(item)
+    for verdict, what in (("fail", "violated by"), ("not_assessable", "not assessable for")):
+        for (group, profile), items in parts.items():
+            those = [item for item in items if item.verdict == verdict]
+            if those:
+                first = f"{those[0].name}: {those[0].reason}" if those[0].reason else those[0].name
+                text = f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"
+                yield plain(text)
+    for each in missed:
+        why = "where a force profile is set" if each in forbidden else "and no limit says how many may be"
+        yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
+    for each in blind:
+        yield plain(f"{each.detector}, {each.group}: {_why_blind(results, each)}")
+
+
+def _why_blind(results: Results, item: Summary) -> str:
+    own: list[ContactResult] = [
+        row for row in results.contacts if (row.detector, row.group) == (item.detector, item.group)
+    ]
+    exposures = [row for row in results.exposure if (row.detector, row.group) == (item.detector, item.group)]
+    reasons = list(dict.fromkeys(row.reason for row in own if row.reason))
+    reasons = reasons or [
+        f"{name} {100.0 * share:.0f} %" for row in exposures for name, share in row.not_judged.items()
+    ]
+    what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
+    more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""
+    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'no reason is known'}{more}"
