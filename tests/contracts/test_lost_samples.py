@@ -181,7 +181,7 @@ def test_a_sensor_that_loses_10_samples_every_200_ms_is_still_judged_and_what_is
 @pytest.mark.parametrize("kind", ["arm", "robot"])
 def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tmp_path, request):
     if (name, threshold, kind) == ("kalman_momentum", "cusum", "robot"):
-        # Known to fail: its covariance takes some 100 ms to settle behind a gap, and the sum gathers what is left.
+        # Known to fail: the sum reaches 17.3 where 1.6 times the normal 10.1 is allowed; the cause is not yet found.
         request.applymarker(pytest.mark.xfail(reason="kalman_momentum with cusum on a robot of 6 joints: open"))
     if kind == "robot":
         pytest.importorskip("pinocchio")
