@@ -1,4 +1,4 @@
-"""Every benchmark but thresholds.py (40 minutes, no target) and signature_coverage.py (10 minutes), a process each.
+"""Every benchmark but thresholds.py, signature_coverage.py and lost_samples.py (10 minutes to hours), a process each.
 
 Ends with status 1 where a target is not held.
 

@@ -49,7 +49,8 @@ class Signal:
     `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive
     always opposes the motion. `joints` names the columns: the machine's joints, those of them that are watched, or one
     name for a signal of the whole machine. A detector may leave it empty: then they are the recording's joints.
-    `notes`: what a user should know of how the signal came about.
+    `notes`: what a user should know of how the signal came about. `lost` (n, J): where an input of the detector had
+    no sample, so that the value rests on a held one; None where no input lost a sample.
     """
 
     time: FloatArray
@@ -59,6 +60,7 @@ class Signal:
     signed: bool = True
     joints: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    lost: BoolArray | None = None
 
     @property
     def valid(self) -> BoolArray:
@@ -87,6 +89,7 @@ class Signal:
             values=np.ascontiguousarray(self.values[:, columns]),
             status=np.ascontiguousarray(self.status[:, columns]),
             joints=tuple(self.joints[i] for i in columns),
+            lost=None if self.lost is None else self.lost[:, columns],
         )
 
     def rows(self, start: float, end: float) -> slice:
@@ -96,7 +99,8 @@ class Signal:
 
     def part(self, rows: slice) -> Signal:
         """Return these rows of the signal."""
-        return replace(self, time=self.time[rows], values=self.values[rows], status=self.status[rows])
+        lost = None if self.lost is None else self.lost[rows]
+        return replace(self, time=self.time[rows], values=self.values[rows], status=self.status[rows], lost=lost)
 
     def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
         """Share of the samples for each reason not to judge, over all joints, from `start` to `end` [s]."""

@@ -10,13 +10,14 @@ import numpy as np
 
 from cdtool.activation import Activation
 from cdtool.clock import previous_value
+from cdtool.clock.lost import lost_samples
 from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
 from cdtool.judgement import Judgement, judged
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
-from cdtool.recording import FloatArray
+from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 
 
@@ -132,6 +133,16 @@ def detect_operations(
     return _judge_log(operations, detector.name, signal, thresholds, activation, hold)
 
 
+def _lost_inputs(detector: Detector, recording: Recording, machine: Any, signal: Signal) -> BoolArray | None:
+    """Where the detector's inputs lost samples, for the columns of its signal; None where none was lost."""
+    channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
+    lost = lost_samples(recording, channels, signal.time)
+    # Each of several coupled joints feels the others, and a signal of the whole machine rests on all of them.
+    if lost is not None and (machine.coupled or lost.shape != signal.values.shape):
+        lost = np.repeat(lost.any(axis=1, keepdims=True), signal.values.shape[1], axis=1)
+    return lost
+
+
 def detect_operation(
     operation: Operation,
     machine: Any,
@@ -158,9 +169,10 @@ def judge(
 
 
 def _signal_of_log(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str]) -> Signal:
-    recording = operation.whole
-    signal = checked_signal(detector, recording.without_ground_truth(), machine)
-    return replace(signal, joints=signal.joints or recording.joints).watching(watched)
+    recording = operation.whole.without_ground_truth()
+    signal = checked_signal(detector, recording, machine)
+    lost = _lost_inputs(detector, recording, machine, signal)
+    return replace(signal, joints=signal.joints or recording.joints, lost=lost).watching(watched)
 
 
 def _rows(signal: Signal, operation: Operation) -> slice:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 
+# A filter goes on over a gap up to this long [s] even where its memory is shorter: no start-up behind it.
+BRIDGED = 0.15
+
 AnyDetector = TypeVar("AnyDetector", bound="DataclassInstance")
 
 
@@ -93,7 +96,7 @@ class Drive:
 
     `missing` (n, J) tells where anything has no sample; `speed_missing` where the motion is not known. Of a coupled
     machine all joints' motion is missing where one joint's is, since each feels the others. A machine that is not
-    coupled needs no position: it is 0 there.
+    coupled needs no position: it is 0 there. `coupled`: the balances depend on the pose.
     """
 
     time: FloatArray
@@ -102,6 +105,12 @@ class Drive:
     speed: FloatArray
     missing: BoolArray
     speed_missing: BoolArray
+    coupled: bool = False
+
+    @property
+    def interrupted(self) -> BoolArray:
+        """(n, J): where a filter of balances waits: the motion is missing, or a torque that there was before."""
+        return self.speed_missing | (self.missing & (np.cumsum(~self.missing, axis=0) > 0))
 
 
 def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Drive:
@@ -133,6 +142,7 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
         hold_last(speed.values, ~np.isfinite(speed.values)),
         torque_missing | motion_missing,
         motion_missing,
+        machine.coupled,
     )
 
 
@@ -158,8 +168,10 @@ def observe_momentum(
     """Residual and status (n, J) of the generalized momentum observer (thesis 2.18-2.19 corrected).
 
     res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
-    constant force and any T_k. `ready` (J,) is the time from which the residual may be judged. `momentum` is used up:
-    the residual is written over it, since on long logs fresh memory costs as much as the filter.
+    constant force and any T_k. Over missing samples it waits: the next step is longer. Where only the speed is missing
+    the force goes on; where the torque is, or the pose of coupled joints, a straight line stands for it. It starts anew
+    behind a gap longer than 3/K and 0.15 s. `ready` (J,) is the time from which the residual may be judged. `momentum`
+    is used up: the residual is written over it, since on long logs fresh memory costs as much as the filter.
     """
     residual = momentum
     status = np.empty(net_force.shape, dtype=np.uint8)
@@ -171,6 +183,7 @@ def observe_momentum(
             np.ascontiguousarray(momentum[:, j]),
             np.ascontiguousarray(drive.missing[:, j]),
             np.ascontiguousarray(drive.speed_missing[:, j]),
+            drive.coupled,
             gains[j],
             ready[j],
             residual[:, j],
@@ -180,7 +193,7 @@ def observe_momentum(
 
 
 @kernel(
-    "void(Array(float64, 1, 'C', readonly=True), float64[::1], float64[::1], b1[::1], b1[::1], "
+    "void(Array(float64, 1, 'C', readonly=True), float64[::1], float64[::1], b1[::1], b1[::1], b1, "
     "float64, float64, float64[:], uint8[:])"
 )
 def _observe(
@@ -189,13 +202,18 @@ def _observe(
     momentum: FloatArray,
     missing: BoolArray,
     speed_missing: BoolArray,
+    coupled: bool,
     bandwidth: float,
     ready: float,
     residual: FloatArray,
     status: StatusArray,
 ) -> None:
     settle = 3.0 / bandwidth
+    longest_gap = max(settle, BRIDGED)
     started = False
+    seen = False
+    bridged = False
+    force_before = 0.0
     value = 0.0
     impulse = 0.0
     elapsed = 0.0
@@ -205,15 +223,20 @@ def _observe(
             step = time[k] - time[k - 1]
             impulse += 0.5 * (net_force[k] + net_force[k - 1]) * step
             elapsed += step
-        if speed_missing[k]:
-            # p is unknown: the impulse goes on, the residual waits for the next speed.
+        seen = seen or not missing[k]
+        if speed_missing[k] or (missing[k] and seen):
+            # p or its rate is unknown: the residual waits for the next whole sample.
+            bridged = bridged or coupled or not speed_missing[k]
             residual[k] = value
             status[k] = 3
             continue
+        if bridged:
+            impulse = 0.5 * (net_force[k] + force_before) * elapsed
+            bridged = False
         if not started:
             started = True
             ready = max(ready, time[k] + settle)
-        elif elapsed > settle:
+        elif elapsed > longest_gap:
             value = 0.0
             ready = time[k] + settle
         else:
@@ -226,6 +249,7 @@ def _observe(
                 weight = 1.0 - math.exp(-x)
             value += weight * ((impulse - (momentum[k] - last_momentum)) / elapsed - value)
         last_momentum = momentum[k]
+        force_before = net_force[k]
         impulse = 0.0
         elapsed = 0.0
         residual[k] = value

@@ -10,7 +10,7 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
-from cdtool.detectors.filters import low_pass, polynomial_rates, settling_time, started_at
+from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -65,9 +65,12 @@ class DesiredDynamics:
         held = hold_last(torque, ~np.isfinite(torque))
         balance = machine.force_balance(held, pose, speed) - machine.inertia_times(pose, acceleration)
         cutoff = per_joint(self.cutoff, len(machine.joints))
-        residual, _ = low_pass(time, balance, motion_missing, cutoff)
+        # A torque that there was before and is missing interrupts the low-pass as a missing reference does.
+        torque_missing = ~np.isfinite(torque)
+        waits = motion_missing | (torque_missing & (np.cumsum(~torque_missing, axis=0) > 0))
+        residual, _ = low_pass(time, balance, waits, cutoff)
         settle = settling_time(cutoff)
-        started = started_at(time, motion_missing, settle)
+        started = started_at(time, waits, longest_gap(cutoff))
         status = np.where(time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
         lost = np.abs(np.nan_to_num(error)) > per_joint(self.tracking_limit, error.shape[1])
         status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE

@@ -15,7 +15,7 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
-from cdtool.detectors.filters import low_pass, settling_time, started_at
+from cdtool.detectors.filters import longest_gap, low_pass, settling_time, started_at
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
@@ -51,11 +51,12 @@ class Direct:
         drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         cutoff = per_joint(self.cutoff, len(machine.joints))
-        filtered, _ = low_pass(drive.time, balance, drive.speed_missing, cutoff)
-        _, acceleration = low_pass(drive.time, drive.speed, drive.speed_missing, cutoff)
+        waits = drive.interrupted
+        filtered, _ = low_pass(drive.time, balance, waits, cutoff)
+        _, acceleration = low_pass(drive.time, drive.speed, waits, cutoff)
         residual = filtered - machine.inertia_times(drive.position, acceleration)
         settle = settling_time(cutoff)
-        started = started_at(drive.time, drive.speed_missing, settle)
+        started = started_at(drive.time, waits, longest_gap(cutoff))
         status = np.where(drive.time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
         missing = for_every_joint(drive.missing) if machine.coupled else drive.missing
         status[missing] = Status.GAP

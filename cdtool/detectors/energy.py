@@ -60,7 +60,7 @@ class Energy:
         if machine.coupled:
             speed = np.linalg.norm(speed, axis=1, keepdims=True)
             missing, motion_missing = (for_every_joint(item)[:, :1] for item in (missing, motion_missing))
-        alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing)
+        alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing, drive.coupled)
         ready = np.full(energy.shape[1], -np.inf)
         residual, status = observe_momentum(alone, power, energy, self.bandwidth, ready)
         slow = speed < per_joint(self.minimum_speed, speed.shape[1])

@@ -5,18 +5,29 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
+from cdtool.clock import HOLD_PERIODS
+from cdtool.clock.coarse import recent_medians
+from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 _READ_BOOL = "Array(b1, 1, 'C', readonly=True)"
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)
+# No gap is cut into more steps than this.
+_MOST_PIECES = 10_000
 
 
 def settling_time(cutoff: FloatArray | float) -> FloatArray:
     """How long after a start a low-pass of `cutoff` [Hz] is not to be trusted [s]: 3 over its poles' real part."""
     return np.asarray(_SETTLE / (2.0 * math.pi * cutoff), dtype=np.float64)
+
+
+def longest_gap(cutoff: FloatArray | float) -> FloatArray:
+    """The longest gap over which a low-pass of `cutoff` [Hz] goes on [s]: a longer one starts it anew."""
+    return np.maximum(settling_time(cutoff), BRIDGED)
 
 
 def low_pass(
@@ -25,16 +36,29 @@ def low_pass(
     """Low-pass (n, J) of `values` (n, J) and its rate of change: y and s y with the same states, so that they match.
 
     Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz] (one, or one a joint), bilinear
-    with the measured step and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: the
-    next step is longer. After a gap longer than the settling time it starts anew, from rest at the first value.
+    with the measured step and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: over
+    the longer step the value runs straight, and the filter takes it in steps of the usual length. After a gap longer
+    than `longest_gap` it starts anew, from rest at the first value.
     """
     filtered, rate = np.empty(values.shape), np.empty(values.shape)
     corners = np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1])
-    settle = settling_time(corners)
+    longest = longest_gap(corners)
+    pieces = _pieces(time)
     for j in range(values.shape[1]):
         column, lost = np.ascontiguousarray(values[:, j]), np.ascontiguousarray(missing[:, j])
-        _low_pass(time, column, lost, 2.0 * math.pi * corners[j], settle[j], filtered[:, j], rate[:, j])
+        _low_pass(time, column, lost, pieces, 2.0 * math.pi * corners[j], longest[j], filtered[:, j], rate[:, j])
     return filtered, rate
+
+
+def _pieces(time: FloatArray) -> npt.NDArray[np.int64]:
+    """(n,): into how many usual steps the step to each sample is cut: 1 up to 5 of them, where no row is lost."""
+    pieces = np.ones(len(time), dtype=np.int64)
+    if len(time) > 2:
+        steps = np.diff(time)
+        usual = recent_medians(steps, float(steps[0]))[:-1]
+        long = steps[1:] > HOLD_PERIODS * usual
+        pieces[2:][long] = np.minimum(np.rint(steps[1:][long] / usual[long]), _MOST_PIECES).astype(np.int64)
+    return pieces
 
 
 def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
@@ -70,11 +94,12 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     return first, second
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {_READ_BOOL}, float64, float64, float64[:], float64[:])")
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {_READ_BOOL}, int64[::1], float64, float64, float64[:], float64[:])")
 def _low_pass(
     time: FloatArray,
     values: FloatArray,
     missing: BoolArray,
+    pieces: npt.NDArray[np.int64],
     cutoff: float,
     longest_gap: float,
     filtered: FloatArray,
@@ -92,15 +117,20 @@ def _low_pass(
                 y = values[k]
                 slope = 0.0
             else:
-                half = 0.5 * step
+                parts = max(pieces[k], k - last)
+                half = 0.5 * step / parts
                 # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
                 w = math.tan(min(cutoff * half, 1.4)) / half
                 square = w * w
-                drive = half * square * (values[k] + values[last])
-                right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
-                right_y = y + half * slope
-                slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
-                y = right_y + half * slope
+                before = values[last]
+                for part in range(parts):
+                    after = values[k] if part == parts - 1 else before + (values[k] - before) / (parts - part)
+                    drive = half * square * (after + before)
+                    right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
+                    right_y = y + half * slope
+                    slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
+                    y = right_y + half * slope
+                    before = after
             last = k
         filtered[k] = y
         rate[k] = slope

@@ -8,8 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import previous_value
-from cdtool.detection import Signal, StatusArray
+from cdtool.clock import GAP_PERIODS, previous_value
+from cdtool.clock.coarse import recent_medians
+from cdtool.clock.lost import lost_samples
+from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
@@ -22,7 +24,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.friction_ekf_arm_kernel import run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import run_filter
 from cdtool.dynamics import Gain, JointEquation, Machine
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 10.0
@@ -30,6 +32,8 @@ _INITIAL_DRIFT_TIME = 10.0
 _ACCELERATION_HOLD = 0.05
 # A speed that falls below the minimum for no longer than this is a glitch, not a stop: no new start-up [s].
 _GLITCH = 0.02
+# The covariance has grown over a gap: what comes behind it moves the estimate at once, for at most this time [s].
+_LONGEST_UNSETTLED = 0.01
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,10 @@ class FrictionEkf:
                 np.ascontiguousarray(acceleration.values[:, j]),
             )
             friction[:, j], status[:, j] = of_joint(self, j, len(equations)).estimate(motion, equation)
+        late = lost_samples(recording, ("acceleration",), drive.time)
+        lost = drive.missing if late is None else drive.missing | late
+        unsettled = _unsettled(drive.time, for_every_joint(lost) if machine.coupled else lost)
+        status[unsettled & (status == Status.VALID)] = Status.GAP
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
     def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
@@ -179,3 +187,23 @@ class FrictionEkf:
         eigenvalues = np.linalg.eigvals(closed)
         poles = np.sort(np.abs(np.log(np.maximum(np.abs(eigenvalues), math.exp(-700.0)) + 0j)) / period)
         return np.asarray(poles.real, dtype=np.float64), float(covariance[0, 0])
+
+
+def _unsettled(time: FloatArray, lost: BoolArray) -> BoolArray:
+    """Where the estimate jumps behind a gap (n, J): for as long as the gap was, at most 10 ms.
+
+    A gap is a step of more than 2.5 usual ones between samples that were not `lost` (n, J): two lost ones or more.
+    """
+    unsettled = np.zeros(lost.shape, dtype=bool)
+    if len(time) < 3:
+        return unsettled
+    steps = np.diff(time)
+    usual = np.concatenate((steps[:1], steps[:1], recent_medians(steps, float(steps[0]))[:-1]))
+    for j in range(lost.shape[1]):
+        known = np.where(lost[:, j], np.nan, time)
+        # How long before each sample the last one was that was not lost.
+        since = time - np.fmax.accumulate(np.concatenate(([time[0]], known[:-1])))
+        ends = time + np.minimum(since - usual, _LONGEST_UNSETTLED)
+        behind = (since > GAP_PERIODS * usual) & ~lost[:, j]
+        unsettled[:, j] = time < np.maximum.accumulate(np.where(behind, ends, -np.inf)) - 0.5 * usual
+    return unsettled

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import previous_value
+from cdtool.clock import HOLD_PERIODS, previous_value
+from cdtool.clock.coarse import recent_medians
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     drive_of,
@@ -27,6 +28,8 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 # The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
 _STANDSTILL_WINDOW = 0.3
 _STANDSTILL_AT_LEAST = 0.1
+# Over a longer gap than this [s] vibration makes a straight line of the acceleration worse than the speed's change.
+_LONGEST_LINE = 0.02
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,8 @@ class InertialMomentum:
         drive = drive_of(self, recording, machine)
         acceleration = previous_value(recording["acceleration"], drive.time)
         lost = ~np.isfinite(acceleration)
+        # Before the first sample of the accelerometer nothing is lost.
+        unknown = lost & (np.cumsum(~lost, axis=0) > 0)
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
         for j, stick_speed in enumerate(machine.stick_speed):
@@ -71,6 +76,7 @@ class InertialMomentum:
                 hold_last(acceleration, lost)[:, j],
                 drive.speed_missing[:, j],
                 stick_speed,
+                unknown[:, j],
             )
         if machine.coupled:
             lost = for_every_joint(lost)
@@ -87,20 +93,35 @@ class InertialMomentum:
         acceleration: FloatArray,
         missing: BoolArray,
         standstill_speed: float,
+        lost: BoolArray | None = None,
     ) -> tuple[FloatArray, float]:
-        """Fused speed (n,) of one joint, and the time from which it may be trusted [s]."""
+        """Fused speed (n,) of one joint, and the time from which it may be trusted [s].
+
+        `missing` and `lost` (n,): where speed and acceleration have no sample. While the speed is missing the
+        acceleration is integrated; a gap in the acceleration is bridged by a straight line up to 20 ms (or 5 periods of
+        a slower clock), by the change of the speed where it is longer.
+        """
         crossover = single(self.crossover)
         k1, k2 = 2.0 * single(self.damping) * crossover, crossover**2
         fused = np.empty(len(time))
-        arrays = (np.ascontiguousarray(item) for item in (speed, acceleration, missing))
+        lost = np.zeros(len(time), dtype=bool) if lost is None else lost
+        inputs = (speed, acceleration, missing, lost, _longest_line(time))
+        arrays = (np.ascontiguousarray(item) for item in inputs)
         settle = 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
         rest = (standstill_speed, _STANDSTILL_WINDOW, _STANDSTILL_AT_LEAST)
         return fused, float(_fuse(time, *arrays, k1, k2, settle, *rest, fused))
 
 
+def _longest_line(time: FloatArray) -> FloatArray:
+    """At each sample (n,) the longest gap in the acceleration that a straight line bridges [s]."""
+    steps = np.diff(time)
+    usual = recent_medians(steps, float(steps[0])) if len(steps) else steps
+    return np.maximum(_LONGEST_LINE, HOLD_PERIODS * np.concatenate((usual[:1], usual[:1], usual[:-1])))[: len(time)]
+
+
 @kernel(
     f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
-    "Array(b1, 1, 'C', readonly=True), "
+    f"Array(b1, 1, 'C', readonly=True), Array(b1, 1, 'C', readonly=True), {READ_ONLY}, "
     "float64, float64, float64, float64, float64, float64, float64[::1])"
 )
 def _fuse(
@@ -108,6 +129,8 @@ def _fuse(
     speed: FloatArray,
     acceleration: FloatArray,
     missing: BoolArray,
+    lost: BoolArray,
+    longest_line: FloatArray,
     k1: float,
     k2: float,
     settle: float,
@@ -126,8 +149,13 @@ def _fuse(
     count = 0
     trusted = math.inf
     last = 0
+    gained = 0.0
+    bridged = False
     for k in range(len(time)):
         fused[k] = w
+        if k > 0:
+            gained += 0.5 * (time[k] - time[k - 1]) * (acceleration[k] + acceleration[k - 1])
+        bridged = bridged or lost[k]
         if missing[k]:
             continue
         if not started:
@@ -147,10 +175,26 @@ def _fuse(
                 z = -total / count
                 fused[k] = w
                 last = k
+                gained = 0.0
+                bridged = False
                 continue
-        half = 0.5 * (time[k] - time[last])
+        if lost[k]:
+            fused[k] = w + speed[k] - speed[last]
+            continue
+        span = time[k] - time[last]
+        half = 0.5 * span
+        straight = bridged or last == k - 1
+        change, gained, bridged = gained, 0.0, False
+        if straight and span > longest_line[k]:
+            w += speed[k] - speed[last]
+            fused[k] = w
+            last = k
+            continue
         speeds = half * (speed[k] + speed[last])
-        right_w = (1.0 - k1 * half) * w + half * z + k1 * speeds + half * (acceleration[k] + acceleration[last])
+        if straight:
+            right_w = (1.0 - k1 * half) * w + half * z + k1 * speeds + half * (acceleration[k] + acceleration[last])
+        else:
+            right_w = (1.0 - k1 * half) * w + half * z + k1 * speeds + change
         right_z = z - k2 * half * w + k2 * speeds
         scale = 1.0 / (1.0 + k1 * half + k2 * half * half)
         w = scale * (right_w + half * right_z)

@@ -74,6 +74,8 @@ class KalmanMomentum:
                 np.ascontiguousarray(momentum[:, j]),
                 np.ascontiguousarray(drive.missing[:, j]),
                 np.ascontiguousarray(drive.speed_missing[:, j]),
+                np.ascontiguousarray(drive.interrupted[:, j]),
+                machine.coupled,
                 drift[j],
                 torque[j],
                 float(inertia) ** 2 * speed[j],
@@ -103,7 +105,8 @@ def _process_noise(drift: float, torque: float, step: float) -> FloatArray:
 
 
 @kernel(
-    f"void({READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], float64, float64, float64, float64[:], uint8[:])"
+    f"void({READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, float64, "
+    "float64[:], uint8[:])"
 )
 def _filter(
     time: FloatArray,
@@ -111,14 +114,24 @@ def _filter(
     momentum: FloatArray,
     missing: BoolArray,
     speed_missing: BoolArray,
+    waits: BoolArray,
+    coupled: bool,
     drift: float,
     torque_noise: float,
     momentum_noise: float,
     estimate: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Predict p + (mean force - tau_c) T over each step, exactly; correct with p as measured, in Joseph form."""
+    """Predict p + (mean force - tau_c) T over each step, exactly; correct with p as measured, in Joseph form.
+
+    `waits`: where a sample is not whole. Behind it a straight line stands for the force where the torque was missing,
+    or the pose of `coupled` joints.
+    """
     started = False
+    bridged = False
+    impulse = 0.0
+    elapsed = 0.0
+    force_before = 0.0
     p = 0.0
     contact = 0.0
     pp = pc = cc = 0.0
@@ -129,14 +142,23 @@ def _filter(
             started = False
         if started:
             step = time[k] - time[k - 1]
+            impulse += 0.5 * (net_force[k] + net_force[k - 1]) * step
+            elapsed += step
             p += (0.5 * (net_force[k] + net_force[k - 1]) - contact) * step
             pp += step * (step * cc - 2.0 * pc) + drift * step**3 / 3.0 + torque_noise * step * step
             pc += -step * cc - 0.5 * drift * step * step
             cc += drift * step
-        if speed_missing[k]:
+        if waits[k]:
+            bridged = bridged or coupled or not speed_missing[k]
             estimate[k] = contact
             status[k] = 3
             continue
+        if started and bridged:
+            p += 0.5 * (net_force[k] + force_before) * elapsed - impulse
+        bridged = False
+        impulse = 0.0
+        elapsed = 0.0
+        force_before = net_force[k]
         if not started:
             started = True
             p = momentum[k]

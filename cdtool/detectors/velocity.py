@@ -66,7 +66,7 @@ class Velocity:
             np.ascontiguousarray(drive.speed),
             np.ascontiguousarray(machine.inertia_matrix(drive.position)),
             np.ascontiguousarray(for_every_joint(drive.missing)[:, 0]),
-            np.ascontiguousarray(drive.speed_missing[:, 0]),
+            np.ascontiguousarray(for_every_joint(drive.interrupted)[:, 0]),
             per_joint(self.bandwidth, len(machine.joints)) * machine.nominal_inertia,
             residual,
             status,

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from cdtool.detection import StatusArray
+from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
@@ -34,7 +35,7 @@ def observe_velocity(
 
     K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
     A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
-    of the slowest mode without a sample it starts anew. Fills `residual` and `status` (n, J).
+    of the slowest mode and 0.15 s without a sample it starts anew. Fills `residual` and `status` (n, J).
     """
     root = np.sqrt(gains)
     known = np.flatnonzero(~motion_missing)
@@ -84,7 +85,11 @@ def _observe(
             continue
         if started:
             slowest = periods[k, joints - 1]
-            if elapsed > 3.0 * slowest:
+            if k > last + 1:
+                # The balance over a gap rests on held values: a straight line stands for it.
+                for j in range(joints):
+                    work[_IMPULSE, j] = 0.5 * (balance[k, j] + balance[last, j]) * elapsed
+            if elapsed > max(3.0 * slowest, BRIDGED):
                 for i in range(joints):
                     work[_VALUE, i] = 0.0
                 settled = 0.0

@@ -8,6 +8,9 @@ import numpy as np
 
 from cdtool.recording import FloatArray
 
+# The sum of so many powers of 2 of terms stands for the infinite one.
+_DOUBLINGS = 24
+
 
 def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
     """Coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k, and the standard deviation of nu, from stretches of e.
@@ -41,3 +44,20 @@ def forecast_spread(coefficients: FloatArray, steps: int) -> FloatArray:
         impulse[k] = coefficients @ impulse[k - order : k][::-1]
     spread: FloatArray = np.sqrt(np.cumsum(impulse[order:] ** 2))
     return spread
+
+
+def stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray:
+    """Covariance (p, p) of the last p values of e, that of nu being 1: P = F P F' + Q, solved by doubling.
+
+    It is scaled up where the variance of e would be below `least`. The model is stable (see `burg`).
+    """
+    order = len(coefficients)
+    transition = np.eye(order, k=-1)
+    transition[0] = coefficients
+    covariance = np.zeros((order, order))
+    covariance[0, 0] = 1.0
+    for _ in range(_DOUBLINGS):
+        covariance = covariance + transition @ covariance @ transition.T
+        transition = transition @ transition
+    scaled: FloatArray = covariance * max(1.0, least / float(covariance[0, 0]))
+    return scaled

@@ -20,9 +20,9 @@ class Innovation:
 
     e = (i - mu(x)) / s(x), nu_k = e_k - sum a_i e_{k-i}, statistic = nu_k / sd(nu), in standard deviations. mu and s
     are the signature's, learned from at least 10 runs of one class; a of order `order` by Burg's recursion over all
-    runs. Samples are counted, not timed: the rate must be that of the runs. A gap above 20 samples starts the model
-    anew. Blind to slow ramps: the model foretells them. Fails against soft impacts, where noise differs from place to
-    place, and with a debounce: an innovation is large for a few samples only.
+    runs. Samples are counted, not timed: the rate must be that of the runs. Behind a gap the model starts
+    from the normal spread. Blind to slow ramps: the model foretells them. Fails against soft impacts, where noise
+    differs from place to place, and with a debounce: an innovation is large for a few samples only.
     """
 
     safety_factor: float = 5.5

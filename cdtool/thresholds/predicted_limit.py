@@ -29,9 +29,9 @@ class PredictedLimit:
     `forgetting`^age; statistic = sum theta_j `ahead`^j, in the signal's unit. Age and `ahead` are counted in sample
     periods of the runs learned from; steps are measured. Limits as those of `limit`, learned on the predicted signal.
     `order` 1 or 2. The longer the prediction, the more noise: order 1, forgetting 0.95 passes on 0.25 of white noise's
-    standard deviation 0 samples ahead, 0.30 at 10; order 2 0.32 and 0.47. A gap above 1 / (1 - forgetting) samples
-    starts it anew. Fails at bends of the normal signal, where it overshoots; brings nothing against an impact shorter
-    than its memory, 1 / (1 - forgetting) samples.
+    standard deviation 0 samples ahead, 0.30 at 10; order 2 0.32 and 0.47. A gap that leaves less than 1 % of the weight
+    (90 samples by default) starts it anew. Fails at bends of the normal signal, where it overshoots; brings nothing
+    against an impact shorter than its memory, 1 / (1 - forgetting) samples.
     """
 
     safety_factor: float = 5.5
@@ -70,9 +70,9 @@ class PredictedLimit:
             _predict(values, step / period, self.forgetting, self.order, self.ahead, result)
             return result
 
-        memory = period / (1.0 - self.forgetting)
+        # Behind a gap that leaves something of the samples before it they still count: it starts anew behind a longer.
         start_up = period * np.log(_SETTLED) / np.log(self.forgetting)
-        return filtered(signal, predict, memory, start_up, signal.unit)
+        return filtered(signal, predict, start_up, start_up, signal.unit)
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, int64, float64, float64[::1])")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -9,11 +10,12 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.clock.lost import lost_samples
 from cdtool.detection import Signal, Status
 from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.autoregression import burg, forecast_spread
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.autoregression import burg, stationary_covariance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.sample_rate import at_learned_rate
 from cdtool.thresholds.signature import Signature
@@ -58,9 +60,10 @@ class Whitening:
     def innovations(self, recording: Recording, signal: Signal) -> Signal:
         """nu_k / sd(nu), in standard deviations, causal; NO_LIMIT where the signature knows none.
 
-        A missing sample is forecast, and the sample behind it divided by the forecast's larger spread; a gap above 20
-        periods starts the model anew, with as many START_UP samples as its order. OTHER_RATE where the log is sampled
-        at another rate than the runs so far: learn from runs of the same rate.
+        Samples that rest on a lost input or a lost position are missing (GAP). Behind a missing sample the model starts
+        from the normal spread: the first innovation is the deviation over that, the next as many as the order count
+        with what is known by then, all VALID. At a start the order's number of samples is START_UP. OTHER_RATE where
+        the log is sampled at another rate than the runs so far: learn from runs of the same rate.
         """
         at_rate = at_learned_rate(signal.time, self.period)
         deviation = _deviation(self.signature, recording, signal)
@@ -77,16 +80,18 @@ class Whitening:
 
     def _column(self, deviation: Signal, j: int, order: int) -> Signal:
         coefficients = np.ascontiguousarray(self.coefficients[:, j])
-        spread = self.spread[j] * forecast_spread(coefficients, LONGEST_GAP + 1)
+        # Where nothing is known, e varies as the signature says: at least by 1.
+        stationary = stationary_covariance(coefficients, least=1.0 / self.spread[j] ** 2)
+        work = np.empty((2 * order, order))
 
         def whiten(values: FloatArray, step: FloatArray) -> FloatArray:
-            slots = np.where(np.isinf(step), 0.0, np.clip(np.rint(step / self.period), 1.0, LONGEST_GAP + 1.0))
+            slots = np.where(np.isinf(step), 0.0, np.clip(np.rint(step / self.period), 1.0, LONGEST_GAP + 2.0))
             result = np.empty(len(values))
-            _whiten(values, slots.astype(np.int64), coefficients, spread, result)
+            _whiten(values, slots.astype(np.int64), coefficients, self.spread[j], stationary, work, result)
             return result
 
         one = replace(deviation, values=deviation.values[:, [j]], status=deviation.status[:, [j]])
-        return filtered(one, whiten, self.longest_gap, (order - 0.5) * self.period, "1")
+        return filtered(one, whiten, np.inf, (order - 0.5) * self.period, "1")
 
     @property
     def longest_gap(self) -> float:
@@ -122,9 +127,26 @@ def _deviation(signature: FittedSignature, recording: Recording, signal: Signal)
     statistic, band = signature.evaluate(recording, signal)
     middle, reach = 0.5 * (band.upper + band.lower), 0.5 * (band.upper - band.lower)
     status = statistic.status.copy()
+    lost = _lost(signature, recording, signal)
+    if lost is not None:
+        status[lost & (status == Status.VALID)] = Status.GAP
     status[signature.changes_curve(recording, signal.time)] = Status.START_UP
     with np.errstate(invalid="ignore", divide="ignore"):
         return replace(statistic, values=(signal.values - middle) / reach, status=status)
+
+
+def _lost(signature: FittedSignature, recording: Recording, signal: Signal) -> BoolArray | None:
+    """Where the deviation rests on held values (n, J): an input of the detector, or the position along the stroke.
+
+    A model that foretells each sample to a small share of the normal spread tells the held value from a true one.
+    """
+    lost = signal.lost
+    if signature.alignment != "time":
+        at = lost_samples(recording, ("position",), signal.time)
+        if at is not None:
+            where = np.repeat(at[:, [signature.motion.joint]], signal.values.shape[1], axis=1)
+            lost = where if lost is None else lost | where
+    return lost
 
 
 def _unbroken(deviation: Signal, j: int, period: float) -> list[FloatArray]:
@@ -135,30 +157,68 @@ def _unbroken(deviation: Signal, j: int, period: float) -> list[FloatArray]:
     return [values[first:last] for first, last in stretch_bounds(part.step)]
 
 
-@kernel(f"void({READ_ONLY}, int64[::1], {READ_ONLY}, {READ_ONLY}, float64[::1])")
+@kernel(f"void({READ_ONLY}, int64[::1], {READ_ONLY}, float64, float64[:, ::1], float64[:, ::1], float64[::1])")
 def _whiten(
     values: FloatArray,
     slots: npt.NDArray[np.int64],
     coefficients: FloatArray,
-    spread: FloatArray,
+    spread: float,
+    stationary: FloatArray,
+    work: FloatArray,
     result: FloatArray,
 ) -> None:
-    """`slots`: periods since the sample before, 0 at a start. In the past a forecast stands for a missing sample."""
+    """`slots`: periods since the sample before, 0 at a start. `work` (2 p, p) is overwritten.
+
+    The last p values of e are the state of a Kalman filter; where all of them were samples it is known exactly. Behind
+    a lost sample it is not: the detector has missed it too, and does not go on as the model says. It starts from the
+    normal spread, `stationary` (p, p), and each sample corrects it: after p in succession all of it is known again.
+    Covariances are in units of the variance of nu; that of the innovation is P[0, 0].
+    """
     order = len(coefficients)
     past = np.zeros(order)
+    covariance, moved = work[:order], work[order:]
+    observed = order
     for k in range(len(values)):
         if slots[k] == 0:
             past[:] = 0.0
+            observed = order
+        elif slots[k] > 1:
+            past[:] = 0.0
+            covariance[:] = stationary
+            observed = 0
         forecast = 0.0
-        for slot in range(max(slots[k], 1)):
-            if slot > 0:
-                for i in range(order - 1, 0, -1):
-                    past[i] = past[i - 1]
-                past[0] = forecast
-            forecast = 0.0
+        for i in range(order):
+            forecast += coefficients[i] * past[i]
+        if 0 < observed < order:
+            # P <- F P F' + Q. F shifts the state by one and puts the forecast on top: first from the left.
+            for j in range(order):
+                top = 0.0
+                for i in range(order):
+                    top += coefficients[i] * covariance[i, j]
+                moved[0, j] = top
+                for i in range(1, order):
+                    moved[i, j] = covariance[i - 1, j]
             for i in range(order):
-                forecast += coefficients[i] * past[i]
-        result[k] = (values[k] - forecast) / spread[max(slots[k], 1) - 1]
+                top = 0.0
+                for j in range(order):
+                    top += coefficients[j] * moved[i, j]
+                covariance[i, 0] = top
+                for j in range(1, order):
+                    covariance[i, j] = moved[i, j - 1]
+            covariance[0, 0] += 1.0
+        fault = values[k] - forecast
         for i in range(order - 1, 0, -1):
             past[i] = past[i - 1]
+        if observed >= order:
+            result[k] = fault / spread
+        else:
+            variance = covariance[0, 0]
+            result[k] = fault / (spread * math.sqrt(variance))
+            for i in range(1, order):
+                past[i] += covariance[i, 0] / variance * fault
+            for i in range(order - 1, -1, -1):
+                gain = covariance[i, 0] / variance
+                for j in range(order - 1, -1, -1):
+                    covariance[i, j] -= gain * covariance[0, j]
+            observed += 1
         past[0] = values[k]

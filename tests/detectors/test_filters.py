@@ -9,7 +9,7 @@ from scipy.signal import bilinear, butter, lfilter, lfilter_zi
 from cdtool.detection import Status
 from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.direct import Direct
-from cdtool.detectors.filters import low_pass, polynomial_rates, settling_time, started_at
+from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.recording import FloatArray, Recording, Series
 from tests.conftest import machine_of
 
@@ -62,7 +62,7 @@ def test_a_missing_sample_makes_the_next_step_longer_and_a_long_gap_starts_it_an
     values = np.sin(2.0 * TIME)[:, np.newaxis]
     lone, gap = NONE.copy(), NONE.copy()
     lone[1000:1010] = True
-    gap[1000 : 1000 + round(settling_time(5.0) * 1e3) + 1] = True
+    gap[1000 : 1000 + round(longest_gap(5.0) * 1e3) + 1] = True
     full, _ = low_pass(TIME, values, NONE, 5.0)
     short, rate = low_pass(TIME, np.where(lone, np.nan, values), lone, 5.0)
     assert (short[1000:1010] == short[999]).all() and (rate[1000:1010] == rate[999]).all()
@@ -70,9 +70,9 @@ def test_a_missing_sample_makes_the_next_step_longer_and_a_long_gap_starts_it_an
     anew, rate = low_pass(TIME, np.where(gap, np.nan, values), gap, 5.0)
     first = int(np.flatnonzero(gap)[-1]) + 1
     assert anew[first] == values[first] and rate[first] == 0.0
-    since = started_at(TIME, gap, settling_time(5.0))
+    since = started_at(TIME, gap, longest_gap(5.0))
     assert since[first - 1, 0] == TIME[0] and since[first, 0] == TIME[first]
-    assert started_at(TIME, lone, settling_time(5.0))[-1, 0] == TIME[0]
+    assert started_at(TIME, lone, longest_gap(5.0))[-1, 0] == TIME[0]
 
 
 def test_it_has_settled_to_five_percent_after_its_settling_time():

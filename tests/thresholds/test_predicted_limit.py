@@ -69,12 +69,21 @@ def test_a_line_over_a_short_gap_is_foretold_as_without_the_gap():
 def test_a_gap_longer_than_the_memory_starts_it_anew():
     holed = signal(np.where(TIME < 2.0, 0.0, 50.0))
     status = holed.status.copy()
-    status[2000:2021] = Status.GAP
-    statistic = PredictedLimit().statistic(replace(holed, status=status), 1e-3)
     start_up = int(np.ceil(np.log(0.01) / np.log(0.95)))
-    assert (statistic.status[2021 : 2021 + start_up] == Status.START_UP).all()
-    assert statistic.valid[2021 + start_up :].all()
-    np.testing.assert_allclose(statistic.values[2021:, 0], 50.0, atol=1e-6)
+    status[2000 : 2000 + start_up] = Status.GAP
+    statistic = PredictedLimit().statistic(replace(holed, status=status), 1e-3)
+    back = 2000 + start_up
+    assert (statistic.status[back : back + start_up] == Status.START_UP).all()
+    assert statistic.valid[back + start_up :].all()
+    np.testing.assert_allclose(statistic.values[back:, 0], 50.0, atol=1e-6)
+
+
+def test_behind_a_gap_within_the_memory_it_is_judged_at_once():
+    holed = signal(np.where(TIME < 2.0, 0.0, 50.0))
+    status = holed.status.copy()
+    status[2000:2050] = Status.GAP
+    statistic = PredictedLimit().statistic(replace(holed, status=status), 1e-3)
+    assert statistic.valid[2050:].all() and statistic.values[2050, 0] > 40.0
 
 
 def test_it_stays_exact_over_a_hundred_thousand_samples():

@@ -1,0 +1,71 @@
+"""Lost samples put into a log, seeded: lost rows, repeated stamps, and NaN in one channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.clock import clean_time
+from cdtool.recording import MEASURED, Recording, Series
+
+LONGEST = 50
+KINDS = ("lost rows", "repeated stamps", "NaN", "lost samples")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """`count` samples lost from `start` [s] on: rows of the log, stamps that repeat, NaN or samples of `channel`."""
+
+    kind: str
+    start: float
+    count: int
+    channel: str = ""
+
+
+def random_faults(recording: Recording, number: int, rng: np.random.Generator, longest: int = LONGEST) -> list[Fault]:
+    """`number` faults of random kind, channel, time and length: 1 to `longest` samples, half of them below 7."""
+    faults = []
+    measured = [name for name in MEASURED if name in recording]
+    for _ in range(number):
+        kind = str(rng.choice(KINDS))
+        count = min(int(longest ** rng.uniform(0.0, 1.0) + 0.5), longest)
+        start = float(rng.uniform(recording.start, recording.end))
+        faults.append(Fault(kind, start, count, str(rng.choice(measured)) if kind in KINDS[2:] else ""))
+    return faults
+
+
+def damaged(recording: Recording, faults: Sequence[Fault]) -> Recording:
+    """The recording with all these faults; ground truth is left whole."""
+    channels: dict[str, Series] = dict(recording.channels)
+    for fault in faults:
+        channels = {name: _spoilt(series, fault) if _hit(name, fault) else series for name, series in channels.items()}
+    return replace(recording, channels=channels)
+
+
+def without(recording: Recording, prefix: str) -> Recording:
+    """The recording without the channels whose names begin with `prefix`."""
+    kept: Mapping[str, Series] = {n: s for n, s in recording.channels.items() if not n.startswith(prefix)}
+    return replace(recording, channels=kept)
+
+
+def _hit(channel: str, fault: Fault) -> bool:
+    return channel == fault.channel if fault.channel else channel not in ("force", "label")
+
+
+def _spoilt(series: Series, fault: Fault) -> Series:
+    first = int(np.searchsorted(series.time, fault.start))
+    lost = slice(first, first + fault.count)
+    if fault.kind == "NaN":
+        values = series.values.copy()
+        values[lost] = np.nan
+        return replace(series, values=values)
+    if fault.kind == "repeated stamps":
+        stamps = series.time.copy()
+        stamps[lost] = stamps[max(first - 1, 0)]
+        clean = clean_time(stamps)
+        return replace(series, time=clean.time, values=series.values[clean.keep])
+    keep = np.ones(len(series), dtype=bool)
+    keep[lost] = False
+    return replace(series, time=series.time[keep], values=series.values[keep])
