@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import json
 import math
-import zlib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.errors import RecordingError
 from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
 from cdtool.recording import Contact, FloatArray
@@ -52,8 +51,9 @@ def _digest(text: str) -> str:
 
 def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
     """The traces of a file; raises RecordingError where it is none, or belongs to other `results` (the file's text)."""
+    content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
-        values = json.loads(gzip.decompress(path.read_bytes()))
+        values = unpack_json(content)
         if values["schema_version"] != SCHEMA_VERSION:
             raise RecordingError(
                 f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
@@ -62,7 +62,9 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
         if results is not None and values["results_sha256"] != _digest(results):
             raise RecordingError(f"{path}: belongs to other results", "put the two files of one benchmark together")
         return tuple(_trace(item) for item in values["traces"])
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zlib.error) as fault:
+    except ContentError as fault:
+        raise RecordingError(f"{path}: damaged, or no file of traces: {fault}", "run cdtool benchmark again") from fault
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError) as fault:
         raise RecordingError(f"{path}: damaged, or no file of traces", "run cdtool benchmark again") from fault
 
 
