@@ -18,7 +18,7 @@ _LOWER_BOUND = re.compile(r">=\s*(?P<version>[0-9][0-9A-Za-z.]*)")
 
 
 def lowest_versions(project: dict, extras: Sequence[str] = ()) -> Iterator[str]:
-    """The pins of a [project] table and of some of its extras; raises ValueError for a dependency without a lower bound."""
+    """The pins of a [project] table and of some of its extras; raises ValueError where a lower bound is missing."""
     for text in project["dependencies"]:
         yield _pin(text)
     for extra in extras:

@@ -80,12 +80,13 @@ def read_bytes(
     except OSError as fault:
         reason = "is a folder" if fault.errno == errno.EISDIR else f"cannot be read: {fault.strerror}"
         raise error(f"{path}: {reason}", hint) from fault
-    with os.fdopen(handle, "rb") as file:
-        state = os.fstat(file.fileno())
+    state = os.fstat(handle)
+    if not stat.S_ISREG(state.st_mode):
+        os.close(handle)
         if stat.S_ISDIR(state.st_mode):
             raise error(f"{path}: is a folder", "name a file in it")
-        if not stat.S_ISREG(state.st_mode):
-            raise error(f"{path}: is not a regular file", "save the stream to a file first")
+        raise error(f"{path}: is not a regular file", "save the stream to a file first")
+    with os.fdopen(handle, "rb") as file:
         if state.st_size > most:
             raise error(
                 f"{path}: has {state.st_size / MIB:.0f} MiB, at most {most / MIB:.0f} are read", "is it the right file?"
@@ -121,7 +122,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ContentError(f"{fault}") from fault
     for key, number in _integers(values, ""):
         if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
-            raise ContentError(f"{key} is a whole number of {_digit_count(number)} digits: beyond 64 bits")
+            raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: beyond 64 bits")
     return values
 
 
@@ -223,10 +224,6 @@ def _integers(value: Any, key: str) -> Iterator[tuple[str, int]]:
             yield from _integers(item, f"{key}[{i}]")
     elif isinstance(value, int):
         yield key, value
-
-
-def _digit_count(number: int) -> int:
-    return math.floor(abs(number).bit_length() * math.log10(2.0)) + 1
 
 
 def _memory(content: bytes) -> int:

@@ -1,7 +1,7 @@
-"""Standard output and error as cdtool writes them: a reader that has gone, a full disk or a narrow encoding stops nothing.
+"""Standard output and error: a reader that has gone, a full disk or a narrow encoding raises nothing.
 
-A pager or `head` may close the pipe before a command ends: the rest is dropped, the command goes on, and its exit status
-is its own. Characters that the terminal's encoding does not have are replaced by "?".
+A pager or `head` may close the pipe before a command ends: the rest is dropped, the command goes on, and its exit
+status is its own. Characters that the terminal's encoding does not have are replaced by "?".
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import errno
 import io
 import os
 import sys
+from pathlib import Path
 from typing import TextIO
 
 _STANDARD_INPUT_OUTPUT_ERROR = range(3)
@@ -38,7 +39,7 @@ class _Stream(io.TextIOWrapper):
 
 
 def open_standard_streams() -> None:
-    """Make standard output and error such that printing to them raises nothing; call it once, before anything is printed.
+    """Make standard output and error such that printing to them raises nothing; call it before anything is printed.
 
     Streams that are no longer the process's own, as under a test runner, are left as they are.
     """
@@ -62,7 +63,7 @@ def lost_output() -> OSError | None:
 
 def _opened(stream: TextIO | None, descriptor: int) -> TextIO:
     if stream is None:  # it was closed when Python started
-        return open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115: for the life of the process
+        return Path(os.devnull).open("w", encoding="utf-8")
     if type(stream) is not io.TextIOWrapper or stream.fileno() != descriptor:
         return stream
     if os.name != "posix":  # a Windows console has a writer of its own

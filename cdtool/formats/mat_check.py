@@ -49,7 +49,7 @@ def check_whole(path: Path) -> None:
 
 
 def _refuse_bomb(path: Path, content: bytes, order: str) -> None:
-    """Refuse a file whose elements, or the numbers of its arrays, need far more memory than it, before any is unpacked."""
+    """Refuse a file whose elements, or the numbers of its arrays, need far more memory than it, before unpacking it."""
     at, unpacked, numbers = _HEADER, 0, 0
     with suppress(ValueError, struct.error, zlib.error):  # damage is reported with its byte later
         while at < len(content):
@@ -72,7 +72,8 @@ def _array_size(element: bytes, order: str) -> int:
     if struct.unpack_from(f"{order}I", element, 8)[0] & 0xFF not in _NUMERIC_CLASSES:
         return 0
     size = struct.unpack_from(f"{order}I", element, 20)[0]
-    return abs(math.prod(struct.unpack_from(f"{order}{min(size, _HEAD) // 4}i", element, 24)))
+    dimensions: tuple[int, ...] = struct.unpack_from(f"{order}{min(size, _HEAD) // 4}i", element, 24)
+    return abs(math.prod(dimensions))
 
 
 def _tag(content: bytes, at: int, order: str) -> tuple[int, int, int]:

@@ -26,10 +26,15 @@ def check_urdf(path: Path, joints: Sequence[str], locked: Mapping[str, float]) -
 def _parse(path: Path) -> ElementTree.Element:
     content = read_bytes(path, ConfigurationError, hint="a URDF file is needed", missing="check the path of the URDF")
     # Of each element, attribute and level a parser makes far more than the few bytes that they take here.
-    if content.count(b"<") > _MOST_TAGS or content.count(b"=") > _MOST_ATTRIBUTES or b"<!DOCTYPE" in content:
+    if (
+        content.count(b"<") > _MOST_TAGS
+        or content.count(b"=") > _MOST_ATTRIBUTES
+        or b"<!DOCTYPE" in content
+        or b"\0" in content
+    ):
         raise ConfigurationError(
-            f"{path}: has more than {_MOST_TAGS} tags or {_MOST_ATTRIBUTES} attributes, or a DOCTYPE: refused",
-            "a URDF file is needed",
+            f"{path}: has more than {_MOST_TAGS} tags or {_MOST_ATTRIBUTES} attributes, or a DOCTYPE or NUL: refused",
+            "a URDF file in UTF-8 is needed",
         )
     try:
         root = ElementTree.fromstring(content)
