@@ -1,6 +1,6 @@
 """Hostile files and options to every command: tracebacks, undocumented exit statuses, long lines, hangs and crashes.
 
-Each attempt mutates one input file (its values or its bytes) or sets one option to a hostile value, and runs the command.
+Each attempt mutates one input file (its values or its bytes) or sets one option to a hostile value, and runs it.
 Attempts are run in a process that is watched: what ends it, or takes longer than --seconds, is counted too. Ends with
 status 1 where there is any. tests/fuzz/test_hostile_commands.py holds a short run of it.
 
