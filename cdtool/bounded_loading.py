@@ -7,7 +7,6 @@ step. No bound is reached by a file that cdtool or a person writes; a hostile on
 
 from __future__ import annotations
 
-import errno
 import json
 import math
 import os
@@ -78,13 +77,12 @@ def read_bytes(
     except ValueError as fault:  # a NUL, which no file's name can hold
         raise error(f"{str(path)!r}: is no name of a file", hint) from fault
     except OSError as fault:
-        reason = "is a folder" if fault.errno == errno.EISDIR else f"cannot be read: {fault.strerror}"
-        raise error(f"{path}: {reason}", hint) from fault
+        raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
     state = os.fstat(handle)
     if not stat.S_ISREG(state.st_mode):
         os.close(handle)
         if stat.S_ISDIR(state.st_mode):
-            raise error(f"{path}: is a folder", "name a file in it")
+            raise error(f"{path}: cannot be read: is a folder", "name a file in it")
         raise error(f"{path}: is not a regular file", "save the stream to a file first")
     with os.fdopen(handle, "rb") as file:
         if state.st_size > most:
@@ -144,7 +142,7 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
     try:
         return json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer)
     except json.JSONDecodeError as fault:
-        raise ContentError(f"cut off or damaged at line {fault.lineno}, column {fault.colno}") from fault
+        raise ContentError(f"cut off or damaged at line {fault.lineno}") from fault
     except RecursionError as fault:
         raise ContentError("nested too deeply") from fault
 
