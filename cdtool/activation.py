@@ -20,6 +20,7 @@ from cdtool.recording import BoolArray, FloatArray
 DEBOUNCE_TIME = 9e-3
 # Samples that are looked at first for when an alarm is armed again.
 _LOOKED_AT = 4096
+_MOST_DEBOUNCE = 1_000_000_000
 
 
 class ActivationSettings(TypedDict, total=False):
@@ -47,8 +48,8 @@ class Activation:
     latch: bool = False
 
     def __post_init__(self) -> None:
-        if self.debounce is not None and self.debounce < 1:
-            raise UsageError(f"debounce is {self.debounce}", "a whole number of samples, at least 1")
+        if self.debounce is not None and not 1 <= self.debounce <= _MOST_DEBOUNCE:
+            raise UsageError(f"debounce is {self.debounce}", f"a whole number of samples, from 1 to {_MOST_DEBOUNCE}")
         if not 0.0 <= self.rearm < math.inf:
             raise UsageError(f"rearm is {self.rearm:g}", "seconds, at least 0; latch: an alarm is never armed again")
         if not 0.0 <= self.hysteresis < 1.0:

@@ -8,6 +8,8 @@ from decimal import Decimal
 
 # Control, format (direction marks), surrogate and private characters, line and paragraph separators.
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
+# What is printed about one fault, warning or note, with all that comes from files [characters].
+LINE_LENGTH = 300
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
 
@@ -17,6 +19,11 @@ def plain(text: object) -> str:
     if given.isprintable():  # nothing in it is active: the common case, and much faster
         return given
     return "".join("?" if _is_active(character) else character for character in given)
+
+
+def one_line(text: object, length: int = LINE_LENGTH) -> str:
+    """Plain text on one line of at most `length` characters; an ellipsis marks where it was cut."""
+    return shorten(plain(text), length)
 
 
 def shorten(text: str, length: int) -> str:

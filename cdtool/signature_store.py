@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.activation import Activation
+from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.dynamics import Gain
 from cdtool.errors import SignatureError, UsageError
 from cdtool.operations import HOW_TO_CUT
@@ -64,11 +65,10 @@ def check_name(file: Path) -> None:
 def read_signature(path: str | Path) -> SignatureFile:
     """Read and check a signature file; raises SignatureError."""
     file = Path(path)
+    content = read_bytes(file, SignatureError, most=MOST_JSON, hint="make one with cdtool learn-signature")
     try:
-        values = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse)
-    except FileNotFoundError:
-        raise SignatureError(f"{file}: no such file", "make it with cdtool learn-signature") from None
-    except (OSError, ValueError, RecursionError) as fault:
+        values = parse_json(content)
+    except ContentError as fault:
         raise SignatureError(
             f"{file}: not a signature file: {fault}", "make one with cdtool learn-signature"
         ) from fault
@@ -176,10 +176,6 @@ def _activation(values: Mapping[str, Any]) -> Activation:
     if isinstance(debounce, bool) or not isinstance(debounce, int | None) or not isinstance(latch, bool):
         raise ValueError(f"activation {dict(values)}")
     return Activation(debounce, float(values["rearm"]), float(values["hysteresis"]), latch)
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no number of JSON")
 
 
 def _gain(value: Any) -> Gain:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cdtool.bounded_loading import MOST_TOML, ContentError, parse_toml, read_text
 from cdtool.errors import ConfigurationError, nearest
 
 
@@ -138,14 +138,10 @@ class Table:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file; raises ConfigurationError with the file and the line."""
+    text = read_text(path, ConfigurationError, most=MOST_TOML)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigurationError(f"{path}: no such file", "check the path") from None
-    except (OSError, UnicodeDecodeError) as fault:
-        why = "no UTF-8 text" if isinstance(fault, UnicodeDecodeError) else fault.strerror
-        raise ConfigurationError(f"{path}: cannot be read: {why}", "a UTF-8 text file is needed") from fault
-    except tomllib.TOMLDecodeError as fault:
+        return parse_toml(text)
+    except ContentError as fault:
         raise ConfigurationError(
             f"{path}: not valid TOML: {fault}", "texts in quotes, decimals with a point"
         ) from fault

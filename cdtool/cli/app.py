@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import logging
 import sys
 import traceback
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -27,9 +26,11 @@ from cdtool.cli.report import report
 from cdtool.cli.score import score
 from cdtool.cli.signature import signature
 from cdtool.cli.simulate import simulate
+from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.cli.study import study
-from cdtool.errors import CdtoolError
+from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
+from cdtool.plain_text import one_line
 
 app = typer.Typer(
     name="cdtool",
@@ -86,31 +87,43 @@ def _options(
 
 
 def _show_note(message: Warning | str, *_: object, **__: object) -> None:
-    typer.echo(f"note: {message}", err=True)
+    typer.echo(one_line(f"note: {message}"), err=True)
+
+
+# What click raises for a wrong option or argument; typer brings a click of its own, or the one that is installed.
+_CLICK_ERROR = typer.BadParameter.__mro__[2]
+
+
+def _print_usage_error(fault: Any) -> None:
+    from cdtool.cli.console import print_error
+
+    if type(fault).__name__ == "NoArgsIsHelpError":  # making it has printed the help
+        return
+    command = fault.ctx.command_path if getattr(fault, "ctx", None) else "cdtool"
+    message = " ".join(fault.format_message().split()).rstrip(".")
+    print_error(UsageError(message, f"see {command} --help"))
 
 
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
+    open_standard_streams()
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
     try:
-        app()
+        status = app(standalone_mode=False)
+        if fault := lost_output():
+            raise CdtoolError(f"standard output: {fault.strerror}", "what was printed is incomplete: check the space")
+        sys.exit(status if isinstance(status, int) else ExitStatus.OK)
     except CdtoolError as fault:
         from cdtool.cli.console import print_error
 
         print_error(fault)
         sys.exit(status_of([Fact.WRONG_USAGE]))
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output (a pager, head) has gone: nothing to tell
-        sys.exit(status_of([]))
     except SystemExit as end:
         if end.code == ExitStatus.INTERRUPTED:
             typer.echo("interrupted", err=True)
-        # click ends with 1 where the reader has gone; here 1 means a violated limit.
-        if isinstance(end.__context__, OSError) and end.__context__.errno == errno.EPIPE:
-            sys.exit(status_of([]))
         raise
     except OSError as fault:
         from cdtool.cli.console import print_error
@@ -118,10 +131,18 @@ def main() -> None:
         where = f"{fault.filename}: " if fault.filename else ""
         print_error(CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space"))
         sys.exit(status_of([Fact.NOTHING_USABLE]))
-    except KeyboardInterrupt:
+    except MemoryError:
+        from cdtool.cli.console import print_error
+
+        print_error(CdtoolError("not enough memory", "fewer or shorter logs, a smaller --jobs, or more memory"))
+        sys.exit(status_of([Fact.NOTHING_USABLE]))
+    except (KeyboardInterrupt, typer.Abort):
         typer.echo("interrupted", err=True)
         sys.exit(status_of([Fact.INTERRUPTED]))
-    except Exception:
+    except Exception as fault:
+        if isinstance(fault, _CLICK_ERROR):
+            _print_usage_error(fault)
+            sys.exit(status_of([Fact.WRONG_USAGE]))
         # Python would end with 1, which means a violated limit to a pipeline.
         traceback.print_exc()
         sys.exit(status_of([Fact.INTERNAL_ERROR]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 import sys
@@ -16,6 +17,7 @@ from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact, status_of
+from cdtool.plain_text import LINE_LENGTH, one_line, shorten
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
@@ -27,18 +29,27 @@ if TYPE_CHECKING:
     from cdtool.workflows.runs import Progress
 
 _SHOWN = 10
+_ERROR, _SHORTEST_HINT = "error: ", 140
 _NARROWEST, _WIDEST = 60, 100
 
 
 def print_error(fault: CdtoolError) -> None:
-    """One line: what is wrong, then the next step."""
-    hint = f" ({plain(fault.hint)})" if fault.hint else ""
-    typer.echo(f"error: {plain(fault.message)}{hint}", err=True)
+    """One line of at most 300 characters: what is wrong, then the next step."""
+    message, hint = plain(fault.message), plain(fault.hint)
+    room = LINE_LENGTH - len(_ERROR) - len(" ()")
+    hint = shorten(hint, max(_SHORTEST_HINT, room - len(message)))
+    message = shorten(message, room - len(hint))
+    typer.echo(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
 
 
 def print_json(value: Any) -> None:
-    """Strict JSON on stdout; NaN and infinity are null."""
-    typer.echo(strict_json(value))
+    """Strict JSON on stdout; NaN and infinity are null; characters that its encoding does not have are escaped."""
+    text = strict_json(value)
+    try:
+        text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(json.loads(text), indent=1)
+    typer.echo(text)
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
@@ -48,7 +59,7 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), 
         items = alike([Skipped(item.recording, _without_name(item)) for item in every])
         for item in items[:_SHOWN]:
             reason = item.reason.removeprefix("damaged, ")
-            typer.echo(f"{word}: {plain(item.recording)}: {plain(reason)}", err=True)
+            typer.echo(one_line(f"{word}: {item.recording}: {reason}"), err=True)
         if len(items) > _SHOWN:
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 

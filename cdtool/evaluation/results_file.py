@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
 from cdtool.evaluation.results_schema import WORDS
@@ -31,20 +32,10 @@ def to_json(results: Results) -> str:
 
 def read_results(path: Path) -> Results:
     """Read results.json; raises RecordingError where it is none, or of another version."""
+    content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
-        values = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
-    except FileNotFoundError:
-        raise RecordingError(f"{path}: no such file", "check the path") from None
-    except OSError as fault:
-        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the path") from fault
-    except UnicodeDecodeError as fault:
-        raise _no_results(path, "no UTF-8 text") from fault
-    except json.JSONDecodeError as fault:
-        why = f"cut off or damaged at line {fault.lineno}" if fault.doc.strip() else "it is empty"
-        raise _no_results(path, why) from fault
-    except RecursionError as fault:
-        raise _no_results(path, "nested too deeply") from fault
-    except ValueError as fault:
+        values = parse_json(content)
+    except ContentError as fault:
         raise _no_results(path, str(fault)) from fault
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "no schema_version in it")
@@ -152,7 +143,3 @@ def _required(kind: Any) -> tuple[str, ...]:
 
 def _no_results(path: Path, why: str) -> RecordingError:
     return RecordingError(f"{path}: not a results file: {why}", "write one with cdtool benchmark -o results.json")
-
-
-def _refuse(name: str) -> float:
-    raise ValueError(f"{name} is no JSON")

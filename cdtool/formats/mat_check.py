@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 from cdtool.errors import RecordingError
+from cdtool.formats.container_checks import check_size
 
 MAGIC = b"MATLAB 5.0 MAT-file"
 _HEADER = 128
+# Flags and dimensions of an array lie within its first bytes: MATLAB has at most 32 dimensions.
+_HEAD = 256
 _MATRIX, _COMPRESSED = 14, 15
 _NUMBER_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
 _NUMERIC_CLASSES = range(6, 16)
@@ -27,6 +31,7 @@ def check_whole(path: Path) -> None:
     if not content.startswith(MAGIC) or len(content) < _HEADER:
         raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with: save(name, ..., '-v7')")
     order = ">" if content[126:128] == b"MI" else "<"
+    _refuse_bomb(path, content, order)
     at = _HEADER
     while at < len(content):
         try:
@@ -41,6 +46,34 @@ def check_whole(path: Path) -> None:
                 f"{path}: damaged at byte {at}: {fault}", "copy the file anew or save it again"
             ) from fault
         at = start + size
+
+
+def _refuse_bomb(path: Path, content: bytes, order: str) -> None:
+    """Refuse a file whose elements, or the numbers of its arrays, need far more memory than it, before unpacking it."""
+    at, unpacked, numbers = _HEADER, 0, 0
+    with suppress(ValueError, struct.error, zlib.error):  # damage is reported with its byte later
+        while at < len(content):
+            kind, start, size = _tag(content, at, order)
+            element = content[start : start + min(size, _HEAD)]
+            if kind == _COMPRESSED:
+                element = zlib.decompressobj().decompress(content[start : start + size], _HEAD)
+                kind, claimed = struct.unpack_from(f"{order}II", element)
+                unpacked += claimed
+                element = element[8:]
+            if kind == _MATRIX:
+                with suppress(ValueError, struct.error):
+                    numbers += _array_size(element, order)
+            check_size(path, max(unpacked // 8, numbers))
+            at = start + size
+
+
+def _array_size(element: bytes, order: str) -> int:
+    """How many numbers an array has by the dimensions in its first bytes; 0 where it holds none."""
+    if struct.unpack_from(f"{order}I", element, 8)[0] & 0xFF not in _NUMERIC_CLASSES:
+        return 0
+    size = struct.unpack_from(f"{order}I", element, 20)[0]
+    dimensions: tuple[int, ...] = struct.unpack_from(f"{order}{min(size, _HEAD) // 4}i", element, 24)
+    return abs(math.prod(dimensions))
 
 
 def _tag(content: bytes, at: int, order: str) -> tuple[int, int, int]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.bounded_loading import read_bytes
 from cdtool.errors import RecordingError
 from cdtool.formats.part_gaps import PartSpan, gaps_between
 from cdtool.formats.source import Column, Source
@@ -181,9 +182,10 @@ def _named_parts(metadata: Path) -> list[str]:
     The first versions of rosbag2 wrote the bag's folder before each name.
     """
     try:
-        lines = metadata.read_text(encoding="utf-8", errors="replace").splitlines() if metadata.is_file() else []
-    except OSError:  # what it says is no more than a check
+        content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
+    except RecordingError:  # what it says is no more than a check
         return []
+    lines = content.decode("utf-8", "replace").splitlines()
     for i, line in enumerate(lines):
         key, colon, rest = line.partition(":")
         if key.strip() == "relative_file_paths" and colon:

@@ -7,9 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
+from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, nearest
 
 _MOVING = ("revolute", "continuous", "prismatic")
+_MOST_TAGS, _MOST_ATTRIBUTES = 100_000, 200_000
+# A chain of links is walked by recursion in the library that reads it.
+_MOST_JOINTS = 1000
+# How many numbers an attribute has; of those that are not named here, one.
+_COUNTS = {"xyz": 3, "rpy": 3, "rgba": 4, "size": 3, "scale": 3}
 
 
 def check_urdf(path: Path, joints: Sequence[str], locked: Mapping[str, float]) -> None:
@@ -18,12 +24,20 @@ def check_urdf(path: Path, joints: Sequence[str], locked: Mapping[str, float]) -
 
 
 def _parse(path: Path) -> ElementTree.Element:
+    content = read_bytes(path, ConfigurationError, hint="a URDF file is needed", missing="check the path of the URDF")
+    # Of each element, attribute and level a parser makes far more than the few bytes that they take here.
+    if (
+        content.count(b"<") > _MOST_TAGS
+        or content.count(b"=") > _MOST_ATTRIBUTES
+        or b"<!DOCTYPE" in content
+        or b"\0" in content
+    ):
+        raise ConfigurationError(
+            f"{path}: has more than {_MOST_TAGS} tags or {_MOST_ATTRIBUTES} attributes, or a DOCTYPE or NUL: refused",
+            "a URDF file in UTF-8 is needed",
+        )
     try:
-        root = ElementTree.fromstring(path.read_bytes())
-    except FileNotFoundError:
-        raise ConfigurationError(f"{path}: no such file", "check the path of the URDF") from None
-    except OSError as fault:
-        raise ConfigurationError(f"{path}: cannot be read: {fault}", "a URDF file is needed") from fault
+        root = ElementTree.fromstring(content)
     except ElementTree.ParseError as fault:
         line, column = fault.position
         raise ConfigurationError(
@@ -46,7 +60,10 @@ def _movable(path: Path, root: ElementTree.Element) -> dict[str, str]:
         if mass is not None and float(mass.get("value", "0")) < 0.0:
             raise ConfigurationError(f"{who}: mass {mass.get('value')} kg is negative", "masses are 0 or more")
     types: dict[str, str] = {}
-    for joint in root.findall("joint"):
+    joints = root.findall("joint")
+    if len(joints) > _MOST_JOINTS:
+        raise ConfigurationError(f"{path}: has {len(joints)} joints", f"at most {_MOST_JOINTS} are read")
+    for joint in joints:
         name, kind = joint.get("name", ""), joint.get("type", "")
         who = f"{path}: joint '{name}'"
         if kind not in (*_MOVING, "fixed"):
@@ -66,13 +83,14 @@ def _movable(path: Path, root: ElementTree.Element) -> dict[str, str]:
 def _numbers(who: str, item: ElementTree.Element) -> None:
     for key, text in item.attrib.items():
         try:
-            finite = all(math.isfinite(float(part)) for part in text.split())
+            numbers = [float(part) for part in text.split()]
         except ValueError:
-            finite = False
-        if not finite:
+            numbers = []
+        count = _COUNTS.get(key, 1)
+        if len(numbers) != count or not all(map(math.isfinite, numbers)):
+            wanted = "a finite number is" if count == 1 else f"{count} finite numbers are"
             raise ConfigurationError(
-                f"{who}: <{item.tag}> {key} is '{text}'",
-                "finite numbers are needed; xacro files must be expanded first",
+                f"{who}: <{item.tag}> {key} is '{text}'", f"{wanted} needed; xacro files must be expanded first"
             )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.activation import Activation
+from cdtool.bounded_loading import read_bytes
 from cdtool.detectors import DETECTORS
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
@@ -133,7 +134,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         limits=read_limits(
             root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
         ),
-        digest=hashlib.sha256(file.read_bytes()).hexdigest(),
+        digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
     )
     force.finish()
     root.finish()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from cdtool.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.errors import ConfigurationError
 from cdtool.formats.groups import Group, Written
 from cdtool.machine_file import MachineFile
 from cdtool.recording import UNITLESS
@@ -22,7 +23,7 @@ def converted_machine(
     machine_file: MachineFile, log: Path, groups: Sequence[Group], names: Written, target: Path
 ) -> str:
     """The text of `target`: everything of the machine file but its channels, then those of the converted log."""
-    text = machine_file.path.read_text(encoding="utf-8")
+    text = read_text(machine_file.path, ConfigurationError)
     kept = _without_channels(text)
     if not _same(text, kept):  # tables written in a way that lines do not show: only the channels are given
         kept = f"# Put [machine] of {machine_file.path.name} here.\n"
@@ -68,15 +69,15 @@ def _without_channels(text: str) -> str:
 def _same(text: str, kept: str) -> bool:
     """Is what was kept valid, and all but the channels?"""
     try:
-        before, after = tomllib.loads(text), tomllib.loads(kept)
-    except tomllib.TOMLDecodeError:
+        before, after = parse_toml(text), parse_toml(kept)
+    except ContentError:
         return False
     before.pop("channels", None)
     return before == after
 
 
 def _stated_urdf(text: str) -> str:
-    machine: dict[str, Any] = tomllib.loads(text).get("machine", {})
+    machine: dict[str, Any] = parse_toml(text).get("machine", {})
     return str(machine.get("urdf", ""))
 
 

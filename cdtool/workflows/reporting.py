@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cdtool.bounded_loading import MOST_JSON, read_text
+from cdtool.errors import RecordingError
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.traces.file import read_traces, traces_path
@@ -20,4 +22,4 @@ def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]
     beside = traces_path(path)
     if not beside.exists():
         return evaluated, (), f"{beside} is missing: no figures over time"
-    return evaluated, read_traces(beside, path.read_text(encoding="utf-8")), ""
+    return evaluated, read_traces(beside, read_text(path, RecordingError, most=MOST_JSON)), ""

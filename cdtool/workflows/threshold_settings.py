@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from typing import Any
 
+from cdtool.bounded_loading import ContentError, parse_toml
 from cdtool.errors import UsageError, nearest
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
@@ -70,8 +70,8 @@ def _setting(text: str) -> tuple[str, Any]:
     if not (name and equals and value):
         raise UsageError(f"--set is '{text}'", "KEY=VALUE, as drift=0.5; docs/thresholds.md names the keys")
     try:
-        return name, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        return name, parse_toml(f"value = {value}")["value"]
+    except ContentError:
         return name, value
 
 

@@ -14,6 +14,8 @@ from numbers import Integral
 from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.interval import Interval, check_level
 
+_MOST_COUNT = 10**15
+
 
 def poisson_rate(count: int, exposure: float, level: float = 0.95) -> Interval:
     """Events per unit of exposure with the exact interval of Garwood (1936).
@@ -129,9 +131,9 @@ def poisson_difference_p(count_a: int, exposure_a: float, count_b: int, exposure
 
 
 def check_count(name: str, count: int) -> None:
-    """Raise UsageError unless `count` is a whole number from 0 on."""
-    if not isinstance(count, Integral) or count < 0:
-        raise UsageError(f"{name} is {count}", "a whole number, 0 or more")
+    """Raise UsageError unless `count` is a whole number from 0 to 10^15: beyond, float64 does not count."""
+    if not isinstance(count, Integral) or not 0 <= count <= _MOST_COUNT:
+        raise UsageError(f"{name} is {count}", "a whole number, 0 or more, at most 10^15")
 
 
 def _check_exposure(count: int, exposure: float) -> None:

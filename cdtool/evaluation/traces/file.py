@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import json
 import math
-import zlib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from cdtool.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.errors import RecordingError
+from cdtool.evaluation.results_file import build
 from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
 from cdtool.recording import Contact, FloatArray
 from cdtool.strict_json import finite, strict_json
@@ -29,6 +30,8 @@ NO_LIMIT = 1_000_000_000
 # Steps over the range of a panel; a plot has fewer pixels.
 _LEVELS = 8000
 _TIME_STEP = 1e-5
+# Beyond this from its begin [s], or beyond this value, a curve is damaged.
+_LONGEST, _LARGEST = 1e9, 1e300
 
 
 def traces_path(results: Path) -> Path:
@@ -52,8 +55,9 @@ def _digest(text: str) -> str:
 
 def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
     """The traces of a file; raises RecordingError where it is none, or belongs to other `results` (the file's text)."""
+    content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
-        values = json.loads(gzip.decompress(path.read_bytes()))
+        values = unpack_json(content)
         if values["schema_version"] != SCHEMA_VERSION:
             raise RecordingError(
                 f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
@@ -61,9 +65,35 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
             )
         if results is not None and values["results_sha256"] != _digest(results):
             raise RecordingError(f"{path}: belongs to other results", "put the two files of one benchmark together")
-        return tuple(_trace(item) for item in values["traces"])
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zlib.error) as fault:
+        return tuple(_checked(_trace(item)) for item in values["traces"])
+    except ContentError as fault:
+        raise RecordingError(f"{path}: damaged, or no file of traces: {fault}", "run cdtool benchmark again") from fault
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError) as fault:
         raise RecordingError(f"{path}: damaged, or no file of traces", "run cdtool benchmark again") from fault
+
+
+def _checked(trace: Trace) -> Trace:
+    """The trace; raises ValueError for what no figure can be drawn of."""
+    _check_curves(trace.start, trace.force_time, trace.force)
+    known = [trace.start, trace.end, *trace.view, *(time for item in trace.contacts for time in (item.start, item.end))]
+    if (not trace.contacts and trace.contact != -1) or trace.contact not in range(-1, len(trace.contacts)):
+        raise ValueError(f"contact {trace.contact} of {len(trace.contacts)}")
+    for panel in trace.panels:
+        course = panel.course
+        _check_curves(trace.start, course.time, course.value, course.lower, course.upper, course.status)
+        if len(panel.seen) != len(trace.contacts):
+            raise ValueError(f"{len(panel.seen)} outcomes of {len(trace.contacts)} contacts")
+        known += [*panel.alarms, *panel.false_alarms]
+    if not all(abs(time - trace.start) < _LONGEST for time in known) or trace.joints < 1:
+        raise ValueError("a time or number that no operation has")
+    return trace
+
+
+def _check_curves(start: float, time: FloatArray, *curves: npt.NDArray[Any]) -> None:
+    if time.ndim != 1 or any(curve.shape != time.shape for curve in curves):
+        raise ValueError("curves of different lengths")
+    if not np.all(np.abs(time - start) < _LONGEST) or np.any(np.diff(time) < 0.0):
+        raise ValueError("times that do not increase")
 
 
 def as_read(traces: Sequence[Trace]) -> tuple[Trace, ...]:
@@ -118,7 +148,7 @@ def _trace(values: dict[str, Any]) -> Trace:
         group=str(values["group"]),
         start=float(values["start"]),
         end=float(values["end"]),
-        contacts=tuple(Contact(**_numbers(item)) for item in values["contacts"]),
+        contacts=tuple(build(Contact, _numbers(item), "contact") for item in values["contacts"]),
         contact=int(values["contact"]),
         view=(float(values["view"][0]), float(values["view"][1])),
         force_time=_decoded(values["force_time"]),
@@ -138,7 +168,7 @@ def _panel(values: dict[str, Any]) -> Panel:
         course=Course(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
         verdict=str(values["verdict"]),
         reason=str(values["reason"]),
-        seen=tuple(Seen(**_numbers(item)) for item in values["seen"]),
+        seen=tuple(build(Seen, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),
@@ -168,7 +198,11 @@ def _coded(values: FloatArray, low: float, step: float) -> dict[str, Any]:
 
 def _decoded(values: dict[str, Any]) -> FloatArray:
     numbers = np.array([math.nan if n is None else n for n in values["at"]], dtype=np.float64)
-    decoded = float(values["from"]) + float(values["step"]) * numbers
+    present = np.isfinite(numbers)
+    low, step = float(values["from"]), float(values["step"])
+    if not (abs(low) < _LARGEST and 0.0 < step < _LARGEST / NO_LIMIT and np.all(np.abs(numbers[present]) <= NO_LIMIT)):
+        raise ValueError(f"a curve from {low:g} in steps of {step:g}")
+    decoded = low + step * numbers
     return np.where(np.abs(numbers) == NO_LIMIT, np.copysign(np.inf, numbers), decoded)
 
 

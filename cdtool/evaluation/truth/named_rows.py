@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, nearest
 
 
@@ -48,16 +49,13 @@ class NamedRow:
 
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
     """The rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
+    content = read_bytes(path, ConfigurationError)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         header = [name.strip() for name in next(reader, [])]
         _check_header(path, header, required, [*required, *optional])
         return [_row(path, reader.line_num, header, cells) for cells in reader if cells]
-    except FileNotFoundError:
-        raise ConfigurationError(f"{path}: no such file", "check the path") from None
-    except OSError as fault:
-        raise ConfigurationError(f"{path}: cannot be read: {fault.strerror}", "check the path") from fault
     except UnicodeDecodeError as fault:
         raise ConfigurationError(f"{path}: no {what} file: no UTF-8 text", "a UTF-8 CSV file is needed") from fault
     except csv.Error as fault:

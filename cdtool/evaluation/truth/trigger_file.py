@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.truth.named_rows import NamedRow, by_recording, read_named_rows
 
@@ -57,7 +58,7 @@ def read_triggers(path: Path) -> TriggerFile:
         _take(row, by_name.setdefault(row.recording, Triggered()))
     if not rows:
         raise ConfigurationError(f"{path}: holds no row", "write one a trigger; an empty time_s: watched, no alarm")
-    return TriggerFile(path, rows, hashlib.sha256(path.read_bytes()).hexdigest())
+    return TriggerFile(path, rows, hashlib.sha256(read_bytes(path, ConfigurationError)).hexdigest())
 
 
 def _take(row: NamedRow, said: Triggered) -> None:

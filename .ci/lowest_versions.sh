@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Installs cdtool with the lower bound of each dependency on Python 3.11, and runs the main job: --help, learn-signature,
+# detect, benchmark. Skipped, by name, where there is no Python 3.11.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+python=$(command -v python3.11 || true)
+if [ -z "$python" ] || ! "$python" --version > /dev/null 2>&1; then
+  echo "no Python 3.11: the lower bounds of the dependencies are not tried"
+  exit 0
+fi
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+"$python" -m venv "$folder/venv"
+mapfile -t pins < <("$python" .ci/lowest_versions.py)
+echo "+ pip install ${pins[*]} ."
+"$folder/venv/bin/pip" install --quiet "${pins[@]}" .
+cdtool="$folder/venv/bin/cdtool"
+gate=$PWD/sample_logs/gate
+cd "$folder" # the installed package is run, not this folder's
+"$cdtool" --help > help.txt
+"$cdtool" benchmark --help >> help.txt
+"$cdtool" learn-signature "$gate"/free/* -m "$gate/machine.toml" -d feekf --force -o gate.feekf.json > learned.txt
+"$cdtool" detect "$gate"/stiff/* -m "$gate/machine.toml" -s gate.feekf.json --plot plots > detected.txt
+"$cdtool" benchmark "$gate/benchmark.toml" -o report > benchmark.txt
+tail -n 2 benchmark.txt

@@ -1,0 +1,57 @@
+"""No command imports pandas: it is installed for what comes later, and would double the start of each command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+# Runs every command and prints, as JSON, each with its status and whether pandas has been imported by then.
+CHILD = """
+import json, sys
+from pathlib import Path
+from tests.command import cdtool
+from tests.fuzz.hostile_commands import make_bench
+folder = Path(sys.argv[1])
+make_bench(folder)
+log, machine, signature = folder / "stiff" / "01.csv", folder / "machine.toml", folder / "gate.json"
+commands = [
+    ("--help",), ("list", "detectors"), ("info", log), ("info", log, "-m", machine), ("info", folder / "log.mat"),
+    ("init", log, "-o", folder / "drafted.toml"),
+    ("learn-signature", *sorted(folder.glob("free/*.csv")), "-m", machine, "-d", "feekf", "--force",
+     "-o", folder / "feekf.json"),
+    ("detect", log, "-m", machine, "-s", signature, "--plot", folder / "a.png"),
+    ("explain", log, "-m", machine, "-s", signature, "--plot", folder / "b.svg"),
+    ("benchmark", folder / "benchmark.toml", "-o", folder / "report.md"),
+    ("report", folder / "results.json", "-o", folder / "again.html"),
+    ("score", folder / "triggers.csv", "-b", folder / "benchmark.toml"),
+    ("compare", folder / "results.json", folder / "other.json", "-o", folder / "compared.md"),
+    ("plan", "--difference-ms", "5", "--std-ms", "3"),
+    *(("convert", log, folder / f"to{suffix}") for suffix in (".csv", ".mcap", ".parquet", ".feather", ".h5", ".tdms")),
+    *(("info", folder / f"to{suffix}") for suffix in (".mcap", ".parquet", ".feather", ".h5", ".tdms")),
+    ("recover", folder / "log.mcap", folder / "recovered.mcap"),
+    ("signature", "show", signature),
+    ("signature", "check", signature, *sorted(folder.glob("free/*.csv")), "-m", machine),
+    ("signature", "update", signature, folder / "holdout" / "01.csv", "-m", machine),
+    ("simulate", "arm", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", folder / "arm"),
+    ("study", "sensors", "-m", machine),
+]
+print(json.dumps([(" ".join(map(str, item[:2])), cdtool(*item).status, "pandas" in sys.modules) for item in commands]))
+"""
+
+
+def test_no_command_imports_pandas(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(tmp_path / "bench")], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    ran = json.loads(done.stdout.splitlines()[-1])
+    assert not [name for name, _, imported in ran if imported]
+    assert {name for name, status, _ in ran if status not in (0, 1, 3)} == set()
+    from cdtool.cli.app import app
+
+    known = {item.name or item.callback.__name__ for item in app.registered_commands}
+    known |= {item.name for item in app.registered_groups}
+    assert known <= {name.split()[0] for name, _, _ in ran}  # a new command belongs into the list above

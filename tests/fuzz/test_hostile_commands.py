@@ -1,0 +1,46 @@
+"""A short run of what benchmarks/hostile_input.py tries for long: hostile files and options to every command."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.command import Outcome
+from tests.fuzz.hostile_commands import Attempt, attempts, complaint, make_bench, run
+
+COUNT, SEED = 60, 14
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hostile") / "bench"
+    make_bench(folder)
+    return folder
+
+
+def test_no_hostile_file_or_option_makes_a_traceback_or_more_than_a_line(bench):
+    complaints = []
+    for attempt in attempts(bench, SEED, COUNT):
+        if said := complaint(run(attempt, bench)):
+            complaints.append(f"{attempt.shown}: {said}")
+    assert not complaints, "\n".join(complaints)
+
+
+# Found by benchmarks/hostile_input.py.
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("plan", "--missed-at-most", "5%", "--allowed", "99999999999999999999"),
+        ("plan", "--false-alarms-at-most", "1/1000op", "--allowed", "99999999999999999999"),
+    ],
+)
+def test_options_that_were_found_once_are_one_line(bench, arguments):
+    outcome = run(Attempt(arguments), bench)
+    assert (outcome.status, complaint(outcome)) == (2, "")
+
+
+def test_the_check_sees_a_traceback_a_wrong_status_and_a_long_line():
+    assert "traceback" in complaint(Outcome(2, "", "Traceback (most recent call last):\nValueError: x\n"))
+    assert "status 120" in complaint(Outcome(120, "", ""))
+    assert "301 characters" in complaint(Outcome(2, "", f"error: {'x' * 294}\n"))
+    assert "no error line" in complaint(Outcome(2, "Usage: cdtool", ""))
+    assert not complaint(Outcome(3, "table\n", "left out: a.csv: is empty\n"))
