@@ -102,7 +102,9 @@ def explain_operation(
         for alarm in {*detection.verdict.alarms, *detecting}
     ]
     found += [
-        explain_miss(detection, item, activation, inputs, margins) for item in matching.matches if item.alarm is None
+        explain_miss(detection, item, activation, inputs, margins)
+        for item in matching.matches
+        if item.alarm is None and not item.contact.in_progress
     ]
     return tuple(sorted(found, key=_order))
 
