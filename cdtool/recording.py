@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -167,10 +168,10 @@ class Contact:
     peak_force: float = float("nan")
     found_by: str = "load cell"
     kind: str = ""
-    rest: float = float("nan")
+    rest: float = math.nan
     drift: float = 0.0
     shift: float = 0.0
-    resolution: float = float("nan")
+    resolution: float = math.nan
     in_progress: bool = False
 
 

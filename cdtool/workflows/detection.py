@@ -117,7 +117,9 @@ def detect(
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
     contacts = any_contacts(recording, rules)
-    matched = match_log(recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait)
+    matched = match_log(
+        recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait, operations
+    )
     return Detected(
         recording,
         detections,

@@ -42,8 +42,12 @@ def match_log(
     group: str,
     rules: ScoringRules,
     rearm: float,
+    cut_by: str,
 ) -> MatchedLog:
-    """Match the detections of each operation with the log's contacts; `rearm` [s] is the activation's."""
+    """Match the detections of each operation with the log's contacts.
+
+    `rearm` [s] is the activation's; `cut_by` says how the log was cut into its operations.
+    """
     inside = _by_operation(operations, contacts)
     courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
     warned = [Skipped(recording.name, str(item)) for item in truth_findings(recording, contacts, rules.onset)]
@@ -68,7 +72,7 @@ def match_log(
         tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
-        tuple(_not_scored(recording, contacts, inside)),
+        tuple(_not_scored(recording, contacts, inside, cut_by)),
         (*warned, *doubts),
     )
 
@@ -96,7 +100,7 @@ def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) 
 
 
 def _not_scored(
-    recording: Recording, contacts: Sequence[Contact], inside: Sequence[Sequence[Contact]]
+    recording: Recording, contacts: Sequence[Contact], inside: Sequence[Sequence[Contact]], cut_by: str
 ) -> list[Skipped]:
     found = []
     for contact in contacts:
@@ -104,7 +108,8 @@ def _not_scored(
             text = f"a contact is in progress when it begins, until {contact.end:.3f} s: its onset is not recorded"
             found.append(Skipped(recording.name, f"{text}, it is not scored"))
         elif not any(contact in own for own in inside):
-            found.append(Skipped(recording.name, f"the contact at {contact.start:.3f} s lies in no operation"))
+            text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
+            found.append(Skipped(recording.name, text))
     return found
 
 

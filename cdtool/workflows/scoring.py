@@ -58,12 +58,13 @@ def detect_with(
     detectors: Sequence[Any],
     thresholds: Mapping[str, tuple[FittedThreshold, ...]],
     lacking: Mapping[str, str],
-    hold: float = HOLD,
 ) -> Detect:
     """Detectors with their thresholds; one that fails on a log is left out there and named.
 
-    Those that are `lacking` what they need, for the reason given, can judge nothing. `hold` [s]: the matching window.
+    Those that are `lacking` what they need, for the reason given, can judge nothing. A class of motion is held for
+    the longest matching window.
     """
+    hold = max(HOLD, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
 
     def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
@@ -120,7 +121,7 @@ def score_log(
             return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     found = detect(operations, scored)
-    matched = match_log(recording, operations, contacts, found, group, rules, setup.activation.wait)
+    matched = match_log(recording, operations, contacts, found, group, rules, setup.activation.wait, setup.operations)
     scored.skipped += matched.not_scored
     scored.findings += matched.doubts
     scored.matched, courses = matched, matched.courses

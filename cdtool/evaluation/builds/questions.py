@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from cdtool.evaluation.results import ContactResult
 from cdtool.evaluation.statistics.bootstrap import RESAMPLES
 from cdtool.evaluation.statistics.interval import Interval
@@ -33,7 +35,8 @@ _MOST = 10_000
 class Asked:
     """One figure of both builds and the p of no change.
 
-    `old` and `new` are means over `old_of` and `new_of` contacts, or counts in so many contacts, operations or hours.
+    `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, as in a
+    benchmark), or counts in so many contacts, operations or hours.
     `detectable(alpha)` is the least change that would have been shown at that p: with 80 % power where a mean is
     asked; else the count of the new build from which on the test shows it. Infinite: none could have been.
     """
@@ -75,7 +78,10 @@ def ask_mean(
         found = unpaired_difference(after[0], before[0], after[1], before[1], level)
         detectable = _unpaired_detectable(*means)
     reason = "" if not math.isnan(found.p) else "fewer than two recordings or campaigns"
-    return Asked(figure, means[0].mean, means[0].n, means[1].mean, means[1].n, found.mean, found.p, detectable, reason)
+    # A force at the alarm is a median wherever it stands; its change is the mean one of what is tested.
+    shown = [np.median(values) if figure == "force_at_alarm_n" else np.mean(values) for values in (before[0], after[0])]
+    old_value, new_value = map(float, shown)
+    return Asked(figure, old_value, means[0].n, new_value, means[1].n, found.mean, found.p, detectable, reason)
 
 
 def ask_missed(old: Sequence[ContactResult], new: Sequence[ContactResult], paired: bool) -> Asked:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import INTERVAL, IntArray, RestLine, RunningRest
-from cdtool.recording import BoolArray, Contact, FloatArray, Series
+from cdtool.recording import Contact, FloatArray, Series
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
 _ROUNDING = 12.0**-0.5
@@ -22,8 +22,9 @@ _ROUNDING = 12.0**-0.5
 _SAME = 1e-6
 # The rest level is estimated again from the samples up to this long before the onset [s].
 _BEFORE_ONSET = 0.05
-# A burst of noise: within this time [s] the force crosses both levels so often, as far to the other side as this share.
-_BURST, _CROSSINGS, _AS_FAR = 0.03, 4, 0.5
+# A burst of noise: within this time [s] before and after, the force crosses both levels so often, goes to the other
+# side by this share, and holds on one side in no more than this share of its excursions.
+_BURST, _CROSSINGS, _AS_FAR, _HELD = 0.03, 4, 0.4, 0.5
 # What was felt at the start was a contact if it was at least this share of the largest force until its release.
 _SHARE_OF_PEAK = 0.1
 
@@ -101,7 +102,7 @@ class _Search:
             first = self._first_held(begin, beyond)
             if first is None:
                 return None
-            burst = self._end_of_burst(first, over[first - begin :])
+            burst = self._end_of_burst(begin, first, over)
             if burst is None:
                 return self._rise(begin, first, float(beyond[first - begin]))
             begin = burst
@@ -117,21 +118,27 @@ class _Search:
         edges = np.flatnonzero(np.diff(beyond) != 0.0) + 1
         starts = np.concatenate(([0], edges))
         ends = np.concatenate((edges, [len(beyond)])) - 1
-        time = self.time[begin:]
+        time = self.time[begin : begin + len(beyond)]
         lasting = time[ends] - time[starts] + self.period
         # A sample stands for one period of the cell; half of one more or less is jitter.
         held = (beyond[starts] != 0.0) & (lasting >= self.rule.hold - 0.5 * min(self.period, self.rule.hold))
         return starts[held], ends[held]
 
-    def _end_of_burst(self, first: int, over: FloatArray) -> int | None:
-        """The sample after a burst of noise, which goes to both sides alike; None where there is none."""
-        stop = int(np.searchsorted(self.time, self.time[first] + _BURST, side="right")) - first
-        part = over[:stop]
-        large = np.sign(part[np.abs(part) > self.above])
-        other = float(np.max(-large[0] * part))
-        if np.count_nonzero(np.diff(large)) < _CROSSINGS or other < _AS_FAR * float(np.max(large[0] * part)):
+    def _end_of_burst(self, begin: int, first: int, over: FloatArray) -> int | None:
+        """The sample after a burst of noise about `first`, which goes to both sides alike; None where there is none."""
+        since = max(begin, int(np.searchsorted(self.time, self.time[first] - _BURST)))
+        until = int(np.searchsorted(self.time, self.time[first] + _BURST, side="right"))
+        part = over[since - begin : until - begin]
+        large = np.flatnonzero(np.abs(part) > self.above)
+        sides = np.sort([float(np.max(part)), -float(np.min(part))])
+        crossings = np.count_nonzero(np.diff(np.sign(part[large])))
+        if crossings < _CROSSINGS or sides[0] < _AS_FAR * sides[1]:
             return None
-        return first + int(np.flatnonzero(np.abs(part) > self.above)[-1]) + 1
+        # A load cell that rings after an impact stays on each side for longer.
+        held, _ = self._held_runs(since, np.where(np.abs(part) > self.above, np.sign(part), 0.0))
+        if len(held) > _HELD * (crossings + 1):
+            return None
+        return since + int(large[-1]) + 1
 
     def _rise(self, begin: int, high: int, sign: float) -> _Rise:
         """Follow the force back to the lower level, over the rest level just before the onset."""
@@ -220,10 +227,11 @@ class _Search:
         if settled is None:
             return None
         sample, rest = settled
-        off: BoolArray = np.abs(self.force[: sample + 1] - rest) > self.back_to
-        if abs(level - rest) < _SHARE_OF_PEAK * float(np.max(np.abs(self.force[: sample + 1] - rest))):
+        over = self.force[: sample + 1] - rest
+        if abs(level - rest) < _SHARE_OF_PEAK * float(np.max(np.abs(over))):
             return None
-        return int(np.flatnonzero(off)[-1]) if off.any() else sample, rest
+        _, ends = self._held_runs(0, np.where(np.abs(over) > self.back_to, np.sign(over), 0.0))
+        return int(ends[-1]) if len(ends) else sample, rest
 
     def _in_progress(self, last: int, rest: float) -> Contact:
         return Contact(

@@ -18,8 +18,11 @@ from cdtool.recording import BoolArray, FloatArray
 INTERVAL = 0.05
 _GAP = 0.3
 _WINDOW = 20
-# A line needs so many intervals, and a slope of so many standard errors; else the level is taken as constant.
-_LINE, _BEYOND_DOUBT = 12, 3.0
+# A line needs so many intervals and a slope of so many standard errors, more of them where n intervals are few:
+# 3 (1 + 10 / n). Else the level is taken as constant.
+_LINE, _BEYOND_DOUBT, _FEW = 6, 3.0, 10.0
+# A line is extended for so long at most [s]: further on its last value stands.
+_EXTENDED = 1.0
 # Until two intervals are old enough the level is that of the log's first samples [s], at least so many of them.
 _FIRST, _FEWEST = 0.1, 3
 # A standard deviation from the median absolute deviation of Gaussian noise; that of a median, in units of a mean's.
@@ -88,10 +91,14 @@ class RunningRest:
         if len(known) < 2:
             return RestLine(self.start, 0.0, float(self.time[0]), self._start_error, 0.0)
         fit = _fit(self._centre[np.newaxis, known], self._median[np.newaxis, known])[:, 0]
-        return RestLine(*(float(value) for value in fit))
+        line = RestLine(*(float(value) for value in fit))
+        last = float(self.time[self._last[known[-1]]])
+        if before - last <= _EXTENDED:
+            return line
+        return RestLine(float(line.value(np.array([last]))[0]), 0.0, last, line.error_at(last), line.drift_error)
 
     def exclude(self, start: float, end: float, level: float | None = None) -> None:
-        """Take the samples from `start` to `end` [s] out of what is at rest, and estimate anew after them.
+        """Take the samples from `start` to `end` [s] out of what is at rest, and estimate again from there on.
 
         `level` [N]: the rest level after them where no interval before them was at rest.
         """
@@ -103,7 +110,7 @@ class RunningRest:
         later = np.flatnonzero(self._rest[last + 1 :]) + last + 1
         until = later[_WINDOW] if len(later) > _WINDOW else len(self._first) - 1
         stop = int(np.searchsorted(self.time[self._first], self.time[self._last[until]] + _GAP, side="right"))
-        for i in range(last + 1, min(stop + 1, len(self._first))):
+        for i in range(first, min(stop + 1, len(self._first))):
             line = self.line(float(self.time[self._first[i]]))
             self._fits[:, i] = line.level, line.drift, line.at, line.error, line.drift_error
         self.levels[self._first[first] :] = self._evaluated(first, len(self._first))
@@ -173,7 +180,7 @@ def _fit(time: FloatArray, values: FloatArray) -> FloatArray:
         middle = np.median(left, axis=1)
         about = _MAD * np.median(np.abs(left - middle[:, np.newaxis]), axis=1)
         drift_error = about / np.sqrt(np.sum(centred**2, axis=1))
-        sure: BoolArray = np.abs(slope) > _BEYOND_DOUBT * drift_error
+        sure: BoolArray = np.abs(slope) > _BEYOND_DOUBT * (1.0 + _FEW / size) * drift_error
         drift, level = np.where(sure, slope, 0.0), np.where(sure, middle, constant)
         spread = np.where(sure, about, spread)
     return np.stack((level, drift, at, _OF_MEDIAN * spread / np.sqrt(size), drift_error))
