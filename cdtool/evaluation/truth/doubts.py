@@ -19,6 +19,8 @@ _LONGEST_SHIFT = 0.1
 _FEWEST = 10
 # Without a lower level by hand a shift of the rest level counts from this share of the peak on.
 _SHARE_OF_PEAK = 0.01
+# A force left at the log's end [s] is next to nothing below this share of the peak.
+_TAIL, _NEXT_TO_NOTHING = 0.2, 0.05
 
 
 def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Finding]:
@@ -26,12 +28,30 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     if "force" not in recording:
         return []
     found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]
+    found += [item for item in [_not_back(recording["force"], contacts)] if item]
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
         name = f" of {joint}" if len(recording.joints) > 1 else ""
         text = f"follows the torque{name} without lag (r = {r:.3f}): not an independent truth, if it is made from it"
         found.append(Finding(text, "force"))
     return found
+
+
+def _not_back(force: Series, contacts: Sequence[Contact]) -> Finding | None:
+    """A warning where the last contact lasts to the end of the log at a force next to nothing."""
+    present = np.isfinite(force.values[:, 0])
+    time, reading = force.time[present], force.values[present, 0]
+    if not contacts or not len(time) or contacts[-1].found_by != "load cell" or contacts[-1].end < time[-1]:
+        return None
+    contact = contacts[-1]
+    left = float(np.median(reading[time >= time[-1] - _TAIL])) - contact.rest
+    if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
+        return None
+    return Finding(
+        f"{digits(float(f'{left:.2g}'))} N are left at the end of the contact that began at {contact.start:.3f} s: it "
+        "still presses, or the reading at rest has shifted and hides later contacts",
+        "force",
+    )
 
 
 def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[str, float]:

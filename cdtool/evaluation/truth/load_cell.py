@@ -8,7 +8,7 @@ onset: it lasts from the first sample to its release.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ _BEFORE_ONSET = 0.05
 _BURST, _CROSSINGS, _AS_FAR, _HELD = 0.03, 4, 0.4, 0.5
 # What was felt at the start was a contact if it was at least this share of the largest force until its release.
 _SHARE_OF_PEAK = 0.1
+# Released is what settles at this share of the first level, or less.
+_RELEASED = 0.5
 
 
 def reading_step(force: FloatArray) -> float:
@@ -52,6 +54,11 @@ def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> l
     if np.count_nonzero(present) < 3:
         return []
     return _Search(series.time[present], series.values[present, 0], rule, steps).contacts()
+
+
+def _joined(contact: Contact, rebound: Contact) -> Contact:
+    """A contact with another that came too soon after it to be one of its own."""
+    return replace(contact, end=rebound.end, peak_force=max(contact.peak_force, rebound.peak_force))
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,10 @@ class _Search:
                 begin, at_start = last + 1, level
             else:
                 contact, last = self._contact(rise, at_start)
-                found.append(contact)
+                if found and contact.start - found[-1].end <= self.rule.separation:
+                    found[-1] = _joined(found[-1], contact)
+                else:
+                    found.append(contact)
                 self.rest.exclude(contact.start - _BEFORE_ONSET, contact.end + INTERVAL)
                 begin = last + 1
         return found
@@ -213,8 +223,9 @@ class _Search:
     def _release(self, rise: _Rise, begin: int) -> tuple[int, float] | None:
         """The last sample of a contact that lasted from the first on, and the rest level after it; None of another.
 
-        It was one where the force does not come back to what it was at first, but settles closer to zero by more than
-        the upper level. So a load cell that is not tared is at rest, as long as it comes back.
+        It was one where the force does not come back to what it was at first, but settles at half of it or less, and
+        closer to zero by more than the upper level. So a load cell that is not tared is at rest as long as it comes
+        back, or nearly so.
         """
         line, onset = rise.rest, rise.onset
         level = float(line.value(self.time[onset : onset + 1])[0])
@@ -223,7 +234,7 @@ class _Search:
         last = onset + self._end(rise, over)
         if abs(level) <= self.above or self.time[-1] - self.time[last] >= 2 * INTERVAL:
             return None
-        settled = self.rest.settled(first, abs(level) - self.above, self.back_to)
+        settled = self.rest.settled(first, min(abs(level) - self.above, _RELEASED * abs(level)), self.back_to)
         if settled is None:
             return None
         sample, rest = settled

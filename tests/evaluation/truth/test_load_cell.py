@@ -219,3 +219,18 @@ def test_hours_of_a_drifting_cell_are_searched_in_seconds():
     force += sum(pulse(time, onset) for onset in onsets)
     found = contacts(time, force)
     assert [item.start for item in found] == pytest.approx(list(onsets + 0.001), abs=1.1e-3)
+
+
+def test_a_rebound_within_the_separation_is_the_same_contact_whatever_the_cell_reads_between():
+    force = noise(T) + pulse(T, 3.0, 0.1) + pulse(T, 3.6, 0.1, 400.0) + 20.5 * ((T > 3.1) & (T < 3.6))
+    (found,) = contacts(T, force)
+    assert (found.start, found.end) == (pytest.approx(3.001, abs=1.1e-3), pytest.approx(3.7, abs=3e-3))
+    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from what had begun before
+    assert begun.in_progress and begun.end == pytest.approx(1.3, abs=3e-3)
+
+
+def test_a_cell_whose_rest_shifts_in_the_contact_is_not_taken_for_one_that_began_in_it():
+    """The pushes of the UR10e: friction keeps a part of what was felt."""
+    for before, after in ((-29.0, -25.0), (30.0, 20.0)):
+        (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
+        assert not found.in_progress and found.start == pytest.approx(3.003, abs=5e-3)
