@@ -79,8 +79,9 @@ def ask_mean(
         detectable = _unpaired_detectable(*means)
     reason = "" if not math.isnan(found.p) else "fewer than two recordings or campaigns"
     # A force at the alarm is a median wherever it stands; its change is the mean one of what is tested.
-    shown = [np.median(values) if figure == "force_at_alarm_n" else np.mean(values) for values in (before[0], after[0])]
-    old_value, new_value = map(float, shown)
+    old_value, new_value = means[0].mean, means[1].mean
+    if figure == "force_at_alarm_n":
+        old_value, new_value = float(np.median(before[0])), float(np.median(after[0]))
     return Asked(figure, old_value, means[0].n, new_value, means[1].n, found.mean, found.p, detectable, reason)
 
 
