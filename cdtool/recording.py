@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -160,7 +161,10 @@ class Recording:
 class Contact:
     """A true impact: onset and end [s], the onset's uncertainty [s], its peak force [N] and how it was found.
 
-    `kind` is what a label file calls it.
+    `kind` is what a label file calls it. Of a load cell: `rest`, what it read at rest just before the onset [N],
+    `drift` of that level [N/s], by how much it had shifted since the log began [N], and how finely the onset is known,
+    `resolution` [s]: clock, noise, drift and slope. A contact that is `in_progress` when the recording begins has no
+    onset: `start` is the first sample.
     """
 
     start: float
@@ -169,6 +173,11 @@ class Contact:
     peak_force: float = float("nan")
     found_by: str = "load cell"
     kind: str = ""
+    rest: float = math.nan
+    drift: float = 0.0
+    shift: float = 0.0
+    resolution: float = math.nan
+    in_progress: bool = False
 
 
 def _frozen(values: npt.ArrayLike) -> FloatArray:

@@ -37,6 +37,7 @@ COMMANDS = {
     "docs/quick-start.md": 6,
     "docs/recordings.md": 4,
     "docs/benchmark-file.md": 1,
+    "docs/evaluation.md": 2,
     "docs/choosing.md": 6,
     "docs/signature.md": 7,
     "docs/simulators.md": 2,

@@ -10,23 +10,32 @@ import typer
 from cdtool.cli.console import leave, plain, print_error, print_json, print_not_assessable, print_skipped, progress
 from cdtool.cli.detect_shown import as_rows, show_detected
 from cdtool.cli.options import (
+    BenchmarkOption,
     DebounceOption,
     DetectorOption,
     HysteresisOption,
     JointsOption,
     JsonOption,
+    LabelsOption,
     LatchOption,
     LimitOption,
-    MachineOption,
+    MachineUnlessBenchmarkOption,
+    MassBeforeCellOption,
     OnsetAboveOption,
     OnsetBackToOption,
+    OnsetHoldOption,
+    OnsetSeparationOption,
+    OnsetSigmasOption,
     OperationsOption,
     RearmOption,
     SignatureOption,
+    SynchronisationOption,
+    WindowOption,
     figure_name,
     limits_of,
     listed,
 )
+from cdtool.cli.scoring_options import refuse_beside_benchmark, rules_of
 from cdtool.errors import CdtoolError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact
@@ -38,7 +47,8 @@ if TYPE_CHECKING:
 
 def detect(
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
-    machine: MachineOption,
+    machine: MachineUnlessBenchmarkOption = None,
+    benchmark: BenchmarkOption = None,
     signature: SignatureOption = None,
     limit: LimitOption = "",
     detector: DetectorOption = None,
@@ -46,13 +56,20 @@ def detect(
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z, m in the link's frame.")
     ] = "",
-    operations: OperationsOption = "whole",
+    operations: OperationsOption = "",
     debounce: DebounceOption = None,
     rearm: RearmOption = None,
     hysteresis: HysteresisOption = None,
     latch: LatchOption = None,
     onset_above: OnsetAboveOption = None,
     onset_back_to: OnsetBackToOption = None,
+    onset_hold: OnsetHoldOption = None,
+    onset_sigmas: OnsetSigmasOption = None,
+    onset_separation: OnsetSeparationOption = None,
+    labels: LabelsOption = None,
+    synchronisation: SynchronisationOption = None,
+    window: WindowOption = None,
+    mass_before_cell: MassBeforeCellOption = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
@@ -60,16 +77,57 @@ def detect(
 ) -> None:
     """Run one detector over logs and show its alarms.
 
+    With --benchmark every setting and the threshold come from that file, and the figures are those of `cdtool
+    benchmark`.
+
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
-    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
+    from cdtool.workflows.prepared_benchmark import prepare_benchmark
     from cdtool.workflows.runs import absent_truth, lost
 
-    machine_file = read_machine_file(machine)
     limits = limits_of(limit)
+    prepared = None
+    if benchmark is not None:
+        refuse_beside_benchmark(
+            benchmark,
+            machine=machine,
+            limit=limit,
+            joints=joints,
+            operations=operations,
+            debounce=debounce,
+            rearm=rearm,
+            hysteresis=hysteresis,
+            latch=latch,
+            onset_above=onset_above,
+            onset_back_to=onset_back_to,
+            onset_hold=onset_hold,
+            onset_sigmas=onset_sigmas,
+            onset_separation=onset_separation,
+            labels=labels,
+            synchronisation=synchronisation,
+            window=window,
+            mass_before_cell=mass_before_cell,
+        )
+        prepared = prepare_benchmark(benchmark, detector=detector, signature=signature)
+        machine_file = prepared.setup.machine_file
+    elif machine is not None:
+        machine_file = read_machine_file(machine)
+    else:
+        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+    rules = rules_of(
+        above=onset_above,
+        back_to=onset_back_to,
+        hold=onset_hold,
+        sigmas=onset_sigmas,
+        separation=onset_separation,
+        labels=labels,
+        synchronisation=synchronisation,
+        window=window,
+        mass_before_cell=mass_before_cell,
+    )
     contact = ContactPoint.parse(contact_at) if contact_at else None
     plot_names = _plot_names(plot, logs)
     done: list[tuple[Path, Detected]] = []
@@ -78,22 +136,26 @@ def detect(
     with progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
             try:
-                found = run(
-                    log,
-                    machine_file,
-                    signature=signature,
-                    detector=detector,
-                    limit=limits,
-                    joints=listed(joints),
-                    operations=operations,
-                    activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
-                    onset=OnsetRule(above=onset_above, back_to=onset_back_to),
+                found = (
+                    run(log, benchmark=prepared)
+                    if prepared
+                    else run(
+                        log,
+                        machine_file,
+                        signature=signature,
+                        detector=detector,
+                        limit=limits,
+                        joints=listed(joints),
+                        operations=operations or "whole",
+                        activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
+                        rules=rules,
+                    )
                 )
                 if contact:
                     made = [summarise_force(item, machine_file.machine, contact) for item in found.detections]
                     forces |= {item.operation: item for item in made}
                 done.append((log, found))
-                skipped += lost(found.recording)
+                skipped += [*lost(found.recording), *found.not_scored]
                 if plot_names:
                     from cdtool.report.plots.detection_plot import plot_detected
 
@@ -112,7 +174,8 @@ def detect(
     taught = "the signature was learned from it: no alarm here shows nothing"
     learned = [Skipped(str(log), taught) for log, found in done if found.learned]
     absent = [Skipped(str(log), str(item)) for log, found in done for item in absent_truth(found.recording)]
-    print_skipped(skipped, learned, absent)
+    doubts = [item for _, found in done for item in found.doubts]
+    print_skipped(skipped, [*learned, *doubts], absent)
     if as_json:
         print_json(as_rows(done, forces))
     else:

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.console import number, plain, say, table
+from cdtool.cli.contact_rows import contact_as_json
+from cdtool.cli.truth_shown import NEGATIVE
 
 if TYPE_CHECKING:
     from cdtool.detection import Alarm
+    from cdtool.evaluation.results import ContactResult
     from cdtool.evaluation.truth.matching import Matching
     from cdtool.pipeline import Detection
     from cdtool.workflows.contact_force import ForceSummary
@@ -37,9 +40,9 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
     """A JSON object an operation."""
     return [
-        _as_json(log, found, detection, matching, forces.get(detection.operation.name))
+        _as_json(log, found, detection, matching, rows, forces.get(detection.operation.name))
         for log, found in done
-        for detection, matching in zip(found.detections, found.matchings, strict=True)
+        for detection, matching, rows in zip(found.detections, found.matchings, found.contact_rows, strict=True)
     ]
 
 
@@ -56,17 +59,21 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
     name, joints = detection.operation.name, detection.statistic.joints
-    latency = {item.alarm: item.latency for item in matching.matches if item.alarm}
+    latency = {item.alarm: item for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
     for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
-        late = number(1e3 * latency[alarm], 3) if alarm in latency else "-"
+        late = number(1e3 * latency[alarm].latency, 3) if alarm in latency else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
+        if alarm in latency and latency[alarm].clipped:
+            why = NEGATIVE
         rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, why))
     for item in matching.matches:
         if not item.alarm:
             outcome = item.outcome.replace("_", " ")
-            why = f"contact at {item.contact.start:.3f} s{': ' + item.reason if item.reason else ''}"
+            at = "until" if item.contact.in_progress else "at"
+            time = item.contact.end if item.contact.in_progress else item.contact.start
+            why = f"contact {at} {time:.3f} s{': ' + item.reason if item.reason else ''}"
             rows.append((name, outcome, "-", "-", "-", "-", "-", why))
     if not rows:
         rows.append((name, detection.verdict.outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
@@ -120,7 +127,12 @@ def _place(way: float) -> str:
 
 
 def _as_json(
-    log: Path, found: Detected, detection: Detection, matching: Matching, force: ForceSummary | None
+    log: Path,
+    found: Detected,
+    detection: Detection,
+    matching: Matching,
+    rows: Sequence[ContactResult],
+    force: ForceSummary | None,
 ) -> dict[str, Any]:
     from cdtool.workflows.detection import contact_of, why_no_contact
 
@@ -147,22 +159,12 @@ def _as_json(
             }
             for alarm, contact in ((alarm, belonging[alarm]) for alarm in detection.verdict.alarms)
         ],
-        "contacts": [
-            {
-                "onset_s": item.contact.start,
-                "onset_uncertainty_s": item.contact.uncertainty,
-                "peak_force_n": item.contact.peak_force,
-                "outcome": item.outcome,
-                "alarm_s": item.alarm.time if item.alarm else None,
-                "latency_ms": 1e3 * item.latency,
-            }
-            for item in matching.matches
-        ],
+        "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
         "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),
-        "findings": [str(item) for item in found.recording.findings],
+        "findings": [*(str(item) for item in found.recording.findings), *(item.reason for item in found.doubts)],
     }
 
 

@@ -11,23 +11,32 @@ import typer
 
 from cdtool.cli.console import leave, number, plain, print_json, print_not_assessable, print_skipped, say, table
 from cdtool.cli.options import (
+    BenchmarkOption,
     DebounceOption,
     DetectorOption,
     HysteresisOption,
     JointsOption,
     JsonOption,
+    LabelsOption,
     LatchOption,
     LimitOption,
-    MachineOption,
+    MachineUnlessBenchmarkOption,
+    MassBeforeCellOption,
     OnsetAboveOption,
     OnsetBackToOption,
+    OnsetHoldOption,
+    OnsetSeparationOption,
+    OnsetSigmasOption,
     OperationsOption,
     RearmOption,
     SignatureOption,
+    SynchronisationOption,
+    WindowOption,
     figure_name,
     limits_of,
     listed,
 )
+from cdtool.cli.scoring_options import refuse_beside_benchmark, rules_of
 
 if TYPE_CHECKING:
     from cdtool.evaluation.explanation.cause import Cause
@@ -41,18 +50,26 @@ _SHOWN = 20
 
 def explain(
     log: Annotated[Path, typer.Argument(help="Recording to explain.", metavar="LOG")],
-    machine: MachineOption,
+    machine: MachineUnlessBenchmarkOption = None,
+    benchmark: BenchmarkOption = None,
     signature: SignatureOption = None,
     limit: LimitOption = "",
     detector: DetectorOption = None,
     joints: JointsOption = "",
-    operations: OperationsOption = "whole",
+    operations: OperationsOption = "",
     debounce: DebounceOption = None,
     rearm: RearmOption = None,
     hysteresis: HysteresisOption = None,
     latch: LatchOption = None,
     onset_above: OnsetAboveOption = None,
     onset_back_to: OnsetBackToOption = None,
+    onset_hold: OnsetHoldOption = None,
+    onset_sigmas: OnsetSigmasOption = None,
+    onset_separation: OnsetSeparationOption = None,
+    labels: LabelsOption = None,
+    synchronisation: SynchronisationOption = None,
+    window: WindowOption = None,
+    mass_before_cell: MassBeforeCellOption = None,
     plot: Annotated[
         Path | None,
         typer.Option("--plot", help="PNG, SVG or PDF to draw the first event into; an existing folder: all events."),
@@ -61,26 +78,67 @@ def explain(
 ) -> None:
     """Explain why each alarm of a log came and why each contact was missed.
 
+    With --benchmark every setting and the threshold come from that file, and the figures are those of `cdtool
+    benchmark`.
+
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.workflows.explaining import explain as run
+    from cdtool.workflows.prepared_benchmark import prepare_benchmark
     from cdtool.workflows.runs import lost
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot)
-    explained = run(
-        log,
-        machine,
-        signature=signature,
-        limit=limits_of(limit),
-        detector=detector,
-        joints=listed(joints),
-        operations=operations,
-        activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
-        onset=OnsetRule(above=onset_above, back_to=onset_back_to),
+    prepared = None
+    if benchmark is not None:
+        refuse_beside_benchmark(
+            benchmark,
+            machine=machine,
+            limit=limit,
+            joints=joints,
+            operations=operations,
+            debounce=debounce,
+            rearm=rearm,
+            hysteresis=hysteresis,
+            latch=latch,
+            onset_above=onset_above,
+            onset_back_to=onset_back_to,
+            onset_hold=onset_hold,
+            onset_sigmas=onset_sigmas,
+            onset_separation=onset_separation,
+            labels=labels,
+            synchronisation=synchronisation,
+            window=window,
+            mass_before_cell=mass_before_cell,
+        )
+        prepared = prepare_benchmark(benchmark, detector=detector, signature=signature)
+    rules = rules_of(
+        above=onset_above,
+        back_to=onset_back_to,
+        hold=onset_hold,
+        sigmas=onset_sigmas,
+        separation=onset_separation,
+        labels=labels,
+        synchronisation=synchronisation,
+        window=window,
+        mass_before_cell=mass_before_cell,
     )
-    skipped = lost(explained.found.recording)
-    print_skipped(skipped)
+    explained = (
+        run(log, benchmark=prepared)
+        if prepared
+        else run(
+            log,
+            machine,
+            signature=signature,
+            limit=limits_of(limit),
+            detector=detector,
+            joints=listed(joints),
+            operations=operations or "whole",
+            activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
+            rules=rules,
+        )
+    )
+    skipped = [*lost(explained.found.recording), *explained.found.not_scored]
+    print_skipped(skipped, explained.found.doubts)
     if as_json:
         print_json(_as_json(log, explained))
     else:
@@ -149,6 +207,7 @@ def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:
 
 
 def _as_json(log: Path, explained: Explained) -> dict[str, Any]:
+    from cdtool.cli.contact_rows import contact_as_json
     from cdtool.evaluation.explanation.explanation import AlarmExplanation
 
     items = [item for _, item in explained.events]
@@ -157,6 +216,11 @@ def _as_json(log: Path, explained: Explained) -> dict[str, Any]:
         "verdicts": [
             {"operation": item.operation.name, "verdict": item.verdict.outcome, "reason": item.verdict.reason or None}
             for item in explained.found.detections
+        ],
+        "contacts": [
+            contact_as_json(detection, row)
+            for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
+            for row in rows
         ],
         "alarms": [_alarm_as_json(item) for item in items if isinstance(item, AlarmExplanation)],
         "missed": [_miss_as_json(item) for item in items if not isinstance(item, AlarmExplanation)],

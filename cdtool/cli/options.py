@@ -11,6 +11,9 @@ import typer
 from cdtool.errors import UsageError
 
 MachineOption = Annotated[Path, typer.Option("--machine", "-m", help="Machine file (TOML); see docs/machine-file.md.")]
+MachineUnlessBenchmarkOption = Annotated[
+    Path | None, typer.Option("--machine", "-m", help="Machine file (TOML); not beside --benchmark.")
+]
 OperationsOption = Annotated[
     str,
     typer.Option(
@@ -41,11 +44,41 @@ LimitOption = Annotated[
     str, typer.Option("--limit", help="Instead: |signal| below this; one value, or one a joint, as 40,inf,40.")
 ]
 DetectorOption = Annotated[str | None, typer.Option("--detector", "-d", help="Detector; needed with --limit.")]
+BenchmarkOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--benchmark",
+        "-b",
+        help="Benchmark file: machine, threshold, onset, window and every other setting come from there.",
+    ),
+]
 OnsetAboveOption = Annotated[
     float | None, typer.Option("--onset-above", help="Onset: load cell above this [N]. Default: from its noise.")
 ]
 OnsetBackToOption = Annotated[
     float | None, typer.Option("--onset-back-to", help="Onset: followed back to this [N]. Default: half of it.")
+]
+OnsetHoldOption = Annotated[
+    float | None,
+    typer.Option("--onset-hold", help="Onset: seconds above; one sample of a cell slower than that. Default: 0.003."),
+]
+OnsetSigmasOption = Annotated[
+    float | None, typer.Option("--onset-sigmas", help="Onset: standard deviations of the noise. Default: 8.")
+]
+OnsetSeparationOption = Annotated[
+    float | None, typer.Option("--onset-separation", help="Contacts closer than this [s] are one. Default: 1.")
+]
+LabelsOption = Annotated[
+    Path | None, typer.Option("--labels", help="Label file (CSV): its contacts instead of the load cell's.")
+]
+SynchronisationOption = Annotated[
+    float | None, typer.Option("--synchronisation", help="How far the load cell's clock may be off [s]. Default: 0.")
+]
+WindowOption = Annotated[
+    float | None, typer.Option("--window", help="An alarm belongs to a contact for this long [s]. Default: 1.")
+]
+MassBeforeCellOption = Annotated[
+    float | None, typer.Option("--mass-before-cell", help="Mass between load cell and contact [kg]. Default: 0.")
 ]
 OutputOption = Annotated[
     list[Path] | None,

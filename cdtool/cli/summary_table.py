@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.console import leave, number, plain, say, table
+from cdtool.cli.truth_shown import show_truth
 from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def show_table(evaluated: Evaluated) -> None:
             f"{item.detector}: safety factor {item.safety_factor:.3g} for a budget of {item.budget}: "
             f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) that it was set on"
         )
+    show_truth(evaluated)
     _show_bounds(evaluated)
     _show_forces(evaluated.results)
 

@@ -65,7 +65,7 @@ def compare_detectors(results: Results) -> list[Comparison]:
     """Every pair of detectors in every group of impacts, in the order of the benchmark file."""
     clusters = campaigns(results)
     rows: dict[tuple[str, str], dict[Key, ContactResult]] = {}
-    for contact in results.contacts:
+    for contact in results.scored_contacts:
         rows.setdefault((contact.group, contact.detector), {})[contact.recording, contact.contact] = contact
     found: list[Comparison] = []
     for group in results.groups:

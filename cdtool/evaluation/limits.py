@@ -57,7 +57,7 @@ def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tu
         named = [
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
         ]
-        meant = [item for item in named if item.contacts or rule.figure in COUNTED_ALWAYS]
+        meant = [item for item in named if item.contacts or item.in_progress or rule.figure in COUNTED_ALWAYS]
         # A group of which no log could be scored has no figure either, but it should have had one.
         meant = meant or [item for item in named if not item.operations]
         if not meant:

@@ -121,6 +121,10 @@ def _beyond(limit: LimitResult, item: ContactResult, force_failed: bool) -> str:
         return "is missed"
     if item.outcome == "not_assessable" and figure in ("not_assessable", "detected"):
         return "is not assessable"
+    if item.in_progress and figure == "in_progress":
+        return "is in progress at the start"
+    if item.clipped and figure == "clipped":
+        return "has a negative latency, counted as 0"
     if figure == "force_failed":
         return "fails its force limits" if force_failed else ""
     value, words, unit = _measured(figure, item)

@@ -40,25 +40,39 @@ class ContactResult:
     group: str = meant("the benchmark's group")
     detector: str = meant("full name of the detector")
     joint: str | None = meant("joint whose alarm detected the contact")
-    onset_s: float = meant("when the contact began")
-    onset_uncertainty_s: float = meant("how much earlier it may have begun")
+    onset_s: float = meant("when the contact began; of one in progress at the start: the first sample")
+    onset_uncertainty_s: float | None = meant("how much earlier it may have begun; null: in progress at the start")
     alarm_s: float | None = meant("time of the sample that raised the alarm, debounce included")
     latency_ms: float | None = meant(
         "alarm less onset; 0 where the alarm came within the onset's uncertainty before it"
     )
-    outcome: str = meant("detected, missed or not_assessable")
-    force_at_alarm_n: float | None = meant("load-cell force when the alarm rose")
-    peak_force_n: float | None = meant("largest load-cell force of the contact")
-    clipped: bool = meant("the alarm came before the onset, within its uncertainty", default=False)
-    reason: str | None = meant("why the contact could not be assessed", default=None)
+    outcome: str = meant("detected, missed, not_assessable or in_progress (at the start: neither detected nor missed)")
+    force_at_alarm_n: float | None = meant(
+        "magnitude of the load-cell force over its rest level: last sample at or before the alarm, or at the onset"
+    )
+    peak_force_n: float | None = meant("largest magnitude of the same force in the contact")
+    clipped: bool = meant(
+        "negative latency, counted as 0: the alarm came before the onset, within its uncertainty", default=False
+    )
+    reason: str | None = meant("why the contact could not be assessed, or is not scored", default=None)
     contact: int = meant("number of the contact in its recording, from 1", default=1)
     kind: str | None = meant("what a label file calls the contact", default=None)
     found_by: str = meant("ground truth: load cell, label, event or label file", default="load cell")
     watched_ms: float | None = meant("how long after the onset an alarm would have counted", default=None)
-    resolution_ms: float | None = meant("the latency is no finer than this", default=None)
+    resolution_ms: float | None = meant(
+        "the latency is no finer than this: sample periods, synchronisation, noise, drift and slope of the force",
+        default=None,
+    )
     side: str | None = meant("the limit that was crossed: above or below; null for triggers of a program", default=None)
     statistic: float | None = meant("value compared with the limit at the alarm; null for triggers", default=None)
     limit: float | None = meant("limit at the alarm, in the unit of the statistic; null for triggers", default=None)
+    rest_n: float | None = meant("what the load cell read at rest just before the onset", default=None)
+    drift_n_per_s: float | None = meant("drift of that reading before the onset; 0: none beyond doubt", default=None)
+
+    @property
+    def in_progress(self) -> bool:
+        """Whether the contact was in progress when the recording began: it has no onset, and is not scored."""
+        return self.outcome == "in_progress"
 
 
 @dataclass(frozen=True)
@@ -222,3 +236,8 @@ class Results:
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
+
+    @property
+    def scored_contacts(self) -> tuple[ContactResult, ...]:
+        """The contacts that have an onset, and so a latency or a reason for none."""
+        return tuple(item for item in self.contacts if not item.in_progress)

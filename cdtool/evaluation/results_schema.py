@@ -17,7 +17,7 @@ from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactR
 _NAMES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 # What text may be, where it is one of a few words: for one class, or for every one that has the field.
 WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
-    (ContactResult, "outcome"): ("detected", "missed", "not_assessable"),
+    (ContactResult, "outcome"): ("detected", "missed", "not_assessable", "in_progress"),
     (LimitResult, "outcome"): ("met", "violated", "not_assessable"),
     (ConclusionResult, "outcome"): ("violated", "not_assessable", "met", "not_asked"),
     "verdict": ("pass", "fail", "not_assessable"),

@@ -28,6 +28,8 @@ class Summary:
     is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
     `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
     alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
+    `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
+    `contacts`: they had begun when the recording did.
     """
 
     detector: str
@@ -56,6 +58,8 @@ class Summary:
     force_at_alarm_max: float
     peak_force: float
     force_failed: float
+    clipped: int = 0
+    in_progress: int = 0
 
     @property
     def watched(self) -> bool:
@@ -91,6 +95,8 @@ class Summary:
         """Why a figure of this summary is NaN."""
         if figure in COUNTED_ALWAYS:
             return "nothing was watched"
+        if not self.contacts and self.in_progress:
+            return f"{self.in_progress} of {self.in_progress} contacts had begun when the recording did"
         if not self.contacts:
             return "no recording of the group was scored"
         if self.contacts == self.not_assessable:
@@ -131,11 +137,13 @@ FIGURES: Mapping[str, Callable[[Summary], float]] = {
     "force_at_alarm_n": lambda item: item.force_at_alarm,
     "force_at_alarm_max_n": lambda item: item.force_at_alarm_max,
     "peak_force_n": lambda item: item.peak_force,
+    "clipped": lambda item: item.clipped if item.assessable else math.nan,
+    "in_progress": lambda item: item.in_progress,
     "force_failed": lambda item: item.force_failed,
 }
 # Figures that a group without contacts has too.
 COUNTED_ALWAYS = frozenset(
-    name for name in FIGURES if name.startswith("false_alarms") or name in ("operations", "hours")
+    name for name in FIGURES if name.startswith("false_alarms") or name in ("operations", "hours", "in_progress")
 )
 
 
@@ -171,7 +179,7 @@ def campaigns(results: Results) -> dict[str, str]:
 
 def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
     """Latency [ms] of every assessable contact, and whether it is censored (the contact was missed)."""
-    seen = [item for item in contacts if item.outcome != "not_assessable"]
+    seen = [item for item in contacts if item.outcome in ("detected", "missed")]
     values = [item.latency_ms if item.latency_ms is not None else item.watched_ms or 0.0 for item in seen]
     return np.array(values, dtype=np.float64), np.array([item.outcome == "missed" for item in seen], dtype=bool)
 
@@ -185,6 +193,8 @@ def _summary(
     clusters: Mapping[str, str],
     forces: Sequence[ForceResult],
 ) -> Summary:
+    in_progress = sum(item.in_progress for item in contacts)
+    contacts = [item for item in contacts if not item.in_progress]
     detected = [item for item in contacts if item.latency_ms is not None]
     values = np.array([item.latency_ms for item in detected], dtype=np.float64)
     labels = [clusters.get(item.recording, item.recording) for item in detected]
@@ -222,6 +232,8 @@ def _summary(
         force_at_alarm_max=math.inf if at_alarm and missed else max(at_alarm, default=math.nan),
         peak_force=float(np.median(peaks)) if peaks else math.nan,
         force_failed=_failed(forces),
+        clipped=sum(item.clipped for item in detected),
+        in_progress=in_progress,
     )
 
 

@@ -36,7 +36,7 @@ def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:
     Where no contact could be assessed it is the first time alone, its band from 0 to 1, and `end` is 0.
     """
     rows: dict[tuple[str, str], list[ContactResult]] = {}
-    for contact in results.contacts:
+    for contact in results.scored_contacts:
         rows.setdefault((contact.group, contact.detector), []).append(contact)
     return tuple(
         _curve(detector, group, rows[group, detector])

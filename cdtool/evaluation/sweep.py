@@ -25,7 +25,7 @@ MULTIPLES: FloatArray = 2.0 ** (np.arange(-16, 17) / 8.0)
 class Swept:
     """For each of f safety factors: alarms that belong to no contact (f,), and latencies (f, contacts) [s].
 
-    A latency is NaN where the contact gave no alarm.
+    A latency is NaN where the contact gave no alarm, or was in progress when the recording began.
     """
 
     false_alarms: npt.NDArray[np.int64]
@@ -54,6 +54,8 @@ def sweep(
             times = statistic.time[at]
             alone[i] += [float(time) for time in times[armed] if not belongs(time, spans)]
             for column, (contact, opens, closes) in zip(order, spans, strict=True):
+                if contact.in_progress:
+                    continue
                 inside = times[(times >= opens) & (times <= closes)]
                 if len(inside):
                     late = max(float(inside[0]) - contact.start, 0.0)

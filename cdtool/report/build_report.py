@@ -24,9 +24,10 @@ _HEADS = (
 )
 _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
-    "Two figures are old / new. Contacts: the same ones in both, unless two numbers stand there. Latency and force are "
-    "means, in pairs of the contacts that both detected. *No change shown* is not *no change*: the change in brackets "
-    "would have been shown with 80 % power. A change has an interval from ten recordings or campaigns on."
+    "Two figures are old / new. Contacts: the same ones in both, unless two numbers stand there. Latency is a mean and "
+    "the force at the alarm a median, of the contacts that both detected; changes are means of their pairs. *No change "
+    "shown* is not *no change*: the change in brackets would have been shown with 80 % power. "
+    "A change has an interval from ten recordings or campaigns on."
 )
 
 

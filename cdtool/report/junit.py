@@ -95,6 +95,7 @@ def _contact(item: ContactResult) -> str:
     words = f"contact {item.contact} at {item.onset_s:.3f} s: {item.outcome.replace('_', ' ')}"
     if item.latency_ms is not None:
         words += f" after {number(item.latency_ms)} ms"
+        words += " (before the onset, within its uncertainty)" if item.clipped else ""
     if item.force_at_alarm_n is not None:
         words += f" at {number(item.force_at_alarm_n)} N"
     if item.peak_force_n is not None:

@@ -29,13 +29,17 @@ def counts_words(evaluated: Evaluated) -> str:
     summaries, results = evaluated.summaries, evaluated.results
     if not any(item.contacts or item.operations for item in summaries):
         return "nothing was scored"
-    contacts = len({(item.group, item.recording, item.contact) for item in results.contacts})
+    contacts = len({(item.group, item.recording, item.contact) for item in results.scored_contacts})
     counts = (
         ("detected", sum(item.detected for item in summaries)),
         ("missed", sum(item.missed for item in summaries)),
         ("not assessable", sum(item.not_assessable for item in summaries)),
     )
     became = ", ".join(f"{count} {what}" for what, count in counts)
+    if negative := sum(item.clipped for item in summaries):
+        became += f" ({negative} before the onset, counted as 0 ms)"
+    if begun := len({(item.group, item.recording, item.contact) for item in results.contacts if item.in_progress}):
+        became += f"; {counted(begun, 'contact')} in progress at the start, not scored"
     watched = any(item.watched and item.judged_operations for item in summaries)
     count = counted(sum(item.false_alarms for item in summaries), "false alarm")
     alarms = count if watched else f"false alarms {NOT_ASSESSABLE}"

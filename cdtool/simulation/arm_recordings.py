@@ -56,7 +56,7 @@ _BENCHMARK_RULES = (
     "[onset]",
     "above_n = 0.5",
     "back_to_n = 0.5",
-    "samples = 3",
+    "hold_s = 0.003",
 )
 
 

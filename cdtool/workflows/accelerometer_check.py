@@ -36,7 +36,9 @@ def _before_contact(recording: Recording) -> Recording:
         contacts = find_contacts(recording, OnsetRule())
     except RecordingError:
         return recording
-    return recording.between(-np.inf, contacts[0].start) if contacts else recording
+    since = contacts[0].end if contacts and contacts[0].in_progress else -np.inf
+    first = next((contact.start for contact in contacts if not contact.in_progress), np.inf)
+    return recording.between(since, first) if contacts else recording
 
 
 def _judge(expected: FloatArray, measured: FloatArray, name: str) -> Finding:

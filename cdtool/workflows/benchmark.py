@@ -20,7 +20,6 @@ from cdtool.evaluation.results import Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.kernel_warm_up import compile_loaded
-from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
@@ -96,8 +95,7 @@ def benchmark(
         left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    longest = max((group.window for group in setup.impacts.values()), default=HOLD)
-    detect = detect_with(setup, used, learned.thresholds, learned.lacking, max(HOLD, longest))
+    detect = detect_with(setup, used, learned.thresholds, learned.lacking)
     factors = _factors(setup, learned.thresholds)
     gathered = Gathering(
         setup,

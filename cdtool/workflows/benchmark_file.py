@@ -21,8 +21,16 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark_sections import read_activation, read_budget, read_onset, read_signature, read_watched
+from cdtool.workflows.benchmark_sections import (
+    migrated_onset,
+    read_activation,
+    read_budget,
+    read_onset,
+    read_signature,
+    read_watched,
+)
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
+from cdtool.workflows.scoring_rules import ScoringRules
 from cdtool.workflows.threshold_settings import read_threshold
 
 HOLDOUT = "holdout"
@@ -42,7 +50,8 @@ class BenchmarkFile:
     """A validated benchmark file with its globs resolved; `impacts` are the groups that are scored, hold-out last.
 
     `rule` is the threshold's, with its settings.
-    `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg].
+    `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg]. `window` [s] is that of a
+    log of no group. `migrated` says how keys of earlier versions were read.
     """
 
     path: Path
@@ -65,6 +74,8 @@ class BenchmarkFile:
     points: Mapping[Path, str]
     limits: tuple[LimitRule, ...]
     digest: str
+    window: float = 1.0
+    migrated: tuple[str, ...] = ()
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -85,6 +96,11 @@ class BenchmarkFile:
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
         }
+
+    def rules_of(self, group: str) -> ScoringRules:
+        """The settings that make the figures of a log of that group, or of a log of none."""
+        window = self.impacts[group].window if group in self.impacts else self.window
+        return ScoringRules(self.onset, window, self.labels, self.synchronisation, self.mass_before_cell)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -110,8 +126,10 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     threshold, rule = read_threshold(root, signature)
     learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
     force = root.table("force")
-    impacts = _groups(root, base, root.number("window_s", 1.0, above=0.0), force)
+    window = root.number("window_s", 1.0, above=0.0)
+    impacts = _groups(root, base, window, force)
     onset = root.table("onset")
+    migrated = migrated_onset(onset)
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
@@ -135,6 +153,8 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
             root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
+        window=window,
+        migrated=migrated,
     )
     force.finish()
     root.finish()

@@ -8,7 +8,7 @@ from typing import Any
 from cdtool.activation import Activation
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.motion.progress import ALIGNMENTS
 from cdtool.tables import Table
 from cdtool.thresholds.fitted_signature import RULES, SIDES
@@ -72,6 +72,30 @@ def _share(table: Table, name: str, default: float) -> float:
     return value
 
 
+def migrated_onset(table: Table) -> tuple[str, ...]:
+    """How a setting of an earlier version is read; nothing where there is none."""
+    if "samples" not in table:
+        return ()
+    return (f"{table.key('samples')}: read as hold_s = {_hold(table):g} (samples of 1 kHz): write that instead",)
+
+
+def _hold(table: Table) -> float:
+    """`hold_s`, or `samples` of an earlier version: those of a load cell of 1 kHz, whatever this one's rate is."""
+    if "samples" not in table:
+        hold = table.number("hold_s", OnsetRule.hold, minimum=0.0)
+        if hold > LONGEST_HOLD:
+            raise table.fault("hold_s", f"is {hold:g}", f"at most {LONGEST_HOLD:g} s")
+        return hold
+    samples = table.whole("samples", 3, minimum=1)
+    if "hold_s" in table:
+        raise table.fault("samples", "is given beside hold_s", "leave samples out: the onset rule counts in seconds")
+    if samples * SAMPLE > LONGEST_HOLD:
+        raise table.fault(
+            "samples", f"is {samples}: the onset rule counts in seconds now", f"write hold_s, at most {LONGEST_HOLD:g}"
+        )
+    return samples * SAMPLE
+
+
 def read_onset(table: Table) -> OnsetRule:
     """[onset]: when a contact begins."""
     above = table.number("above_n", above=0.0) if "above_n" in table else None
@@ -81,7 +105,7 @@ def read_onset(table: Table) -> OnsetRule:
     rule = OnsetRule(
         above=above,
         back_to=back_to,
-        samples=table.whole("samples", OnsetRule.samples, minimum=1),
+        hold=_hold(table),
         sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
         separation=table.number("separation_s", OnsetRule.separation, above=0.0),
     )

@@ -67,9 +67,10 @@ class SweepRows:
             operations, seconds = self._watched.get(name, (0, 0.0))
             self._watched[name] = operations + 1, seconds + detection.assessed_seconds
             return
-        seen = np.array([match.outcome != "not_assessable" for match in matching.matches], dtype=bool)
+        outcomes = [match.outcome for match in matching.matches]
+        seen = np.array([outcome in ("detected", "missed") for outcome in outcomes], dtype=bool)
         self._latency.setdefault((name, group), []).append(swept.latency[:, seen])
-        self._blind[name, group] += int(np.count_nonzero(~seen))
+        self._blind[name, group] += outcomes.count("not_assessable")
 
     def rows(self, detectors: Sequence[str], groups: Sequence[str]) -> Iterator[SweepResult]:
         """A row for each detector, group of impacts and safety factor."""

@@ -12,11 +12,10 @@ from cdtool.activation import Activation, ActivationSettings
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.truth.matching import Matching, belongs, match, windows
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.evaluation.results import ContactResult, Skipped
+from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.motion.applicable import HOLD
-from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
@@ -24,7 +23,12 @@ from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
+from cdtool.workflows.matched_log import match_log
+from cdtool.workflows.normal_runs import normals_of
+from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
+from cdtool.workflows.scoring_rules import ScoringRules
+from cdtool.workflows.true_contacts import any_contacts
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Detected:
     words what was held against the signal, `activation` is what raised the alarms. `learned`: the signature was learned
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     `normals`: what impact-free runs look like, or why that is not known.
+    `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
+    `not_scored` names contacts without an onset, `doubts` warns about the load cell.
     """
 
     recording: Recording
@@ -45,6 +51,9 @@ class Detected:
     activation: Activation = field(default_factory=Activation)
     learned: bool = False
     window: float = 1.0
+    contact_rows: tuple[tuple[ContactResult, ...], ...] = ()
+    not_scored: tuple[Skipped, ...] = ()
+    doubts: tuple[Skipped, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
 
     @property
@@ -55,24 +64,34 @@ class Detected:
 
 def detect(
     log: str | Path,
-    machine: str | Path | MachineFile,
+    machine: str | Path | MachineFile | None = None,
     *,
+    benchmark: str | Path | PreparedBenchmark | None = None,
     signature: str | Path | None = None,
     detector: str | None = None,
     limit: Sequence[float] = (),
     joints: Sequence[str] = (),
     operations: str = "whole",
     activation: ActivationSettings | None = None,
-    onset: OnsetRule | None = None,
-    window: float = 1.0,
+    rules: ScoringRules | None = None,
 ) -> Detected:
     """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
 
     With limits, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
-    `activation`: settings other than the signature's, or than the default's.
+    `activation`: settings other than the signature's, or than the default's. `rules`: when contacts begin and for how
+    long an alarm belongs to one. With `benchmark` all of that, the machine and the threshold come from there; a
+    signature file takes the threshold's place.
     Raises UsageError where neither or both are given, SignatureError where the signature does not belong,
     RecordingError where the log cannot be read.
     """
+    if benchmark is not None:
+        if machine is not None or limit or joints or operations != "whole" or activation or rules:
+            raise UsageError("settings are given beside a benchmark file", "all of them come from there")
+        if isinstance(benchmark, PreparedBenchmark):
+            return _detect_prepared(Path(log), benchmark)
+        return _detect_prepared(Path(log), prepare_benchmark(benchmark, detector=detector, signature=signature))
+    if machine is None:
+        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
     if (signature is None) == (not limit):
         raise UsageError("one threshold is needed: a signature or a limit", "give --signature FILE or --limit VALUE")
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
@@ -89,7 +108,7 @@ def detect(
         thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
-        normals = NormalMotions(stored.normal or (), Absence.OLDER_FILE if stored.normal is None else Absence.FEW_RUNS)
+        normals = normals_of(stored)
     else:
         if detector is None:
             raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
@@ -102,24 +121,54 @@ def detect(
     if raised_by != stored_one and signature is not None:
         described += ", with another activation than that of the file"
     recording, parts = load_operations(Path(log), machine_file, operations, ranges=ranges)
-    detections = tuple(
-        detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, max(HOLD, window))
-    )
-    contacts = _contacts(recording, onset or OnsetRule())
-    matchings = tuple(
-        match(item.verdict, contacts_of(item.operation, contacts), item.statistic, window, rearm=raised_by.wait)
-        for item in detections
+    rules = rules or ScoringRules()
+    hold = max(HOLD, rules.window)
+    detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
+    contacts = any_contacts(recording, rules)
+    matched = match_log(
+        recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait, operations
     )
     return Detected(
         recording,
         detections,
-        contacts,
-        matchings,
+        tuple(contacts),
+        tuple(item.matchings[0] for item in matched.judged),
         described,
         raised_by,
         recording.digest in learned,
-        window,
+        rules.window,
+        matched.contacts,
+        matched.not_scored,
+        matched.doubts,
         normals,
+    )
+
+
+def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
+    """As `cdtool benchmark` scores it; raises RecordingError where it left the log out."""
+    scored = benchmark.score(log)
+    matched = scored.matched
+    judged = (
+        [(item, rows) for item, rows in zip(matched.judged, matched.contacts, strict=True) if item.detections]
+        if matched
+        else []
+    )
+    if scored.log is None or matched is None or not judged:
+        reason = scored.skipped[0].reason if scored.skipped else "no operation could be judged"
+        raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+    return Detected(
+        scored.log,
+        tuple(item.detections[0] for item, _ in judged),
+        scored.truth,
+        tuple(item.matchings[0] for item, _ in judged),
+        benchmark.described,
+        benchmark.setup.activation,
+        scored.log.digest in benchmark.learned,
+        benchmark.window(log),
+        tuple(rows for _, rows in judged),
+        matched.not_scored,
+        matched.doubts,
+        benchmark.normals,
     )
 
 
@@ -133,6 +182,8 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
     """What an alarm of a contact is that did not detect it: another joint's, the same one's again, or too late."""
     matches = [item for matching in found.matchings for item in matching.matches if item.contact == contact]
     first = next((item.alarm for item in matches if item.alarm), None)
+    if contact.in_progress:
+        return "contact in progress at the start"
     if first is None:
         return f"contact at {contact.start:.3f} s, more than {found.window:g} s after its onset"
     if first.joint != alarm.joint:
@@ -152,16 +203,3 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
         ends = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
         return f"{'load cell' if channel == 'force' else channel} {ends}"
     return "no contact"
-
-
-def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:
-    """The contacts whose onset lies in an operation."""
-    part = operation.recording
-    return tuple(contact for contact in contacts if part.start <= contact.start <= part.end)
-
-
-def _contacts(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]:
-    try:
-        return tuple(find_contacts(recording, rule))
-    except RecordingError:
-        return ()  # without ground truth there are alarms, but no latency

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.activation import ActivationSettings
+from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
-from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
 from cdtool.workflows.detection import Detected, detect
 from cdtool.workflows.detector_inputs import inputs_of
+from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.scoring_rules import ScoringRules
 
 
 @dataclass(frozen=True)
@@ -31,33 +33,40 @@ class Explained:
 
 def explain(
     log: str | Path,
-    machine: str | Path | MachineFile,
+    machine: str | Path | MachineFile | None = None,
     *,
+    benchmark: str | Path | PreparedBenchmark | None = None,
     signature: str | Path | None = None,
     detector: str | None = None,
     limit: Sequence[float] = (),
     joints: Sequence[str] = (),
     operations: str = "whole",
     activation: ActivationSettings | None = None,
-    onset: OnsetRule | None = None,
-    window: float = 1.0,
+    rules: ScoringRules | None = None,
 ) -> Explained:
     """Why each alarm of one detector in one log came, and why each contact was missed.
 
     Arguments and errors are those of `cdtool.workflows.detection.detect`.
     """
-    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    if benchmark is not None and not isinstance(benchmark, PreparedBenchmark):
+        benchmark = prepare_benchmark(benchmark, detector=detector, signature=signature)
+    if benchmark is not None:
+        machine_file = benchmark.setup.machine_file
+    elif machine is None:
+        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+    else:
+        machine_file = machine = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     found = detect(
         log,
-        machine_file,
+        machine,
+        benchmark=benchmark,
         signature=signature,
         detector=detector,
         limit=limit,
         joints=joints,
         operations=operations,
         activation=activation,
-        onset=onset,
-        window=window,
+        rules=rules,
     )
     explanations = tuple(
         explain_operation(

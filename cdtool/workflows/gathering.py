@@ -47,7 +47,7 @@ class Gathering:
         self.normals = normals
         self.scored: list[Scored] = []
         self.skipped: list[Skipped] = []
-        self.findings: list[Skipped] = []
+        self.findings: list[Skipped] = [Skipped(str(setup.path), words) for words in setup.migrated]
         # By detector: the unit of what was held against its limits, which need not be that of its signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
@@ -77,7 +77,7 @@ class Gathering:
             self._exposure[group, name].recordings += 1
         if scored.recording.point:
             self._tests.setdefault((group, scored.recording.point), []).extend(scored.verdicts.values())
-        self.scored.append(replace(scored, judged=[], verdicts={}))
+        self.scored.append(replace(scored, judged=[], verdicts={}, log=None, matched=None))
 
     @property
     def traces(self) -> tuple[Trace, ...]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import Skipped
-from cdtool.evaluation.truth.onset import OnsetRule, baseline, find_contacts
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
 from cdtool.recording import Contact, Finding, Recording
@@ -25,7 +24,7 @@ def contacts_shown(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]
     steps at least. A load cell that feels the machine's own motion shows contacts that are none: a level by hand helps.
     """
     try:
-        return tuple(find_contacts(recording, _above_the_steps(recording, rule)))
+        return tuple(find_contacts(recording, rule, _STEPS))
     except RecordingError:
         return ()
 
@@ -55,22 +54,9 @@ def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[Skipped]:
     return [Skipped(which, f"{notes[0][1]}: taken as free of impacts")]
 
 
-def _above_the_steps(recording: Recording, rule: OnsetRule) -> OnsetRule:
-    if rule.above is not None or "force" not in recording:
-        return rule
-    force = recording["force"].values[:, 0]
-    force = force[np.isfinite(force)]
-    if not len(force):
-        return rule
-    steps = np.abs(np.diff(force))
-    steps = steps[steps > 1e-6 * np.abs(force).max()]  # what rounding leaves of no step is none
-    return (
-        replace(rule, above=max(rule.sigmas * baseline(force)[1], _STEPS * float(steps.min()))) if len(steps) else rule
-    )
-
-
 def _described(contact: Contact) -> str:
     force = f" of {digits(round(contact.peak_force))} N" if np.isfinite(contact.peak_force) else ""
-    shown = f"the {contact.found_by} shows a contact{force} at {contact.start:.3f} s"
+    since = f"from its start to {contact.end:.3f} s" if contact.in_progress else f"at {contact.start:.3f} s"
+    shown = f"the {contact.found_by} shows a contact{force} {since}"
     hint = " (no contact? raise the onset level: --onset-above or [onset] above_n)" if force else ""
     return f"{shown}: not an impact-free run{hint}"

@@ -51,14 +51,22 @@ def contact_rows(
 ) -> list[ContactResult]:
     """A row for each contact and detector; `synchronisation` [s]: how far the load cell's clock may be off."""
     numbers = {contact: number for number, contact in enumerate(contacts, 1)}
-    cell = recording["force"].period if "force" in recording else 0.0
     rows = []
     for detection, matching in zip(judged.detections, judged.matchings, strict=True):
-        resolution = detection.statistic.period + (cell if np.isfinite(cell) else 0.0) + synchronisation
+        own = detection.statistic.period + synchronisation
         for found in matching.matches:
             number = numbers[found.contact]
+            resolution = own + _resolution_of_onset(recording, found.contact)
             rows.append(_contact_row(judged, recording, detection, found, number, courses.get(number), resolution))
     return rows
+
+
+def _resolution_of_onset(recording: Recording, contact: Contact) -> float:
+    """How finely the onset is known [s]: of a label file's, no finer than it says and than the cell."""
+    if np.isfinite(contact.resolution):
+        return contact.resolution
+    cell = recording["force"].period if "force" in recording else 0.0
+    return (cell if np.isfinite(cell) else 0.0) + contact.uncertainty
 
 
 def _contact_row(
@@ -78,19 +86,21 @@ def _contact_row(
         detector=detection.detector,
         joint=detection.statistic.joints[alarm.joint] if alarm else None,
         onset_s=contact.start,
-        onset_uncertainty_s=contact.uncertainty,
+        onset_uncertainty_s=None if contact.in_progress else contact.uncertainty,
         alarm_s=alarm.time if alarm else None,
         latency_ms=1e3 * found.latency if alarm else None,
         outcome=found.outcome,
-        force_at_alarm_n=finite(force_at(course, found.latency)) if course and alarm else None,
+        force_at_alarm_n=finite(abs(force_at(course, found.latency))) if course and alarm else None,
         peak_force_n=finite(peak),
         clipped=found.clipped,
         reason=found.reason or None,
         contact=number,
         kind=contact.kind or None,
         found_by=contact.found_by,
-        watched_ms=1e3 * found.watched,
-        resolution_ms=1e3 * resolution,
+        watched_ms=None if contact.in_progress else 1e3 * found.watched,
+        resolution_ms=None if contact.in_progress else 1e3 * resolution,
+        rest_n=finite(contact.rest),
+        drift_n_per_s=contact.drift if np.isfinite(contact.rest) and not contact.in_progress else None,
         **_crossing(detection, alarm),
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from statistics import median
 
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
@@ -25,6 +26,11 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
         if normal is not None:
             learned.append(normal)
     return tuple(learned)
+
+
+def normals_of(file: SignatureFile) -> NormalMotions:
+    """Return the normal motions of a signature file, or why there are none."""
+    return NormalMotions(file.normal or (), Absence.OLDER_FILE if file.normal is None else Absence.FEW_RUNS)
 
 
 def with_operation(

@@ -202,7 +202,7 @@ def _detectors(results: Results, names: Sequence[str], unpaired: bool) -> list[s
 
 def _group(results: Results, name: str) -> str:
     """The group named, or the only one with contacts."""
-    known = [group for group in results.groups if any(item.group == group for item in results.contacts)]
+    known = [group for group in results.groups if any(item.group == group for item in results.scored_contacts)]
     if not name and len(known) == 1:
         return known[0]
     if name not in known:
@@ -211,7 +211,7 @@ def _group(results: Results, name: str) -> str:
 
 
 def _contacts(results: Results, detector: str, group: str) -> list[ContactResult]:
-    return [item for item in results.contacts if (item.detector, item.group) == (detector, group)]
+    return [item for item in results.scored_contacts if (item.detector, item.group) == (detector, group)]
 
 
 def _difference_of(first: ContactResult, second: ContactResult) -> float | None:

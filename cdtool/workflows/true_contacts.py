@@ -12,6 +12,7 @@ from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.benchmark_file import BenchmarkFile
 from cdtool.workflows.impact_free import contacts_shown
 from cdtool.workflows.runs import DAMAGED, absent_truth, lost
+from cdtool.workflows.scoring_rules import ScoringRules
 
 # A load cell that ends earlier than this [s] before its log has not seen all of it.
 _TAIL = 0.1
@@ -22,6 +23,18 @@ def unwanted_contacts(recording: Recording, setup: BenchmarkFile) -> tuple[Conta
     labels = setup.labels
     name = labels.name_of(recording.name) if labels else None
     return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, setup.onset)
+
+
+def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
+    """The contacts that a log shows, by a label file that names it or by its channels; none without ground truth."""
+    name = rules.labels.name_of(recording.name) if rules.labels else None
+    if rules.labels and name is not None:
+        rules.labels.check(recording.name, recording.start, recording.end)
+        return list(rules.labels.contacts[name])
+    try:
+        return find_contacts(recording, rules.onset)
+    except RecordingError:
+        return []  # without ground truth there are alarms, but no latency
 
 
 def true_contacts(recording: Recording, setup: BenchmarkFile, path: Path) -> list[Contact]:

@@ -137,7 +137,7 @@ def test_another_version_is_named_with_the_way_out(tmp_path):
         (
             '"outcome": "missed"',
             '"outcome": "mised"',
-            r"contacts\[3\]\.outcome is .mised., none of detected, missed, not_assessable$",
+            r"contacts\[3\]\.outcome is .mised., none of detected, missed, not_assessable, in_progress$",
         ),
         (
             '"outcome": "violated"',

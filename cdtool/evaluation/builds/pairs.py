@@ -110,7 +110,7 @@ def _agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
 def _onsets(results: Results) -> Onsets:
     found: dict[tuple[str, str], dict[int, tuple[float, float]]] = defaultdict(dict)
     for item in results.contacts:
-        found[item.group, item.recording][item.contact] = (item.onset_s, item.onset_uncertainty_s)
+        found[item.group, item.recording][item.contact] = (item.onset_s, item.onset_uncertainty_s or 0.0)
     return found
 
 

@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from cdtool.evaluation.builds.detectable import least_count, paired_detectable, unpaired_detectable
 from cdtool.evaluation.results import ContactResult
 from cdtool.evaluation.statistics.interval import Interval
@@ -49,7 +51,8 @@ class Watched:
 class Asked:
     """One figure of both builds and the p of no change.
 
-    `old` and `new` are means over `old_of` and `new_of` contacts, or counts in so many contacts, operations or hours.
+    `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, as in a
+    benchmark), or counts in so many contacts, operations or hours.
     `detectable(alpha)` is the least change that would have been shown at that p: with 80 % power where a mean is
     asked; else the count of the new build from which on the test shows it. Infinite: none could have been.
     """
@@ -103,11 +106,15 @@ def ask_mean(
     def left_open(alpha: float) -> float:
         return math.inf if reason else detectable(alpha) / abs(means[0].mean) if means[0].mean else math.inf
 
+    # A force at the alarm is a median wherever it stands; its change is the mean one of what is tested.
+    old_value, new_value = means[0].mean, means[1].mean
+    if figure == "force_at_alarm_n":
+        old_value, new_value = float(np.median(before[0])), float(np.median(after[0]))
     return Asked(
         figure,
-        means[0].mean,
+        old_value,
         means[0].n,
-        means[1].mean,
+        new_value,
         means[1].n,
         found.mean,
         found.p,

@@ -109,7 +109,7 @@ class Build:
         self._contacts: dict[tuple[str, str], list[ContactResult]] = defaultdict(list)
         self._false_alarms: dict[tuple[str, str], int] = defaultdict(int)
         self._exposure = {(item.detector, item.group): item for item in results.exposure}
-        for contact in results.contacts:
+        for contact in results.scored_contacts:
             self._contacts[contact.detector, contact.group].append(contact)
         for alarm in results.false_alarms:
             self._false_alarms[alarm.detector, alarm.group] += 1

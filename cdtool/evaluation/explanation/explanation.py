@@ -119,7 +119,7 @@ def explain_operation(
     found += [
         explain_miss(detection, item, activation, inputs, margins, normals)
         for item in matching.matches
-        if item.alarm is None
+        if item.alarm is None and not item.contact.in_progress
     ]
     return tuple(sorted(found, key=_order))
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.truth.onset import baseline
+from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 
@@ -74,7 +74,7 @@ def force_course(
 ) -> ForceCourse:
     """F_contact = F_cell + m a: load cell less its reading at rest, and the inertia before it (thesis figure 4.11).
 
-    `recording`: the one that the contact was found in, whole, since the reading at rest is that of its beginning; on
+    `recording`: the one that the contact was found in, whole, since the reading at rest is that before the onset; on
     the load side. `until`: when the next contact begins [s on its clock]; the course ends there. `mass_before_cell`
     [kg]: what moves with the machine between load cell and contact; a [m/s2] is its acceleration in the direction of
     the contact force on it, against the motion of the leading joint: F = F_cell - m sign(v) a_measured. The
@@ -92,7 +92,7 @@ def force_course(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
             "take the force limits of contacts that the load cell saw",
         )
-    over = reading - baseline(reading)[0]
+    over = reading - (contact.rest if np.isfinite(contact.rest) else rest_before(time, reading, contact.start))
     part = (time >= contact.start) & (time < until)
     time, over = time[part], over[part]
     pressing = (time <= contact.end) | (contact.end <= contact.start)

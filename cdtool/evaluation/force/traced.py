@@ -12,8 +12,8 @@ from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import ForceVerdict, Outcome, StepVerdict
 from cdtool.evaluation.results import ForceResult, Results
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.evaluation.truth.onset import baseline
-from cdtool.recording import FloatArray
+from cdtool.evaluation.truth.rest_level import rest_before
+from cdtool.recording import Contact, FloatArray
 
 # Onsets of a trace and of its row are the same number; a file may have rounded one.
 _SAME_ONSET = 1e-6
@@ -51,17 +51,17 @@ def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForc
     verdicts = {(row.group, row.recording, row.contact): row for row in results.forces}
     onsets: dict[tuple[str, str], dict[int, float]] = {}
     alarms: dict[tuple[str, str, int], dict[str, float]] = {}
-    for contact in results.contacts:
-        key = (contact.group, contact.recording)
-        onsets.setdefault(key, {})[contact.contact] = contact.onset_s
-        if contact.latency_ms is not None:
-            alarms.setdefault((*key, contact.contact), {})[contact.detector] = 1e-3 * contact.latency_ms
+    for seen in results.contacts:
+        key = (seen.group, seen.recording)
+        onsets.setdefault(key, {})[seen.contact] = seen.onset_s
+        if seen.latency_ms is not None:
+            alarms.setdefault((*key, seen.contact), {})[seen.detector] = 1e-3 * seen.latency_ms
     found = []
     for trace in traces:
         for log in (trace.recording, trace.recording.rpartition("#")[0]):
-            for number, onset, ends in _contacts(trace, onsets.get((trace.group, log), {})):
+            for number, contact, until in _contacts(trace, onsets.get((trace.group, log), {})):
                 row = verdicts.get((trace.group, log, number))
-                curve = _curve(trace, onset, ends)
+                curve = _curve(trace, contact, until)
                 if row is not None and curve is not None:
                     verdict = _verdict(row, *curve)
                     late = alarms.get((trace.group, log, number), {})
@@ -69,25 +69,26 @@ def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForc
     return tuple(found)
 
 
-def _contacts(trace: Trace, onsets: Mapping[int, float]) -> Iterator[tuple[int, float, float]]:
-    """Number, onset and end [s] of the trace's contacts; one ends where the next begins."""
+def _contacts(trace: Trace, onsets: Mapping[int, float]) -> Iterator[tuple[int, Contact, float]]:
+    """The trace's contacts with their number and their end [s]; one ends where the next begins."""
     ends = [*(contact.start for contact in trace.contacts[1:]), math.inf]
     for contact, until in zip(trace.contacts, ends, strict=False):
         for number, onset in onsets.items():
             if abs(onset - contact.start) <= _SAME_ONSET:
-                yield number, contact.start, until
+                yield number, contact, until
 
 
-def _curve(trace: Trace, onset: float, until: float) -> tuple[FloatArray, FloatArray] | None:
+def _curve(trace: Trace, contact: Contact, until: float) -> tuple[FloatArray, FloatArray] | None:
     present = np.isfinite(trace.force)
     time, reading = trace.force_time[present], trace.force[present]
-    part = (time >= onset) & (time < until)
+    part = (time >= contact.start) & (time < until)
     if not part.any():
         return None
-    force = (reading - baseline(reading)[0])[part]
+    rest = contact.rest if math.isfinite(contact.rest) else rest_before(time, reading, contact.start)
+    force = (reading - rest)[part]
     if force[np.argmax(np.abs(force))] < 0.0:
         force = -force
-    return time[part] - onset, force
+    return time[part] - contact.start, force
 
 
 def _verdict(row: ForceResult, time: FloatArray, force: FloatArray) -> ForceVerdict:

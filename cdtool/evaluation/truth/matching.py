@@ -3,7 +3,9 @@
 Conventions: latency = time of the sample whose processing raised the alarm (debounce included) - onset. A contact's
 window is [onset - its uncertainty, onset + window]; it ends earlier where the next contact's window begins. A contact
 without an alarm in it is missed: its latency is censored at `watched`, never dropped. It is not assessable where the
-detector's signal was valid nowhere between onset and the window's end.
+detector's signal was valid nowhere between onset and the window's end. A contact that is in progress when the recording
+begins has no onset, and so no latency: it is neither detected nor missed, and what alarms until its release, and in the
+window after that, is no false alarm.
 """
 
 from __future__ import annotations
@@ -20,7 +22,10 @@ from cdtool.recording import Contact
 # What raises an alarm again within this time [s] is the same event.
 REARM = 0.5
 
-Outcome = Literal["detected", "missed", "not_assessable"]
+# Why a contact that is in progress at the start has no latency.
+IN_PROGRESS = "in progress when the recording begins: its onset is not recorded"
+
+Outcome = Literal["detected", "missed", "not_assessable", "in_progress"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +33,7 @@ class Match:
     """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero.
 
     `watched`: how long after the onset an alarm would have counted [s], the censoring time of a missed contact.
-    `reason` tells why a contact could not be assessed.
+    `reason` tells why a contact could not be assessed, or has no latency.
     """
 
     contact: Contact
@@ -51,10 +56,11 @@ class Matching:
 def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:
     """Each contact in order of time with the beginning and the end [s] of its window; no two windows overlap."""
     ordered = sorted(contacts, key=lambda item: item.start)
-    opens = [contact.start - contact.uncertainty for contact in ordered]
+    opens = [-np.inf if contact.in_progress else contact.start - contact.uncertainty for contact in ordered]
     for i in range(1, len(ordered)):
         opens[i] = max(opens[i], ordered[i - 1].start)
-    closes = [min(contact.start + window, after) for contact, after in zip(ordered, [*opens[1:], np.inf], strict=False)]
+    begins = [contact.end if contact.in_progress else contact.start for contact in ordered]
+    closes = [min(begin + window, after) for begin, after in zip(begins, [*opens[1:], np.inf], strict=False)]
     return list(zip(ordered, opens, closes, strict=True))
 
 
@@ -81,6 +87,9 @@ def match(
     known = list(contacts)
     for contact, opens, closes in spans:
         if contact not in known:
+            continue
+        if contact.in_progress:
+            matches.append(Match(contact, "in_progress", reason=IN_PROGRESS))
             continue
         watched = max(min(closes, _end(statistic)) - contact.start, 0.0)
         candidates = crossings or verdict.crossings

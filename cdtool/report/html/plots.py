@@ -33,7 +33,7 @@ def plot_data(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, Any]:
     """Everything that the plots need but the traces themselves."""
     results = evaluated.results
     contacts: dict[tuple[str, str], list[ContactResult]] = {}
-    for item in results.contacts:
+    for item in results.scored_contacts:
         contacts.setdefault((item.group, item.detector), []).append(item)
     return {
         "detectors": [_detector(results, name) for name in results.detectors],

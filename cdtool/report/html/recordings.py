@@ -173,6 +173,8 @@ def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
 
 
 def _missing(item: ContactResult) -> str:
+    if item.in_progress:
+        return "in progress at the start"
     return "missed" if item.outcome == "missed" else _NOT_SEEN
 
 

@@ -40,10 +40,12 @@ def details(results: Results) -> list[Section]:
     """Every folded section that has something to say."""
     missed = [item for item in results.contacts if item.outcome == "missed"]
     blind = [item for item in results.contacts if item.outcome == "not_assessable"]
+    begun = [_contact_row(results, item) for item in results.contacts if item.in_progress]
     sections = [
         _folded("Contacts missed", _CONTACT, [_contact_row(results, item) for item in missed], "contacts"),
         _folded("False alarms", _ALARM, _false_alarm_rows(results), "false_alarms"),
         _folded("Contacts not assessable", _CONTACT, [_contact_row(results, item) for item in blind], "contacts"),
+        _folded("Contacts in progress at the start", _CONTACT, begun, "contacts"),
         _folded("What could not be judged", _NOT_JUDGED, _not_judged(results), "exposure"),
         _folded("Force limits not met", _FORCE, _force_rows(results), "forces"),
         _folded("Left out", ("recording", "reason"), _reasons(alike(results.skipped)), "skipped"),

@@ -119,7 +119,7 @@ def _figure(evaluated: Evaluated) -> Figure:
 
 def _all_marks(results: Results) -> dict[tuple[str, str], _Marks]:
     found: dict[tuple[str, str], tuple[list[float], list[float]]] = {}
-    for item in results.contacts:
+    for item in results.scored_contacts:
         detected, missed = found.setdefault((item.detector, item.group), ([], []))
         if item.latency_ms is not None:
             detected.append(item.latency_ms)

@@ -156,7 +156,7 @@ def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
         return (false or "no alarm"), ""
     if seen.outcome == "detected":
         return f"{1e3 * seen.late:.0f} ms", false
-    return "missed", false
+    return ("in progress" if seen.outcome == "in_progress" else "missed"), false
 
 
 def _row_name(trace: Trace, row: Panel) -> str:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.force.course import force_at, force_course
-from cdtool.evaluation.truth.onset import OnsetRule, baseline, find_contacts
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 MASS, STIFFNESS, SPEED, ONSET = 620.0, 500e3, 0.2, 2.0
@@ -59,13 +59,11 @@ def test_neither_the_cells_offset_nor_its_sign_changes_the_course(offset, sign):
 
 def test_the_reading_at_rest_is_the_one_of_the_onset_rule():
     noisy = 30.0 + half_sine(TIME) + np.random.default_rng(2).normal(0.0, 2.0, len(TIME))
-    rest, noise = baseline(noisy)
-    assert rest == pytest.approx(30.0, abs=0.5)
-    assert noise == pytest.approx(2.0, abs=0.3)
     (contact,) = find_contacts(recording(noisy), OnsetRule(20.0, 8.0))
+    assert contact.rest == pytest.approx(30.0, abs=0.5)
     course = force_course(recording(noisy), contact)
     assert course.peak == pytest.approx(contact.peak_force, abs=1e-9)
-    assert course.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - rest)
+    assert course.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - contact.rest)
 
 
 def test_a_pull_after_the_push_stays_negative():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts, reading_step
+from cdtool.evaluation.truth.load_cell import reading_step
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Recording, Series
 
 TIME = np.arange(4000) * 1e-3
@@ -91,11 +92,13 @@ def test_a_rebound_is_the_same_contact_and_a_later_touch_another():
     assert contacts[0].end == pytest.approx(1.799)
 
 
-def test_a_contact_from_the_first_sample_on_is_found():
+def test_a_contact_from_the_first_sample_on_is_in_progress_until_its_release():
     force = np.full(4000, 0.0)
-    force[:1] = 0.0
-    force[1:600] = 500.0
-    assert len(find_contacts(recording(force), GATE_RULE)) == 1
+    force[:600] = 500.0
+    (contact,) = find_contacts(recording(force), GATE_RULE)
+    assert contact.in_progress
+    assert (contact.start, contact.end) == (0.0, pytest.approx(0.599))
+    assert contact.peak_force == 500.0
 
 
 def test_labels_serve_where_there_is_no_load_cell():

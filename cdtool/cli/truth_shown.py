@@ -1,0 +1,27 @@
+"""What the screen says of contacts whose onset is not recorded, and of latencies below zero."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cdtool.cli.console import say
+from cdtool.plain_text import counted
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.evaluated import Evaluated
+
+# Beside a latency that came out below zero.
+NEGATIVE = "alarm before the onset, within its uncertainty: counted as 0"
+
+
+def show_truth(evaluated: Evaluated) -> None:
+    """One line for each group with contacts in progress at the start, and for each with negative latencies."""
+    for group in evaluated.results.groups:
+        items = [item for item in evaluated.summaries if item.group == group]
+        begun = max((item.in_progress for item in items), default=0)
+        if begun:
+            say(f"{group}: {counted(begun, 'contact')} in progress at the start: neither detected nor missed")
+        negative = [item for item in items if item.clipped]
+        if negative:
+            each = ", ".join(f"{item.detector} {item.clipped} of {item.detected}" for item in negative)
+            say(f"{group}: negative latencies, within the onset's uncertainty, counted as 0: {each}")

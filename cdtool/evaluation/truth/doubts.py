@@ -1,0 +1,120 @@
+"""What speaks against a load cell as the truth: a rest level that wanders, or a "force" that is the torque again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cdtool.evaluation.truth.onset_rule import OnsetRule
+from cdtool.plain_text import digits
+from cdtool.recording import Contact, Finding, FloatArray, Recording, Series
+
+# Above this magnitude of the correlation the force follows the torque.
+_FOLLOWS = 0.95
+# It is compared around each contact: this long before its onset and after it [s].
+_BEFORE, _AFTER = 0.2, 0.5
+# A load cell that feels what the drive then answers leads the torque: shifts up to this one are tried [s].
+_LONGEST_SHIFT = 0.1
+_FEWEST = 10
+# Without a lower level by hand a shift of the rest level counts from this share of the peak on.
+_SHARE_OF_PEAK = 0.01
+# A force left at the log's end [s] is next to nothing below this share of the peak.
+_TAIL, _NEXT_TO_NOTHING = 0.2, 0.05
+
+
+def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Finding]:
+    """Warnings about the load cell of a recording as the truth of its contacts; none without a load cell."""
+    if "force" not in recording:
+        return []
+    found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]
+    found += [item for item in [_not_back(recording["force"], contacts)] if item]
+    joint, r = follows_torque(recording, contacts)
+    if abs(r) > _FOLLOWS:
+        name = f" of {joint}" if len(recording.joints) > 1 else ""
+        text = f"follows the torque{name} without lag (r = {r:.3f}): not an independent truth, if it is made from it"
+        found.append(Finding(text, "force"))
+    return found
+
+
+def _not_back(force: Series, contacts: Sequence[Contact]) -> Finding | None:
+    """A warning where the last contact lasts to the end of the log at a force next to nothing."""
+    present = np.isfinite(force.values[:, 0])
+    time, reading = force.time[present], force.values[present, 0]
+    if not contacts or not len(time) or contacts[-1].found_by != "load cell" or contacts[-1].end < time[-1]:
+        return None
+    contact = contacts[-1]
+    left = float(np.median(reading[time >= time[-1] - _TAIL])) - contact.rest
+    if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
+        return None
+    return Finding(
+        f"{digits(float(f'{left:.2g}'))} N are left at the end of the contact that began at {contact.start:.3f} s: it "
+        "still presses, or the reading at rest has shifted and hides later contacts",
+        "force",
+    )
+
+
+def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[str, float]:
+    """The joint whose torque the force follows most closely without lag, and their correlation around the contacts.
+
+    Without contacts over the whole recording; NaN where a shift fits better, as where a drive answers a contact.
+    """
+    none = "", float("nan")
+    if "torque" not in recording or "force" not in recording:
+        return none
+    torque, force = recording["torque"], recording["force"]
+    present = np.isfinite(force.values[:, 0])
+    time, reading = force.time[present], force.values[present, 0]
+    near = _near(time, contacts)
+    time, reading = time[near], reading[near]
+    period = np.nanmax([force.period, torque.period])
+    if len(time) < _FEWEST or not np.isfinite(period) or np.ptp(reading) == 0.0:
+        return none
+    best = none
+    for j, joint in enumerate(recording.joints):
+        r = _correlation(reading, _at(torque, j, time))
+        if not abs(r) > max(abs(best[1]) if best[0] else 0.0, _FOLLOWS):
+            continue
+        count = int(np.ceil(_LONGEST_SHIFT / period))
+        shifts = period * np.unique(np.linspace(2, max(count, 2), 12).astype(int))
+        others = [_correlation(reading, _at(torque, j, time + shift)) for shift in (*shifts, *-shifts)]
+        if abs(r) >= np.nanmax(np.abs([0.0, *others])):
+            best = joint, r
+    return best
+
+
+def _near(time: FloatArray, contacts: Sequence[Contact]) -> np.ndarray:
+    known = [contact for contact in contacts if not contact.in_progress]
+    if not known:
+        return np.ones(len(time), dtype=bool)
+    near = np.zeros(len(time), dtype=bool)
+    for contact in known:
+        near |= (time >= contact.start - _BEFORE) & (time <= contact.start + _AFTER)
+    return near
+
+
+def _at(series: Series, joint: int, time: FloatArray) -> FloatArray:
+    present = np.isfinite(series.values[:, joint])
+    if np.count_nonzero(present) < 2:
+        return np.full(len(time), np.nan)
+    return np.asarray(np.interp(time, series.time[present], series.values[present, joint]))
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    if not np.all(np.isfinite(b)) or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def _has_drifted(contact: Contact, rule: OnsetRule) -> bool:
+    least = rule.back_to if rule.back_to is not None else _SHARE_OF_PEAK * contact.peak_force
+    return not contact.in_progress and abs(contact.shift) > least
+
+
+def _drifted(contact: Contact) -> Finding:
+    rate = f", {digits(float(f'{contact.drift:.2g}'))} N/s just before it" if contact.drift else ""
+    return Finding(
+        f"the reading at rest shifted by {digits(float(f'{contact.shift:.3g}'))} N before the contact at "
+        f"{contact.start:.3f} s{rate}: the onset counts from where it was then",
+        "force",
+    )

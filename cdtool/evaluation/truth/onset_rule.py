@@ -1,0 +1,54 @@
+"""When a contact begins: the settings of the onset rule, in newtons and seconds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cdtool.errors import UsageError
+
+# The longest hold [s]: later the rest level would rest on the contact itself.
+LONGEST_HOLD = 0.1
+# A setting in samples means those of a load cell of 1 kHz: so many seconds each.
+SAMPLE = 1e-3
+
+
+@dataclass(frozen=True)
+class OnsetRule:
+    """Upper level `above` and lower level `back_to` [N], over the rest level; None: from the noise (`sigmas`, half).
+
+    The force stays above the upper level, on one side, for `hold` [s], where each sample stands for one period of the
+    load cell: of a cell slower than that one sample is enough. Contacts closer than `separation` [s] are one (a
+    rebound). Raises UsageError for a setting outside its range.
+
+    >>> OnsetRule(above=20.0, back_to=8.0).described
+    'load cell above 20 N for 3 ms, followed back to 8 N'
+    """
+
+    above: float | None = None
+    back_to: float | None = None
+    hold: float = 0.003
+    sigmas: float = 8.0
+    separation: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("above", "back_to", "sigmas", "separation"):
+            value = getattr(self, name)
+            if value is not None and not (value > 0.0 and math.isfinite(value)):
+                raise UsageError(f"onset: {name} is {value:g}", "a finite number above 0")
+        if not 0.0 <= self.hold <= LONGEST_HOLD:
+            raise UsageError(f"onset: hold is {self.hold:g} s", f"0 to {LONGEST_HOLD:g} s")
+        if self.above is not None and self.back_to is not None and self.back_to > self.above:
+            raise UsageError(f"onset: back_to is {self.back_to:g}, more than above", "at most above")
+
+    @property
+    def described(self) -> str:
+        """The rule in words, for reports."""
+        above = f"{self.above:g} N" if self.above is not None else f"{self.sigmas:g} standard deviations of the noise"
+        back = f"{self.back_to:g} N" if self.back_to is not None else "half of it"
+        return f"load cell above {above} for {1e3 * self.hold:g} ms, followed back to {back}"
+
+    def levels(self, noise: float, least: float = 0.0) -> tuple[float, float]:
+        """The upper and the lower level [N] of a cell with that noise; one from the noise is at least `least` [N]."""
+        above = self.above if self.above is not None else max(self.sigmas * noise, least, 1e-9)
+        return above, min(self.back_to if self.back_to is not None else 0.5 * above, above)

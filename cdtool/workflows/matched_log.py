@@ -1,0 +1,141 @@
+"""A log's contacts held against what detectors say of its operations: the one way, whatever command asks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cdtool.detection import Alarm
+from cdtool.errors import CdtoolError
+from cdtool.evaluation.force.course import ForceCourse, force_course
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.truth.doubts import truth_findings
+from cdtool.evaluation.truth.matching import match
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection
+from cdtool.recording import Contact, Recording
+from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.scoring_rules import ScoringRules
+
+
+@dataclass(frozen=True)
+class MatchedLog:
+    """What became of a log's contacts and alarms.
+
+    `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
+    number; `not_scored` names contacts that have no onset or lie in no operation, `doubts` warns about the load cell.
+    """
+
+    judged: tuple[Judged, ...]
+    contacts: tuple[tuple[ContactResult, ...], ...]
+    false_alarms: tuple[FalseAlarmResult, ...]
+    courses: dict[int, ForceCourse]
+    not_scored: tuple[Skipped, ...]
+    doubts: tuple[Skipped, ...]
+
+
+def match_log(
+    recording: Recording,
+    operations: Sequence[Operation],
+    contacts: Sequence[Contact],
+    found: Sequence[Sequence[Detection]],
+    group: str,
+    rules: ScoringRules,
+    rearm: float,
+    cut_by: str,
+) -> MatchedLog:
+    """Match the detections of each operation with the log's contacts.
+
+    `rearm` [s] is the activation's; `cut_by` says how the log was cut into its operations.
+    """
+    inside = _by_operation(operations, contacts)
+    courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
+    warned = [Skipped(recording.name, str(item)) for item in truth_findings(recording, contacts, rules.onset)]
+    crossings = _pooled(found)
+    judged = []
+    for operation, own, detections in zip(operations, inside, found, strict=True):
+        matchings = tuple(
+            match(
+                item.verdict,
+                own,
+                item.statistic,
+                rules.window,
+                of_log=contacts,
+                crossings=crossings[item.detector],
+                rearm=rearm,
+            )
+            for item in detections
+        )
+        judged.append(Judged(group, operation, own, tuple(detections), matchings))
+    return MatchedLog(
+        tuple(judged),
+        tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
+        tuple(row for item in judged for row in false_alarm_rows(item)),
+        courses,
+        tuple(_not_scored(recording, contacts, inside, cut_by)),
+        (*warned, *doubts),
+    )
+
+
+def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+    """The contacts whose onset lies in an operation, and one that is in progress when it begins."""
+    part = operation.recording
+    return tuple(
+        contact
+        for contact in contacts
+        if part.start <= contact.start <= part.end
+        or (contact.in_progress and contact.start <= part.end and contact.end >= part.start)
+    )
+
+
+def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
+    """The contacts of each operation; one on the edge of two belongs to the earlier."""
+    taken: set[Contact] = set()
+    found = []
+    for operation in operations:
+        own = tuple(contact for contact in contacts_of(operation, contacts) if contact not in taken)
+        taken.update(own)
+        found.append(own)
+    return found
+
+
+def _not_scored(
+    recording: Recording, contacts: Sequence[Contact], inside: Sequence[Sequence[Contact]], cut_by: str
+) -> list[Skipped]:
+    found = []
+    for contact in contacts:
+        if contact.in_progress:
+            text = f"a contact is in progress when it begins, until {contact.end:.3f} s: its onset is not recorded"
+            found.append(Skipped(recording.name, f"{text}, it is not scored"))
+        elif not any(contact in own for own in inside):
+            text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
+            found.append(Skipped(recording.name, text))
+    return found
+
+
+def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
+    """Every detector's crossings in all operations of a log, in order of time."""
+    pooled: dict[str, list[Alarm]] = {}
+    for detections in found:
+        for detection in detections:
+            pooled.setdefault(detection.detector, []).extend(detection.verdict.crossings)
+    return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
+
+
+def _courses(
+    recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
+) -> tuple[dict[int, ForceCourse], list[Skipped]]:
+    """The force over each contact that has an onset, by its number; one without a force is named."""
+    found: dict[int, ForceCourse] = {}
+    missing: list[Skipped] = []
+    if "force" not in recording:
+        return found, missing
+    ends = [*(contact.start for contact in contacts[1:]), float("inf")]
+    for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
+        if contact.in_progress:
+            continue
+        try:
+            found[number] = force_course(recording, contact, mass_before_cell, until)
+        except CdtoolError as fault:
+            missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
+    return found, missing

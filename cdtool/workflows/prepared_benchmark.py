@@ -1,0 +1,106 @@
+"""One detector of a benchmark file, ready for single logs: with its threshold, and every setting that makes figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.plausible import PlausibleRanges
+from cdtool.signature_store import read_signature
+from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.workflows.calibration import learn_thresholds
+from cdtool.workflows.normal_runs import normal_motions, normals_of
+from cdtool.workflows.runs import load_runs
+from cdtool.workflows.scoring import Detect, Scored, detect_with, score_log
+
+
+@dataclass(frozen=True)
+class PreparedBenchmark:
+    """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
+
+    `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
+    `normals` what they look like.
+    """
+
+    setup: BenchmarkFile
+    detector: str
+    described: str
+    learned: Mapping[str, str]
+    run: Detect
+    ranges: PlausibleRanges | None
+    normals: NormalMotions
+
+    def score(self, log: Path) -> Scored:
+        """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
+        group, path = self._listed(log)
+        return score_log(self.setup, group, path, self.run, {}, self.ranges)
+
+    def window(self, log: Path) -> float:
+        """How long after its onset a contact of the log may be detected [s]."""
+        return self.setup.rules_of(self._listed(log)[0]).window
+
+    def _listed(self, log: Path) -> tuple[str, Path]:
+        """The log's group and its path as the file names it; no group where it is in none."""
+        for name, group in self.setup.impacts.items():
+            for path in group.logs:
+                if path.resolve() == log.resolve():
+                    return name, path
+        return "", log
+
+
+def prepare_benchmark(
+    file: str | Path,
+    *,
+    detector: str | None = None,
+    signature: str | Path | None = None,
+    jobs: int = 1,
+) -> PreparedBenchmark:
+    """Read a benchmark file and learn the threshold of one of its detectors, or take that of a signature file.
+
+    `detector` may be left out where the file names one alone, or a signature is given. Raises ConfigurationError for a
+    wrong file, SignatureError where nothing can be learned or the signature does not belong, UsageError for a detector
+    that is not clear.
+    """
+    setup = read_benchmark_file(file)
+    machine_file = setup.machine_file
+    if signature is not None:
+        stored = read_signature(signature)
+        instance = machine_file.detector(detector or stored.detector)
+        stored.check(machine_file.machine, instance)
+        if stored.joints != setup.watched:
+            names = [", ".join(joints) or "all joints" for joints in (stored.joints, setup.watched)]
+            raise UsageError(f"the signature watches {names[0]}, {file} {names[1]}", "learn one for the same joints")
+        thresholds: Mapping[str, Any] = {instance.name: stored.current}
+        learned = {run.sha256: "" for run in stored.runs}
+        run = detect_with(setup, [instance], thresholds, {})
+        return PreparedBenchmark(
+            setup, instance.name, stored.described, learned, run, stored.plausible, normals_of(stored)
+        )
+    setup = with_detectors(setup, [_chosen(setup, detector)])
+    instance = machine_file.detector(setup.detectors[0])
+    runs = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=setup.path.parent)
+    fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
+    count = len(runs.operations)
+    described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {count} operations"
+    hashes = {operation.recording.digest: operation.recording.name for operation in runs.operations}
+    run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
+    normals = NormalMotions(normal_motions(runs.operations), Absence.FEW_RUNS)
+    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals)
+
+
+def _chosen(setup: BenchmarkFile, detector: str | None) -> str:
+    if detector is None and len(setup.detectors) == 1:
+        return setup.detectors[0]
+    if detector is None:
+        raise UsageError(
+            f"{setup.path} names {len(setup.detectors)} detectors",
+            f"give --detector, one of {', '.join(setup.detectors)}",
+        )
+    name: str = setup.machine_file.detector(detector).name
+    if name not in setup.detectors:
+        raise UsageError(f"{setup.path} does not name detector '{detector}'", nearest(name, setup.detectors))
+    return name

@@ -1,0 +1,31 @@
+"""The settings that make a log's figures: the same in every command that scores one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.truth.labels import Labels
+from cdtool.evaluation.truth.onset import OnsetRule
+
+
+@dataclass(frozen=True)
+class ScoringRules:
+    """When a contact begins and for how long an alarm belongs to it: the onset rule, labels, `window` [s].
+
+    `synchronisation` [s]: how far the load cell's clock may be off. `mass_before_cell` [kg]: what moves with the
+    machine between load cell and contact. Raises UsageError for a setting outside its range.
+    """
+
+    onset: OnsetRule = field(default_factory=OnsetRule)
+    window: float = 1.0
+    labels: Labels | None = None
+    synchronisation: float = 0.0
+    mass_before_cell: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.window > 0.0:
+            raise UsageError(f"window is {self.window:g} s", "more than 0 s")
+        for name, unit in (("synchronisation", "s"), ("mass_before_cell", "kg")):
+            if not getattr(self, name) >= 0.0:
+                raise UsageError(f"{name} is {getattr(self, name):g} {unit}", f"0 {unit} or more")

@@ -1,0 +1,186 @@
+"""`benchmark`, `detect --benchmark` and `explain --benchmark` agree on every number of the same recording."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdtool.cli.console import number
+from cdtool.workflows import prepared_benchmark
+from tests.command import cdtool
+
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
+OF_THE_LOG = ("recording", "group", "detector")
+# What else may make numbers, all of it away from its default.
+SETTINGS = """
+joints = {joints}
+operations = "motion"
+window_s = 0.4
+[activation]
+debounce = 12
+hysteresis = 0.1
+[signature]
+safety_factor = 4.0
+[onset]
+above_n = {above}
+hold_s = 0.005
+sigmas = 6.0
+separation_s = 0.5
+synchronisation_s = 0.004
+labels = "labels.csv"
+[force]
+mass_before_cell_kg = {mass}
+"""
+
+
+@pytest.fixture(autouse=True)
+def learn_once(monkeypatch):
+    """Each command learns the threshold anew; here it is learned once for a file and a detector."""
+    monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", cache(prepared_benchmark.prepare_benchmark))
+
+
+def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
+    """A copy of a sample's benchmark in which everything that makes numbers is other than the default."""
+    base = SAMPLES / sample
+    values = tomllib.loads((base / "benchmark.toml").read_text(encoding="utf-8"))
+    gate = sample == "gate"
+
+    def logs(table: dict[str, Any]) -> str:
+        return json.dumps([str(base / pattern) for pattern in table["logs"]])
+
+    groups = "".join(f"[impacts.{name}]\nlogs = {logs(item)}\n" for name, item in values["impacts"].items())
+    settings = SETTINGS.format(
+        joints='["gate"]' if gate else '["arm"]', above=30.0 if gate else 0.8, mass=20.0 if gate else 0.0
+    )
+    first = sorted((base / "stiff").glob("*.csv"))[0]
+    (folder / "labels.csv").write_text(
+        f"recording,start_s,end_s,kind,uncertainty_s\n{first},{6.25 if gate else 1.5},,bump,0.02\n", encoding="utf-8"
+    )
+    head = f'machine = "{base / "machine.toml"}"\ndetectors = {json.dumps(values["detectors"])}\n'
+    file = folder / "benchmark.toml"
+    top, tables = settings.split("[activation]")
+    file.write_text(
+        f"{head}{top}[activation]{tables}[learn]\nlogs = {logs(values['learn'])}\n{groups}", encoding="utf-8"
+    )
+    return file
+
+
+def rows_of(values: Any) -> dict[tuple[str, int], dict[str, Any]]:
+    """Contact rows by log and number, without what only a benchmark says of them."""
+    found = {}
+    for row in values:
+        log = str(row.get("recording") or row["operation"].partition("#")[0])
+        found[log, row["contact"]] = {
+            name: value for name, value in row.items() if name not in (*OF_THE_LOG, "operation")
+        }
+    return found
+
+
+def check(file: Path, detector: str) -> int:
+    done = cdtool("benchmark", file, "--json", "--detectors", detector)
+    assert done.status in (0, 1, 3), done.err
+    results = json.loads(done.out)
+    truth = rows_of(results["contacts"])
+    assert truth
+    paths = sorted({str(file.parent / log) for log, _ in truth})
+    detected = cdtool("detect", *paths, "--benchmark", file, "--detector", detector, "--json")
+    items = json.loads(detected.out)
+    assert rows_of([row for item in items for row in item["contacts"]]) == truth
+    shown = cdtool("detect", *paths, "--benchmark", file, "--detector", detector).out
+    false = {}
+    for path in paths:
+        values = json.loads(cdtool("explain", path, "--benchmark", file, "--detector", detector, "--json").out)
+        own = rows_of(values["contacts"])
+        assert own and all(truth[key] == row for key, row in own.items())
+        alarms = {item["time_s"]: item for item in values["alarms"] if item["role"] == "detection"}
+        missed = {item["onset_s"]: item for item in values["missed"]}
+        for row in own.values():
+            if row["outcome"] == "detected":
+                item = alarms[row["alarm_s"]]
+                for name in ("onset_s", "statistic", "limit", "side", "joint"):
+                    assert item[name] == row[name]
+                (late,) = re.findall(r"(-?\d+) ms after the contact", item["words"][0]) or [None]
+                if late is not None and not row["clipped"]:
+                    assert int(late) == round(row["latency_ms"])
+                assert number(row["latency_ms"], 3) in shown
+            else:
+                assert missed[row["onset_s"]]["watched_ms"] == row["watched_ms"]
+        for item in values["alarms"]:
+            if item["role"] == "false alarm":
+                false[item["operation"], item["time_s"]] = item["statistic"]
+    names = {item["recording"] for item in results["recordings"] if item["group"] != "holdout"}
+    alone = [item for item in results["false_alarms"] if item["recording"].partition("#")[0] in names]
+    assert {(item["recording"], item["time_s"]): item["statistic"] for item in alone} == false
+    return len(truth)
+
+
+@pytest.mark.parametrize(
+    ("sample", "detector"), [("gate", "pi"), ("gate", "pt"), ("arm/trial_1", "igm"), ("arm/trial_2", "gm")]
+)
+def test_of_every_impact_of_the_sample_logs(sample, detector):
+    assert check(SAMPLES / sample / "benchmark.toml", detector) == (8 if sample == "gate" else 6)
+
+
+@pytest.mark.parametrize(("sample", "detector"), [("gate", "gm"), ("arm/trial_1", "igm")])
+def test_with_every_setting_that_makes_numbers_away_from_its_default(sample, detector, tmp_path):
+    assert check(benchmark_with_other_settings(tmp_path, sample), detector) >= 6
+
+
+def test_the_options_by_hand_give_the_figures_of_the_file(tmp_path):
+    """As `detect` did with 80 ms beside 81 ms: the same levels, the same limit, the same latency."""
+    log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
+    file = tmp_path / "benchmark.toml"
+    file.write_text(
+        f'machine = "{machine}"\ndetectors = ["pi"]\nthreshold = {{ name = "limit", limits = 1.2 }}\n'
+        f'[learn]\nlogs = ["{SAMPLES}/gate/free/*.csv"]\n[impacts.soft]\nlogs = ["{log}"]\nwindow_s = 0.7\n'
+        "[onset]\nabove_n = 25.0\nback_to_n = 5.0\nhold_s = 0.004\nseparation_s = 0.8\nsynchronisation_s = 0.003\n"
+        "[force]\nmass_before_cell_kg = 10.0\n",
+        encoding="utf-8",
+    )
+    options = ("--window", 0.7, "--onset-above", 25, "--onset-back-to", 5, "--onset-hold", 0.004)
+    options += ("--onset-separation", 0.8, "--synchronisation", 0.003, "--mass-before-cell", 10)
+    by_file = json.loads(cdtool("benchmark", file, "--json").out)["contacts"]
+    for command in ("detect", "explain"):
+        by_hand = json.loads(cdtool(command, log, "-m", machine, "-d", "pi", "--limit", 1.2, *options, "--json").out)
+        rows = by_hand[0]["contacts"] if command == "detect" else by_hand["contacts"]
+        assert list(rows_of(rows).values()) == list(rows_of(by_file).values())
+
+
+@pytest.mark.parametrize("command", ["detect", "explain"])
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--machine", "m.toml"),
+        ("--operations", "whole"),
+        ("--limit", "3"),
+        ("--debounce", 3),
+        ("--no-latch",),
+        ("--onset-above", 3),
+        ("--onset-hold", 0),
+        ("--onset-sigmas", 5),
+        ("--labels", "l.csv"),
+        ("--window", 1),
+        ("--mass-before-cell", 0),
+    ],
+)
+def test_a_setting_beside_the_benchmark_file_is_refused(command, option):
+    file = SAMPLES / "gate" / "benchmark.toml"
+    done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
+    assert done.status == 2
+    assert done.err.startswith(f"error: {'--latch' if option[0] == '--no-latch' else option[0]} is given beside")
+
+
+def test_a_detector_has_to_be_named_where_the_file_names_several():
+    file = SAMPLES / "gate" / "benchmark.toml"
+    done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
+    assert done.status == 2 and "names 5 detectors (give --detector, one of pure_inertia" in done.err
+    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, "-d", "vo")
+    assert done.status == 2 and "does not name detector 'vo'" in done.err
+    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi", "--limit", 3)
+    assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
