@@ -5,9 +5,13 @@ from __future__ import annotations
 import errno
 import gc
 import logging
+import signal
 import sys
+import threading
 import traceback
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
@@ -58,6 +62,8 @@ app.command("list")(list_known)
 
 # As a shell counts it: 128 and the number of the signal that Ctrl-C sends.
 _INTERRUPTED = 130
+# What a service manager or a pipeline sends to end a command, and a terminal that is closed.
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 def _show_version(wanted: bool) -> None:
@@ -77,7 +83,7 @@ def _options(
     """How fast, how surely and at which force does a machine notice that it has hit something?
 
     Exit status: 0 done, 1 a limit is broken, 2 wrong usage or nothing usable, 3 done but some data was left out,
-    130 interrupted.
+    130 interrupted, 143 terminated.
     """
 
 
@@ -85,8 +91,34 @@ def _show_note(message: Warning | str, *_: object, **__: object) -> None:
     typer.echo(f"note: {message}", err=True)
 
 
+@contextmanager
+def _ending_as_if_interrupted() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP undo what is half written, as Ctrl-C does; the exit status is 128 and their number."""
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_IGN)  # a second one must not stop the undoing
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in _ENDING}
+    for number in (number for number, handler in before.items() if handler == signal.SIG_DFL):
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
+    with _ending_as_if_interrupted():
+        _main()
+
+
+def _main() -> None:
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)
     warnings.showwarning = _show_note
@@ -104,6 +136,8 @@ def main() -> None:
     except SystemExit as end:
         if end.code == _INTERRUPTED:
             typer.echo("interrupted", err=True)
+        elif end.code in {128 + number for number in _ENDING}:
+            typer.echo("terminated", err=True)
         # click ends with 1 where the reader has gone; here 1 means a broken limit.
         if isinstance(end.__context__, OSError) and end.__context__.errno == errno.EPIPE:
             sys.exit(ExitStatus.OK)

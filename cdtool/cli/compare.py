@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import plain, table
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import ForceOption, JsonOption
 from cdtool.errors import ExitStatus
 from cdtool.plain_text import shorten
 
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 _WIDTH = 100
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 _SHOWN = 10
-# How each file of a comparison begins.
-_MARKS = {".md": b"**cdtool compare: ", ".json": b'{\n "verdict": "'}
 
 
 def compare(
@@ -33,6 +31,7 @@ def compare(
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="Where to, repeatable: .md (a pull request), .json.")
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Tell a real change between two builds from noise: latency, misses, false alarms, force at the alarm.
@@ -42,15 +41,13 @@ def compare(
 
     Example: cdtool compare old.json new.json -o compare.md
     """
+    from cdtool.foreign_files import refuse_inputs
     from cdtool.report.build_report import check_outputs, to_json, write_outputs
     from cdtool.workflows.comparing import compare as run
-    from cdtool.workflows.written_file import refuse_inputs, refuse_other_kind
 
     targets = output or []
-    check_outputs(targets)
     refuse_inputs(targets, (old, new))
-    for target in targets:
-        refuse_other_kind(target, _MARKS[target.suffix.lower()], "comparison of cdtool")
+    check_outputs(targets, force=force)
     found = run(old, new, significance=level)
     write_outputs(found, targets)
     if as_json:

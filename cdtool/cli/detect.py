@@ -12,6 +12,7 @@ from cdtool.cli.detect_shown import as_rows, show_detected
 from cdtool.cli.options import (
     DebounceOption,
     DetectorOption,
+    ForceOption,
     HysteresisOption,
     JointsOption,
     JsonOption,
@@ -27,7 +28,7 @@ from cdtool.cli.options import (
     limits_of,
     listed,
 )
-from cdtool.errors import CdtoolError, ExitStatus, SignatureError, UsageError
+from cdtool.errors import CdtoolError, ExitStatus, OutputError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def detect(
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run one detector over logs and show its alarms.
@@ -70,7 +72,7 @@ def detect(
     machine_file = read_machine_file(machine)
     limits = limits_of(limit)
     contact = ContactPoint.parse(contact_at) if contact_at else None
-    plot_names = _plot_names(plot, logs)
+    plot_names = _plot_names(plot, logs, force=force)
     done: list[tuple[Path, Detected]] = []
     forces: dict[str, ForceSummary] = {}
     skipped: list[Skipped] = []
@@ -98,8 +100,8 @@ def detect(
 
                     plot_detected(found, plot_names[log])
             except CdtoolError as fault:
-                # What is wrong with the call or the signature is wrong for every log.
-                if len(logs) == 1 or isinstance(fault, UsageError | SignatureError):
+                # What is wrong with the call, the signature or the disk is wrong for every log.
+                if len(logs) == 1 or isinstance(fault, UsageError | SignatureError | OutputError):
                     raise
                 skipped.append(Skipped(str(log), str(fault)))
             if advance:
@@ -122,12 +124,13 @@ def detect(
     leave(skipped)
 
 
-def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
+def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:
     if plot is None:
         return {}
     if len(logs) == 1 and not plot.is_dir():
-        return {logs[0]: figure_name(plot)}
+        return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
         raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
+    names = {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
     plot.mkdir(parents=True, exist_ok=True)
-    return {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
+    return {log: figure_name(path, force=force) for log, path in names.items()}
