@@ -26,14 +26,14 @@ static long wanted_count;
 static long counts[KINDS];
 static char in_folder[HANDLES];
 
-void failing_calls_set(const char *path, int kind, long count, int error, int signal_number) {
+void failing_calls_set(const char *path, int kind, int count, int error, int signal_number) {
     strncpy(folder, path, sizeof folder - 1);
     folder_length = strlen(folder);
     memset(counts, 0, sizeof counts);
     wanted_kind = kind; wanted_count = count; wanted_error = error; wanted_signal = signal_number;
 }
 
-long failing_calls_count(int kind) { return counts[kind]; }
+int failing_calls_count(int kind) { return (int)counts[kind]; }
 
 static int below(const char *path) {
     return folder_length && path && strncmp(path, folder, folder_length) == 0;
