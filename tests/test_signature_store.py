@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -122,6 +123,25 @@ def test_concurrent_updates_lose_no_run(tmp_path, learned):
     ]
     assert [worker.wait(120) for worker in workers] == [0] * 4
     assert len(read_signature(path).runs) == len(learned.runs) + 20
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="links as POSIX has them")
+def test_eight_processes_that_update_by_three_paths_one_of_them_a_link_lose_no_run(tmp_path, learned):
+    """48 runs, six by each process; through the link 20 of them were lost."""
+    (tmp_path / "store").mkdir()
+    path = tmp_path / "store" / "s.json"
+    write_signature(path, learned)
+    (tmp_path / "link.json").symlink_to("store/s.json")
+    paths = (path, tmp_path / "link.json", tmp_path / "store" / ".." / "store" / "s.json")
+    workers = [
+        subprocess.Popen([sys.executable, "-c", WORKER, str(paths[k % 3]), str(k), "6"], cwd=Path(__file__).parents[1])
+        for k in range(8)
+    ]
+    assert [worker.wait(300) for worker in workers] == [0] * 8
+    added = {run.name for run in read_signature(path).runs[len(learned.runs) :]}
+    assert added == {f"{worker}.{k}" for worker in range(8) for k in range(6)}
+    assert (tmp_path / "link.json").is_symlink()
+    assert {item.name for item in tmp_path.rglob("*")} == {"store", "s.json", "link.json"}
 
 
 def test_an_update_that_fails_changes_nothing(tmp_path, learned):

@@ -48,7 +48,7 @@ def benchmark(
             jobs=jobs,
             progress=advance,
         )
-    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force)
+    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)

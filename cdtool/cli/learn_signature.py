@@ -78,6 +78,7 @@ def learn_signature(
     Example: cdtool learn-signature free/*.csv --machine machine.toml --detector feekf -o gate.feekf.json
     """
     from cdtool.evaluation.truth.onset import OnsetRule
+    from cdtool.files import resolved
     from cdtool.foreign_files import refuse_other_kind
     from cdtool.machine_file import read_machine_file
     from cdtool.plain_text import counted
@@ -87,6 +88,7 @@ def learn_signature(
     from cdtool.workflows.threshold_settings import rule_of
 
     check_name(output)
+    resolved(output)
     refuse_other_kind(output, SIGNATURE)
     machine_file = read_machine_file(machine)
     own: dict[str, Any] = {"rule": rule, "alignment": align, "force": force}

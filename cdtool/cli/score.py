@@ -44,7 +44,7 @@ def score(
     with progress("scoring") as advance:
         done = run(triggers, benchmark, clock=clock, listed_only=listed_only, jobs=jobs, progress=advance)
     results = done.evaluated.results
-    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force)
+    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     print_skipped(results.skipped, results.findings)
     if as_json:
         typer.echo(to_json(results), nl=False)

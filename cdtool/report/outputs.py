@@ -16,7 +16,7 @@ from cdtool.evaluation.traces.file import as_read, encode_traces, traces_path
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.file_locks import is_temporary
 from cdtool.files import replaced, replaced_folder, resolved, write_text
-from cdtool.foreign_files import FIGURES, Kind, refuse_other_kind
+from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.report.plots.figures import SUFFIXES
 
@@ -122,8 +122,15 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
                 refuse_other_kind(path, _KINDS[path.suffix.lower()], force=force)
 
 
-def write_outputs(report: Report, targets: Sequence[Path], *, force: bool = False) -> list[Path]:
-    """Write every target; returns what to show: the files, and of a folder its report. Raises CdtoolError."""
+def write_outputs(
+    report: Report, targets: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()
+) -> list[Path]:
+    """Write every target; returns what to show: the files, and of a folder its report. Raises CdtoolError.
+
+    `inputs` were read and are never written to, `force` or not.
+    """
+    folders = [target for target in targets if target.is_dir()]
+    refuse_inputs([*targets, *(folder / name for folder in folders for name in _IN_FOLDER)], inputs)
     check_outputs(targets, force=force)
     if targets:
         report = replace(report, traces=as_read(report.traces))
