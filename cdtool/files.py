@@ -92,34 +92,40 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
     target = resolved(path)
     if target.exists() and not target.is_dir():
         raise UsageError(f"{plain(path)}: exists and is no folder", "choose another name")
-    new_parents = [folder for folder in target.parents if not folder.exists()]
-    with _explained(path, []):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists() and not os.access(target, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    if target.exists() and not os.access(target, os.W_OK | os.X_OK):
+        raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
     whole = not has_to_stay(target) and (may_replace is None or not target.exists() or may_replace(target))
     place = target.parent if whole else target
     part = temporary_name(target, place)
+    with made_folder(target.parent), _explained(path, [(part, path)]), holding(target, place, path):
+        try:
+            _temporaries.add(part)
+            part.mkdir()
+            yield part
+            _flush_tree(part)
+            if target.exists() and may_replace is not None:  # as it is now, not as it was a while ago
+                whole = may_replace(target) and whole
+            if not (whole and _put_whole(part, target)):
+                _put_in_place([(item, target / item.name) for item in sorted(part.iterdir())])
+                _flush(target)
+            _flush(place)
+        finally:
+            _discard([part])
+
+
+@contextmanager
+def made_folder(path: Path) -> Iterator[Path]:
+    """A folder, made with its missing parents; what was made and is empty in the end is removed again."""
+    target = resolved(path)
+    made = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
-        with _explained(path, [(part, path)]), holding(target, place, path):
-            try:
-                _temporaries.add(part)
-                part.mkdir()
-                yield part
-                _flush_tree(part)
-                if target.exists() and may_replace is not None:  # as it is now, not as it was a while ago
-                    whole = may_replace(target) and whole
-                if not (whole and _put_whole(part, target)):
-                    _put_in_place([(item, target / item.name) for item in sorted(part.iterdir())])
-                    _flush(target)
-                _flush(place)
-            finally:
-                _discard([part])
-    except BaseException:
-        for folder in new_parents:
+        with _explained(path, []):
+            target.mkdir(parents=True, exist_ok=True)
+        yield target
+    finally:
+        for folder in made:
             with suppress(OSError):
                 folder.rmdir()
-        raise
 
 
 def resolved(path: Path) -> Path:

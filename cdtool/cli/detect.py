@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,6 +65,7 @@ def detect(
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
+    from cdtool.files import made_folder
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
@@ -76,7 +78,8 @@ def detect(
     done: list[tuple[Path, Detected]] = []
     forces: dict[str, ForceSummary] = {}
     skipped: list[Skipped] = []
-    with progress("detecting") as advance:
+    folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
+    with folder, progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
             try:
                 found = run(
@@ -132,5 +135,6 @@ def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Pat
     if plot.suffix:
         raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
     names = {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
-    plot.mkdir(parents=True, exist_ok=True)
-    return {log: figure_name(path, force=force) for log, path in names.items()}
+    if plot.is_dir():
+        names = {log: figure_name(path, force=force) for log, path in names.items()}
+    return names
