@@ -6,8 +6,9 @@ preloaded (failing_calls.c, built with the system's compiler; without one there 
 Each command runs through its real entry point in a process of its own, forked from one that has the imports done.
 
 After a kill each file, or each report folder, must be the old or the new one, to the byte; a SIGKILL may leave hidden
-temporaries, which the next write removes. After a fault, SIGTERM or SIGINT all files of the command are old, or all are
-new, nothing else is there, and the status is the documented one: 2 with one line "error: ...", 143, 130.
+temporaries, which the next write removes. After a fault, SIGTERM or SIGINT each target is old or new with all that
+belongs to it (results and traces, a converted log and its machine file), nothing else is there, and the status is the
+documented one: 2 with one line "error: ...", 143, 130.
 
 python benchmarks/kills_and_faults.py                          # 500 and 500
 python benchmarks/kills_and_faults.py --kills 50 --faults 50   # as in CI
@@ -161,6 +162,8 @@ def _measure(folder: Path, calls: Any, options: argparse.Namespace) -> int:
                 if not struck:
                     continue  # the command had ended before
                 tried += 1
+                if tried % 25 == 0:
+                    print(f"{tried} {what}, {len(wrong)} wrong", file=sys.stderr, flush=True)
                 done[problem.partition(":")[0] if problem else "old or new"] += 1
                 if problem:
                     wrong.append(f"{case.name}: {strike}: {problem}")
@@ -257,6 +260,7 @@ def _hard_kill(known: Known, left: Snapshot, out: Path) -> str:
         states = [_part(files, unit) for files in (known.old_files, known.new_files)]
         if _part(left, unit) not in states:
             return f"corrupt: {unit}"
+    write_text(out / "next", "")
     for folder in (out, *(path for path in out.iterdir() if path.is_dir())):
         write_text(folder / "next", "")
         (folder / "next").unlink()
@@ -265,13 +269,23 @@ def _hard_kill(known: Known, left: Snapshot, out: Path) -> str:
 
 
 def _soft_end(known: Known, left: Snapshot) -> str:
-    if left in (known.old_files, known.new_files):
-        return ""
     strays = sorted({*left} - {*known.old_files} - {*known.new_files})
     if strays:
         return f"strays: {strays[0]}"
-    changed = [name for name in left if left[name] not in (known.old_files.get(name), known.new_files.get(name))]
-    return f"corrupt: {changed[0]}" if changed else "corrupt: some files old, some new"
+    for target in sorted({_target(name) for name in {*left, *known.old_files, *known.new_files}}):
+        states = [_of_target(files, target) for files in (known.old_files, known.new_files)]
+        if _of_target(left, target) not in states:
+            return f"corrupt: {target}"
+    return ""
+
+
+def _target(name: str) -> str:
+    """What a file belongs to: its folder, results with their traces, a converted log with its machine file."""
+    return Path(name).parts[0].replace(".traces.json.gz", ".json").replace(".machine.toml", "")
+
+
+def _of_target(files: Snapshot, target: str) -> Snapshot:
+    return {name: value for name, value in files.items() if _target(name) == target}
 
 
 def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
