@@ -36,6 +36,10 @@ class RecordingError(CdtoolError):
     """A recording cannot be read, or lacks what is needed."""
 
 
+class OutputError(CdtoolError):
+    """A file or folder cannot be written: what was there before is still there."""
+
+
 class SignatureError(CdtoolError):
     """A signature cannot be learned, read, or does not belong to what it is applied to."""
 

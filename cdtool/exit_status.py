@@ -19,7 +19,9 @@ class ExitStatus(IntEnum):
     LOST = 3
     INCONCLUSIVE = 4
     INTERRUPTED = 130
-    """128 and the number of the signal that Ctrl-C sends, as a shell counts it."""
+    """128 and the number of the signal that Ctrl-C sends, as a shell counts it; so are the next two."""
+    TERMINATED = 143
+    HUNG_UP = 129
 
 
 class Fact(Enum):
@@ -69,6 +71,8 @@ STATUSES: Mapping[ExitStatus, str] = {
     ExitStatus.LOST: "done, but something was lost or left out, or nothing could be assessed",
     ExitStatus.INCONCLUSIVE: "inconclusive or incomplete: the recordings do not suffice for what was asked",
     ExitStatus.INTERRUPTED: "interrupted with Ctrl-C: a file that was being written is left as it was",
+    ExitStatus.TERMINATED: "terminated by SIGTERM, in the same way",
+    ExitStatus.HUNG_UP: "the terminal was closed (SIGHUP), in the same way",
 }
 """What each status means, in one line."""
 

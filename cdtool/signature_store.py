@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,9 @@ from typing import Any
 from cdtool.activation import Activation
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.dynamics import Gain
-from cdtool.errors import SignatureError, UsageError
+from cdtool.errors import OutputError, SignatureError, UsageError
+from cdtool.files import locked, write_text
+from cdtool.foreign_files import Kind
 from cdtool.operations import HOW_TO_CUT
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
@@ -28,32 +29,16 @@ SCHEMA_VERSION = 4
 _READABLE = (3, SCHEMA_VERSION)
 _KIND = "cdtool signature"
 # Every signature file begins with it: `_to_json` names its kind first.
-MARK = f'"kind": "{_KIND}"'.encode()
-_LOCK_SECONDS = 60.0
+SIGNATURE = Kind(f'"kind": "{_KIND}"'.encode(), "signature")
 
 
 def write_signature(path: str | Path, signature: SignatureFile) -> None:
-    """Write a file in .json atomically: a temporary file, fsync, rename, fsync of the folder. Raises SignatureError."""
+    """Write a file in .json, whole or not at all (see `cdtool.files`). Raises SignatureError."""
     file = Path(path)
     check_name(file)
     text = json.dumps(_to_json(signature), allow_nan=False)
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{file.name}.", suffix=".tmp", dir=file.parent)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as stream:
-                stream.write(text)
-                stream.flush()
-                os.fsync(stream.fileno())
-            Path(name).chmod(0o644)
-            Path(name).replace(file)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-        _sync_folder(file.parent)
-    except OSError as fault:
-        raise SignatureError(
-            f"{file}: cannot be written: {fault.strerror or fault}", "check folder and space"
-        ) from fault
+    with _faults():
+        write_text(file, text)
 
 
 def check_name(file: Path) -> None:
@@ -90,18 +75,21 @@ def read_signature(path: str | Path) -> SignatureFile:
 
 def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
     """Read, change and write under a lock, so that no concurrent update is lost. Raises SignatureError."""
-    from filelock import FileLock, Timeout
+    with _faults(), locked(Path(path)):
+        stored = read_signature(path)
+        changed = change(stored)
+        if changed is not stored:
+            write_signature(path, changed)
+        return changed
 
-    file = Path(path)
+
+@contextmanager
+def _faults() -> Iterator[None]:
+    """What goes wrong with writing, as a SignatureError."""
     try:
-        with FileLock(f"{file}.lock", timeout=_LOCK_SECONDS):
-            stored = read_signature(file)
-            changed = change(stored)
-            if changed is not stored:
-                write_signature(file, changed)
-            return changed
-    except Timeout as fault:
-        raise SignatureError(f"{file}: locked by another process", f"remove {file}.lock if none runs") from fault
+        yield
+    except (OutputError, UsageError) as fault:
+        raise SignatureError(fault.message, fault.hint) from fault
 
 
 def _to_json(signature: SignatureFile) -> dict[str, Any]:
@@ -180,13 +168,3 @@ def _activation(values: Mapping[str, Any]) -> Activation:
 
 def _gain(value: Any) -> Gain:
     return tuple(map(float, value)) if isinstance(value, list) else float(value)
-
-
-def _sync_folder(folder: Path) -> None:
-    if not hasattr(os, "O_DIRECTORY"):
-        return  # Windows: a folder cannot be synced
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError, UsageError
+from cdtool.errors import OutputError, RecordingError, UsageError
+from cdtool.files import replaced
 from cdtool.formats.reading import survey
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.converting import _WRITERS, convert
 from cdtool.workflows.runs import read_log
-from cdtool.workflows.written_file import written_file
 from tests.command import cdtool
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
 
@@ -173,7 +173,7 @@ def test_a_write_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("cdtool.formats.csv_writing.write_csv_table", fail)
-    with pytest.raises(RecordingError, match=r"out\.csv: cannot be written: No space left on device"):
+    with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device"):
         convert(log, tmp_path / "out.csv", machine=machine)
     assert sorted(tmp_path.iterdir()) == before
 
@@ -187,7 +187,7 @@ def test_an_unknown_suffix_lists_what_can_be_written(tmp_path):
 def test_a_log_without_a_clock_goes_where_none_is_needed_only(tmp_path):
     log = tmp_path / "run.csv"
     log.write_text("a,b\n" + "".join(f"{k % 7},{k % 5}\n" for k in range(50)))
-    with pytest.raises(UsageError, match=r"no column of the log looks like its clock, and \.mcap needs one"):
+    with pytest.raises(UsageError, match=r"no column of the log looks like its clock, and this container needs one"):
         convert(log, tmp_path / "out.mcap")
     assert convert(log, tmp_path / "out.csv").columns == 2
 
@@ -246,7 +246,7 @@ PROVENANCE = {
 
 def test_an_error_names_the_file_that_was_asked_for_and_not_the_temporary_one(tmp_path):
     target = tmp_path / "out.parquet"
-    with pytest.raises(RecordingError, match=r"out\.parquet: no pyarrow") as told, written_file(target) as part:
+    with pytest.raises(RecordingError, match=r"out\.parquet: no pyarrow") as told, replaced(target) as (part,):
         raise RecordingError(f"{part}: no pyarrow", "pip install 'cdtool[parquet]'")
     assert part.name not in str(told.value) and "pip install" in told.value.hint
     assert list(tmp_path.iterdir()) == []

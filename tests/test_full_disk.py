@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.errors import RecordingError
+from cdtool.errors import OutputError, RecordingError
+from cdtool.files import replaced
 from cdtool.formats.groups import Part
 from cdtool.workflows.converting import convert
 from cdtool.workflows.log_rows import LogRows
-from cdtool.workflows.written_file import written_file
 from tests.test_converting import KINDS, needs, table
 
 # A disk that is full as far as a process can tell: no file may grow beyond some KiB.
@@ -61,8 +61,8 @@ def test_a_disk_that_gets_full_is_one_line_and_leaves_what_was_there(suffix, lim
 def test_a_full_device_behind_a_written_file_names_the_file(tmp_path):
     target = tmp_path / "out.csv"
     with (
-        pytest.raises(RecordingError, match=r"out\.csv: cannot be written: No space left on device") as told,
-        written_file(target),
+        pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device") as told,
+        replaced(target),
         Path("/dev/full").open("w") as file,
     ):
         file.write("1,2\n")

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import gc
 import logging
+import signal
 import sys
+import threading
 import traceback
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -61,6 +65,8 @@ app.add_typer(simulate, name="simulate")
 app.add_typer(study, name="study")
 
 _WHAT_FOR = "How fast, how surely and at which force does a machine notice that it has hit something?"
+# What a service manager or a pipeline sends to end a command, and a terminal that is closed.
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 def _show_version(wanted: bool) -> None:
@@ -104,8 +110,34 @@ def _print_usage_error(fault: Any) -> None:
     print_error(UsageError(message, f"see {command} --help"))
 
 
+@contextmanager
+def _ending_as_if_interrupted() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP undo what is half written, as Ctrl-C does; the exit status is 128 and their number."""
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_IGN)  # a second one must not stop the undoing
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in _ENDING}
+    for number in (number for number, handler in before.items() if handler == signal.SIG_DFL):
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
+    with _ending_as_if_interrupted():
+        _main()
+
+
+def _main() -> None:
     open_standard_streams()
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)
@@ -124,6 +156,8 @@ def main() -> None:
     except SystemExit as end:
         if end.code == ExitStatus.INTERRUPTED:
             typer.echo("interrupted", err=True)
+        elif end.code in {128 + number for number in _ENDING}:
+            typer.echo("terminated", err=True)
         raise
     except OSError as fault:
         from cdtool.cli.console import print_error

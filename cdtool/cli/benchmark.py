@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
-from cdtool.cli.options import JobsOption, JsonOption, OutputOption, listed
+from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption, listed
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
 
@@ -16,6 +16,7 @@ from cdtool.errors import UsageError
 def benchmark(
     file: Annotated[Path, typer.Argument(help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE")],
     output: OutputOption = None,
+    force: ForceOption = False,
     detectors: Annotated[
         str | None,
         typer.Option("--detectors", help="Others than the file's, as gm,vo,eo; all: every one that the logs allow."),
@@ -38,7 +39,7 @@ def benchmark(
     from cdtool.workflows.benchmark import benchmark as run
 
     targets = output or []
-    check_outputs(targets)
+    check_outputs(targets, force=force)
     with progress("benchmark") as advance:
         done = run(
             file,
@@ -47,7 +48,7 @@ def benchmark(
             jobs=jobs,
             progress=advance,
         )
-    written = write_outputs(Report(done.evaluated, done.traces), targets)
+    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import columns_to_fill, leave, plain, table
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import ForceOption, JsonOption
 from cdtool.exit_status import Fact
 from cdtool.plain_text import shorten
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 _SHOWN = 10
-# How each file of a comparison begins.
-_MARKS = {".md": b"**cdtool compare: ", ".json": b'{\n "verdict": "'}
 
 
 def compare(
@@ -48,6 +46,7 @@ def compare(
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="Where to, repeatable: .md (a pull request), .json.")
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare two builds, a real change apart from noise: latency, misses, false alarms, force at the alarm.
@@ -57,15 +56,13 @@ def compare(
 
     Example: cdtool compare old.json new.json -o compare.md
     """
+    from cdtool.foreign_files import refuse_inputs
     from cdtool.report.build_report import check_outputs, to_json, write_outputs
     from cdtool.workflows.comparing import compare as run
-    from cdtool.workflows.written_file import refuse_inputs, refuse_other_kind
 
     targets = output or []
-    check_outputs(targets)
     refuse_inputs(targets, (old, new))
-    for target in targets:
-        refuse_other_kind(target, _MARKS[target.suffix.lower()], "comparison of cdtool")
+    check_outputs(targets, force=force)
     found = run(old, new, significance=level, relevant_change=relevant_change)
     write_outputs(found, targets)
     if as_json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from cdtool.cli.options import (
     BenchmarkOption,
     DebounceOption,
     DetectorOption,
+    ForceOption,
     HysteresisOption,
     JointsOption,
     JsonOption,
@@ -36,7 +38,7 @@ from cdtool.cli.options import (
     listed,
 )
 from cdtool.cli.scoring_options import refuse_beside_benchmark, rules_of
-from cdtool.errors import CdtoolError, SignatureError, UsageError
+from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact
 
@@ -73,6 +75,7 @@ def detect(
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run one detector over logs and show its alarms.
@@ -82,6 +85,7 @@ def detect(
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
+    from cdtool.files import made_folder
     from cdtool.machine_file import read_machine_file
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
@@ -129,11 +133,12 @@ def detect(
         mass_before_cell=mass_before_cell,
     )
     contact = ContactPoint.parse(contact_at) if contact_at else None
-    plot_names = _plot_names(plot, logs)
+    plot_names = _plot_names(plot, logs, force=force)
     done: list[tuple[Path, Detected]] = []
     forces: dict[str, ForceSummary] = {}
     skipped: list[Skipped] = []
-    with progress("detecting") as advance:
+    folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
+    with folder, progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
             try:
                 found = (
@@ -161,8 +166,8 @@ def detect(
 
                     plot_detected(found, plot_names[log])
             except CdtoolError as fault:
-                # What is wrong with the call or the signature is wrong for every log.
-                if len(logs) == 1 or isinstance(fault, UsageError | SignatureError):
+                # What is wrong with the call, the signature or the disk is wrong for every log.
+                if len(logs) == 1 or isinstance(fault, UsageError | SignatureError | OutputError):
                     raise
                 skipped.append(Skipped(str(log), str(fault)))
             if advance:
@@ -186,12 +191,14 @@ def detect(
     leave(skipped, print_not_assessable((str(log), found.detections) for log, found in done))
 
 
-def _plot_names(plot: Path | None, logs: list[Path]) -> dict[Path, Path]:
+def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:
     if plot is None:
         return {}
     if len(logs) == 1 and not plot.is_dir():
-        return {logs[0]: figure_name(plot)}
+        return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
         raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
-    plot.mkdir(parents=True, exist_ok=True)
-    return {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
+    names = {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
+    if plot.is_dir():
+        names = {log: figure_name(path, force=force) for log, path in names.items()}
+    return names

@@ -14,6 +14,7 @@ from cdtool.cli.options import (
     BenchmarkOption,
     DebounceOption,
     DetectorOption,
+    ForceOption,
     HysteresisOption,
     JointsOption,
     JsonOption,
@@ -74,6 +75,7 @@ def explain(
         Path | None,
         typer.Option("--plot", help="PNG, SVG or PDF to draw the first event into; an existing folder: all events."),
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Explain why each alarm of a log came and why each contact was missed.
@@ -87,7 +89,7 @@ def explain(
     from cdtool.workflows.prepared_benchmark import prepare_benchmark
     from cdtool.workflows.runs import lost
 
-    drawn = plot if plot is None or plot.is_dir() else figure_name(plot)
+    drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
     prepared = None
     if benchmark is not None:
         refuse_beside_benchmark(
@@ -143,7 +145,7 @@ def explain(
         print_json(_as_json(log, explained))
     else:
         _show(explained)
-    for path in _draw(explained, drawn, log.stem):
+    for path in _draw(explained, drawn, log.stem, force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
     leave(skipped, print_not_assessable([(str(log), explained.found.detections)]))
@@ -193,7 +195,7 @@ def _show_event(item: Explanation) -> None:
     typer.echo()
 
 
-def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:
+def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) -> list[Path]:
     """One figure of the first event, or one an event in a folder; the files that were written."""
     if plot is None:
         return []
@@ -201,6 +203,7 @@ def _draw(explained: Explained, plot: Path | None, stem: str) -> list[Path]:
 
     events = explained.events[: _SHOWN if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
+    paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):
         plot_explanation(detection, item, path)
     return paths

@@ -78,16 +78,18 @@ def learn_signature(
     Example: cdtool learn-signature free/*.csv --machine machine.toml --detector feekf -o gate.feekf.json
     """
     from cdtool.evaluation.truth.onset import OnsetRule
+    from cdtool.files import resolved
+    from cdtool.foreign_files import refuse_other_kind
     from cdtool.machine_file import read_machine_file
     from cdtool.plain_text import counted
-    from cdtool.signature_store import MARK, check_name, write_signature
+    from cdtool.signature_store import SIGNATURE, check_name, write_signature
     from cdtool.thresholds.signature import ENOUGH_RUNS
     from cdtool.workflows.learning import learn_signature as learn
     from cdtool.workflows.threshold_settings import rule_of
-    from cdtool.workflows.written_file import refuse_other_kind
 
     check_name(output)
-    refuse_other_kind(output, MARK, "signature")
+    resolved(output)
+    refuse_other_kind(output, SIGNATURE)
     machine_file = read_machine_file(machine)
     own: dict[str, Any] = {"rule": rule, "alignment": align, "force": force}
     own |= {"safety_factor": safety_factor} if safety_factor is not None else {}

@@ -88,6 +88,7 @@ OutputOption = Annotated[
         help="Where to, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
     ),
 ]
+ForceOption = Annotated[bool, typer.Option("--force", help="Also replace files that cdtool did not write.")]
 JobsOption = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Logs read and analysed side by side.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
@@ -108,12 +109,14 @@ def limits_of(text: str) -> tuple[float, ...]:
     return limits
 
 
-def figure_name(plot: Path) -> Path:
-    """The file of --plot; raises UsageError where its name is none of a figure, or its folder is missing."""
+def figure_name(plot: Path, *, force: bool) -> Path:
+    """The file of --plot; raises UsageError for a name of no figure, a missing folder, a file that is not ours."""
+    from cdtool.foreign_files import refuse_foreign_figure
     from cdtool.report.plots.figures import SUFFIXES
 
     if plot.suffix.lower() not in SUFFIXES:
         raise UsageError(f"--plot is '{plot}'", f"a name that ends in {', '.join(SUFFIXES)}")
     if not plot.parent.is_dir():
         raise UsageError(f"--plot is '{plot}': no folder {plot.parent}", "make it first")
+    refuse_foreign_figure(plot, force=force)
     return plot

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from cdtool.cli.console import plain, print_skipped
-from cdtool.cli.options import OutputOption
+from cdtool.cli.options import ForceOption, OutputOption
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def report(
     results: Annotated[Path, typer.Argument(help="results.json of a benchmark.", metavar="RESULTS")],
     output: OutputOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Make reports of a benchmark again, without its recordings.
 
@@ -27,11 +28,11 @@ def report(
     from cdtool.workflows.reporting import load_report
 
     targets = output or []
-    check_outputs(targets)
+    check_outputs(targets, force=force)
     evaluated, traces, note = load_report(results)
     if note:
         typer.echo(f"note: {plain(note)}", err=True)
-    written = write_outputs(Report(evaluated, traces), targets)
+    written = write_outputs(Report(evaluated, traces), targets, force=force)
     print_skipped(evaluated.results.skipped, evaluated.results.findings)
     show_conclusion(evaluated)
     show_table(evaluated)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
-from cdtool.cli.options import JobsOption, JsonOption, OutputOption
+from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
@@ -20,6 +20,7 @@ def score(
         Path, typer.Option("--benchmark", "-b", help="Benchmark file: the recordings, their contacts, the rules.")
     ],
     output: OutputOption = None,
+    force: ForceOption = False,
     clock: Annotated[
         Literal["recording", "source"],
         typer.Option("--clock", help="Trigger times on the recording's clock as cdtool shows it, or the source's."),
@@ -39,11 +40,11 @@ def score(
     from cdtool.workflows.score_triggers import score as run
 
     targets = output or []
-    check_outputs(targets)
+    check_outputs(targets, force=force)
     with progress("scoring") as advance:
         done = run(triggers, benchmark, clock=clock, listed_only=listed_only, jobs=jobs, progress=advance)
     results = done.evaluated.results
-    written = write_outputs(Report(done.evaluated, done.traces), targets)
+    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     print_skipped(results.skipped, results.findings)
     if as_json:
         typer.echo(to_json(results), nl=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
-from cdtool.cli.options import JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
+from cdtool.cli.options import ForceOption, JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import UsageError
 from cdtool.exit_status import Fact, statuses_words
@@ -37,7 +37,7 @@ PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF
 
 
 @signature.command("show", epilog=statuses_words("signature show"))
-def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = False) -> None:
+def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False, as_json: JsonOption = False) -> None:
     """What a signature file holds: machine, detector, threshold, classes of motion, runs, and its drift since learned.
 
     Example: cdtool signature show gate.feekf.json --plot signature.png
@@ -45,7 +45,7 @@ def show(file: FileArgument, plot: PlotOption = None, as_json: JsonOption = Fals
     from cdtool.signature_store import read_signature
     from cdtool.workflows.upkeep import signatures_in
 
-    drawn = figure_name(plot) if plot else None
+    drawn = figure_name(plot, force=force) if plot else None
     stored = read_signature(file)
     pairs = signatures_in(stored) if drawn else ()
     if as_json:
@@ -78,6 +78,7 @@ def check(
         Path | None,
         typer.Option("--plot", help="PNG, SVG or PDF of the drift; a folder for several classes."),
     ] = None,
+    force: ForceOption = False,
     onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
@@ -93,7 +94,7 @@ def check(
     from cdtool.workflows.upkeep import check_signature
 
     if plot is not None and not plot.is_dir():
-        figure_name(plot)
+        figure_name(plot, force=force)
     with progress("reading runs") as advance:
         checked = check_signature(
             file,
@@ -105,7 +106,7 @@ def check(
             jobs=jobs,
             progress=advance,
         )
-    names = _plot_names(plot, checked)
+    names = _plot_names(plot, checked, force=force)
     print_skipped(checked.skipped, checked.findings)
     if as_json:
         print_json(checked_as_json(checked))
@@ -173,7 +174,7 @@ def update(
     leave(done.refused, () if done.added else [Fact.NOTHING_USABLE])
 
 
-def _plot_names(plot: Path | None, checked: Checked) -> list[tuple[Path, DriftAudit]]:
+def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:
     """The figure of each class that has a season; raises UsageError where the name fits none."""
     audits = [item.drift for item in checked.classes if item.drift]
     if plot is None:
@@ -183,7 +184,9 @@ def _plot_names(plot: Path | None, checked: Checked) -> list[tuple[Path, DriftAu
             "--plot shows the drift over a season: no log is new", "give logs that are not in the signature"
         )
     if plot.is_dir():
-        return [(plot / f"drift_{number}.png", audit) for number, audit in enumerate(audits, 1)]
+        return [
+            (figure_name(plot / f"drift_{number}.png", force=force), audit) for number, audit in enumerate(audits, 1)
+        ]
     if len(audits) > 1:
         raise UsageError(f"--plot is one file for {len(audits)} classes of motion", "give an existing folder")
-    return [(figure_name(plot), audits[0])]
+    return [(figure_name(plot, force=force), audits[0])]

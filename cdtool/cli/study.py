@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.cli.console import number, plain, print_json, table
-from cdtool.cli.options import JsonOption, MachineOption
+from cdtool.cli.options import ForceOption, JsonOption, MachineOption
 from cdtool.errors import UsageError
 from cdtool.exit_status import statuses_words
 
@@ -45,6 +45,7 @@ def sensors(
     factor: Annotated[float, typer.Option("--k", help="Seen: beyond k sigma of its noise and its resolution.")] = 5.0,
     as_json: JsonOption = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A figure: .png, .svg, .pdf.")] = None,
+    force: ForceOption = False,
 ) -> None:
     """Which sensor sees an impact first, at which force, and what limits it (thesis figure 4.10, computed).
 
@@ -53,10 +54,12 @@ def sensors(
     from cdtool.workflows.study import study_sensors
 
     if output:
+        from cdtool.foreign_files import refuse_foreign_figure
         from cdtool.report.plots.figures import SUFFIXES
 
         if output.suffix.lower() not in SUFFIXES:
             raise UsageError(f"{output} is no name for a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+        refuse_foreign_figure(output, force=force)
     given = {
         "impact.speed": speed,
         "impact.stiffness": stiffness,
@@ -78,6 +81,7 @@ def sensors(
 @study.command("figures", epilog=statuses_words("study figures"))
 def figures(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Draw the thesis's figures of impacts anew: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
@@ -86,7 +90,7 @@ def figures(
     """
     from cdtool.report.plots.impact_figures import draw_impact_figures
 
-    written = draw_impact_figures(output)
+    written = draw_impact_figures(output, force=force)
     if as_json:
         print_json([str(path) for path in written])
         return

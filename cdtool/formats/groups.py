@@ -94,7 +94,7 @@ def need_clocks(path: Path, groups: Sequence[Group]) -> None:
     """Raise UsageError where the container needs times and those of a group are not known."""
     if not all(group.timed for group in groups):
         raise UsageError(
-            f"{path}: no column of the log looks like its clock, and {path.suffix} needs one",
+            f"{path}: no column of the log looks like its clock, and this container needs one",
             "name the clock in a machine file, and give it with -m",
         )
 

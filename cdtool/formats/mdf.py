@@ -192,7 +192,8 @@ def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Map
             for number, part in enumerate(ready):
                 if part is not None:  # kept by asammdf in a temporary file
                     log.extend(number, [(values, None) for values in (part.time, *part.flat)])
-        log.save(path, overwrite=True)
+        with path.open("wb+") as file:  # by its name asammdf would give it another suffix
+            log.save(file)
     return [
         [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]
         for number, group in enumerate(groups)

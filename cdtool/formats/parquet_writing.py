@@ -21,8 +21,19 @@ from cdtool.recording import FloatArray
 _VALUES, _FEWEST_ROWS = 2**20, 2**14
 
 
-def write_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write one table: of several clocks a row for every time, without a value where a clock has no sample."""
+def write_parquet(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
+    """Write one table as Parquet: of several clocks a row for every time, null where a clock has no sample."""
+    return _write_table(path, groups, parts, provenance, feather=False)
+
+
+def write_feather(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
+    """Write one table as Feather, as `write_parquet` does."""
+    return _write_table(path, groups, parts, provenance, feather=True)
+
+
+def _write_table(
+    path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str], *, feather: bool
+) -> Written:
     arrow = library("pyarrow", "parquet", path)
     several = len(groups) > 1
     if several:
@@ -35,7 +46,7 @@ def write_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: M
     ]
     metadata = stored(provenance) | ({OWN_CLOCKS.decode(): "1"} if several else {})
     schema = arrow.schema(fields, metadata=metadata)
-    with _opened(arrow, path, schema) as write:
+    with _opened(arrow, path, schema, feather=feather) as write:
         for ready in parts:
             arrays = _of_several(arrow, groups, ready) if several else _of_one(arrow, groups[0], ready[0])
             write(arrow.Table.from_arrays(arrays, schema=schema))
@@ -43,13 +54,13 @@ def write_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: M
 
 
 @contextmanager
-def _opened(arrow: Any, path: Path, schema: Any) -> Iterator[Callable[[Any], None]]:
+def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[Callable[[Any], None]]:
     """What takes the next rows of the file; they wait until a group of rows is full."""
-    if path.suffix == ".parquet":
-        writer = library("pyarrow.parquet", "parquet", path).ParquetWriter(path, schema, compression="zstd")
-    else:
+    if feather:
         ipc = library("pyarrow.ipc", "parquet", path)
         writer = ipc.new_file(str(path), schema, options=ipc.IpcWriteOptions(compression="zstd"))
+    else:
+        writer = library("pyarrow.parquet", "parquet", path).ParquetWriter(path, schema, compression="zstd")
     waiting: list[Any] = []
     most = max(_FEWEST_ROWS, _VALUES // len(schema.names))
 

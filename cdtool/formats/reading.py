@@ -123,7 +123,7 @@ def read_as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
 def log_parts(path: Path) -> list[Path]:
     """The files of a log: itself, or those in the folder that rosbag2 made; raises RecordingError."""
     for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
-        if parts := sorted(path.glob(pattern)):
+        if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
             return parts
     if path.is_dir() and (lost := lost_parts(path, [])):
         raise RecordingError(f"{path}: {lost[0]}", "copy the whole folder that rosbag2 made")

@@ -11,9 +11,10 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.builds.comparison import BuildComparison
 from cdtool.evaluation.builds.questions import Figure
 from cdtool.evaluation.builds.rows import BuildRow
+from cdtool.files import write_text
+from cdtool.foreign_files import Kind, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.report.figure_text import NOTHING, number
-from cdtool.report.files import write_text
 from cdtool.report.markdown.text import Table, escape
 from cdtool.report.verdict_words import NO_CERTIFICATE
 from cdtool.strict_json import strict_json
@@ -71,21 +72,26 @@ def contacts_of(row: BuildRow) -> str:
     return str(row.pairs) if row.paired else f"{row.old_contacts} / {row.new_contacts}"
 
 
+_KINDS = {
+    ".md": Kind(b"**cdtool compare: ", "comparison of cdtool"),
+    ".json": Kind(b'{\n "verdict": "', "comparison of cdtool"),
+}
 _WRITERS: dict[str, Callable[[BuildComparison], str]] = {".md": to_markdown, ".json": to_json}
 
 
-def check_outputs(targets: Sequence[Path]) -> None:
-    """Raise UsageError where a target's name does not say what to write, or its folder is missing."""
+def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
+    """Raise UsageError where a target's name does not say what to write, its folder is missing, or it is not ours."""
     for target in targets:
         if target.suffix.lower() not in _WRITERS:
             raise UsageError(f"--output is '{plain(target)}'", f"a name that ends in {' or '.join(_WRITERS)}")
         if not target.parent.is_dir():
             raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
+        refuse_other_kind(target, _KINDS[target.suffix.lower()], force=force)
 
 
 def write_outputs(comparison: BuildComparison, targets: Sequence[Path]) -> None:
-    """Write every target by its suffix; raises CdtoolError where one cannot be written."""
-    check_outputs(targets)
+    """Write every target by its suffix, whatever is there; raises CdtoolError where one cannot be written."""
+    check_outputs(targets, force=True)
     for target in targets:
         write_text(target, _WRITERS[target.suffix.lower()](comparison))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Generic, Literal, Protocol, TypeVar
 
 from cdtool.errors import UsageError
+from cdtool.files import replaced_folder
 
 IMPACT_OF: Mapping[str, Literal["none", "stiff", "soft"]] = {
     "free": "none",
@@ -64,7 +65,7 @@ def write_folder(
     bench: Bench[AnyRun],
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write `counts` recordings of each group of GROUPS below `folder`; returns how many.
+    """Write `counts` recordings of each group of GROUPS below `folder`, all or nothing; returns how many.
 
     `file_format`: csv, mcap, or mixed (the first two of each group as MCAP, the others as CSV). Raises UsageError
     where nothing is to be written or the folder is not empty.
@@ -74,6 +75,14 @@ def write_folder(
         raise UsageError("no recording is asked for", "give a number above 0 for --free, --holdout, --stiff or --soft")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
+    with replaced_folder(folder) as part:
+        _write_all(part, planned, bench, progress)
+    return len(planned)
+
+
+def _write_all(
+    folder: Path, planned: list[_Planned], bench: Bench[AnyRun], progress: Callable[[int, int], None] | None
+) -> None:
     contacts = []
     for done, item in enumerate(planned, 1):
         run = bench.simulate(item.group, item.number)
@@ -89,7 +98,6 @@ def write_folder(
     with (folder / "contacts.csv").open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerows([("recording", "true_contact_s", "kind"), *contacts])
-    return len(planned)
 
 
 @dataclass(frozen=True)

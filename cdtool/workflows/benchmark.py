@@ -42,11 +42,12 @@ from cdtool.workflows.threshold_settings import set_by_hand
 
 @dataclass(frozen=True)
 class Benchmark:
-    """The results with their statistics, the traces that were kept for figures, and where the time went [s]."""
+    """The results with their statistics, the traces kept for figures, where the time went [s], and what was read."""
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
     seconds: Mapping[str, float]
+    inputs: tuple[Path, ...] = ()
 
     @property
     def results(self) -> Results:
@@ -119,7 +120,7 @@ def benchmark(
     provenance = _provenance(setup, used, learned.thresholds, learn.operations)
     provenance["units"] |= gathered.units
     results = gathered.results(provenance, learned.calibration)
-    return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds)
+    return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds, setup.inputs)
 
 
 def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, np.ndarray]:

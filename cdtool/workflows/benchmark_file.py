@@ -103,6 +103,13 @@ class BenchmarkFile:
         return ScoringRules(self.onset, window, self.labels, self.synchronisation, self.mass_before_cell)
 
     @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Every file that is read for it: none of them may be written to."""
+        logs = (path for group in self.impacts.values() for path in group.logs)
+        labels = (Path(self.labels.source),) if self.labels else ()
+        return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
+
+    @property
     def groups(self) -> tuple[str, ...]:
         """The impact groups, then the hold-out."""
         return tuple(self.impacts)

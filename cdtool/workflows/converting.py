@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.errors import RecordingError, UsageError, nearest
+from cdtool.files import replaced
 from cdtool.formats.channel_assembly import file_digest
 from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
 from cdtool.formats.part_pieces import FoundParts
@@ -21,7 +21,6 @@ from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.converted_machine import converted_machine
 from cdtool.workflows.log_rows import LogRows
-from cdtool.workflows.written_file import written_file
 
 if TYPE_CHECKING:
     from cdtool.workflows.runs import Progress
@@ -29,8 +28,8 @@ if TYPE_CHECKING:
 _WRITERS = {
     ".csv": "cdtool.formats.csv_writing:write_csv_table",
     ".mcap": "cdtool.formats.mcap_writing:write_mcap_topics",
-    ".parquet": "cdtool.formats.parquet_writing:write_table",
-    ".feather": "cdtool.formats.parquet_writing:write_table",
+    ".parquet": "cdtool.formats.parquet_writing:write_parquet",
+    ".feather": "cdtool.formats.parquet_writing:write_feather",
     ".h5": "cdtool.formats.hdf5_writing:write_hdf5",
     ".hdf5": "cdtool.formats.hdf5_writing:write_hdf5",
     ".mf4": "cdtool.formats.mdf:write_mdf",
@@ -82,13 +81,12 @@ def convert(
     _check_free([*names, *companions], parts, force)
     provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
     course = _Course(log, sum(group.rows for group in rows.groups), progress)
-    with ExitStack() as stack:  # all of them or none
+    with replaced(*names, *companions) as temporary:  # all of them or none
         for i, (path, part) in enumerate(pieces):
-            ready = course.of(rows.parts(part))
-            written = writer(stack.enter_context(written_file(path)), part, ready, provenance)
+            written = writer(temporary[i], part, course.of(rows.parts(part)), provenance)
             if machine_file is not None:
                 text = converted_machine(machine_file, path, part, written, companions[i])
-                stack.enter_context(written_file(companions[i])).write_text(text, encoding="utf-8")
+                temporary[len(names) + i].write_text(text, encoding="utf-8")
     width = sum(len(parts) for group in rows.groups for parts in group.flat)
     made = tuple(map(str, names)), tuple(map(str, companions))
     return Converted(str(log), *made, width, len(rows.groups), tuple(rows.findings))

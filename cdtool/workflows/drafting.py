@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
+from cdtool.files import write_text
 from cdtool.formats.element_names import element_names
 from cdtool.formats.reading import choose_format, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
@@ -21,7 +22,6 @@ from cdtool.workflows.draft_streams import Channels, streams_of
 from cdtool.workflows.draft_text import Clock, Draft, draft_text
 from cdtool.workflows.draft_units import Evidence, fits_as_well, is_si
 from cdtool.workflows.information import info
-from cdtool.workflows.written_file import written_file
 
 _CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
 # What accelerometer_check says of a sensor that is mounted the other way round.
@@ -49,8 +49,7 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     if target.exists() and not force:
         raise UsageError(f"{target}: is there already", "choose another name with -o, or overwrite it with --force")
     drafted = replace(_settled(Path(log), _drafted(Path(log))), path=str(target))
-    with written_file(target) as part:
-        part.write_text(drafted.text, encoding="utf-8")
+    write_text(target, drafted.text)
     return drafted
 
 

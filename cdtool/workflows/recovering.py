@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
-from uuid import uuid4
 
 from cdtool.errors import RecordingError, UsageError
+from cdtool.files import replaced
 from cdtool.recording import Finding
 
 if TYPE_CHECKING:
@@ -73,7 +71,7 @@ def recover(
     kept = surveyed.unverified if unverified else 0
     left_out = surveyed.unverified - kept
     result = Recovered(str(source), str(output), surveyed.count - left_out, kept, left_out, tuple(findings))
-    with _replacing(output) as file:
+    with replaced(output) as (part,), part.open("wb") as file:
         _write(source, file, result, surveyed.unverified == 0, progress)
     return result
 
@@ -139,24 +137,6 @@ def _check_names(source: Path, output: Path, force: bool) -> None:
         raise UsageError(f"{output}: is the file to recover from", "write to another one")
     if output.exists() and not force:
         raise UsageError(f"{output}: is there already", "choose another name, or overwrite it with --force")
-
-
-@contextmanager
-def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    """A temporary file beside `target` that takes its place once all was written."""
-    temporary = target.parent / f".cdtool-{uuid4().hex}.tmp"
-    try:
-        with temporary.open("xb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    except OSError as fault:
-        raise RecordingError(
-            f"{target}: cannot be written: {fault.strerror or fault}", "check the folder and its space"
-        ) from fault
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _digest(path: Path) -> str:

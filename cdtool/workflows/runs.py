@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -59,7 +60,7 @@ def in_order(
             if progress:
                 progress(i, len(items))
         return
-    with ThreadPoolExecutor(jobs) as pool:
+    with ThreadPoolExecutor(jobs) as pool, _cancelling(pool):
         # No more than that many are on their way: what was made waits for whoever takes it, and needs memory.
         ahead = deque(pool.submit(work, item) for item in items[: 2 * jobs])
         for i in range(1, len(items) + 1):
@@ -69,6 +70,16 @@ def in_order(
             yield made
             if progress:
                 progress(i, len(items))
+
+
+@contextmanager
+def _cancelling(pool: ThreadPoolExecutor) -> Iterator[None]:
+    """Where the block ends early, work that was not begun is not waited for."""
+    try:
+        yield
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
 
 
 def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
@@ -197,4 +208,11 @@ def absent_truth(recording: Recording) -> list[Finding]:
 def _glob(path: Path) -> Iterator[Path]:
     root = Path(path.anchor) if path.is_absolute() else Path()
     pattern = str(path.relative_to(root)) if path.is_absolute() else str(path)
-    return (match for match in root.glob(pattern) if match.is_file())
+    # As in a shell: a name that begins with a dot is matched only where it is written out. Files that are not whole
+    # yet have such names.
+    written_out = set(path.parts)
+    return (
+        match
+        for match in root.glob(pattern)
+        if all(part in written_out for part in match.parts if part.startswith(".")) and match.is_file()
+    )

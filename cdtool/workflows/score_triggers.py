@@ -33,10 +33,11 @@ _STRANGER = "the benchmark file does not score it: its rows are left out"
 
 @dataclass(frozen=True)
 class Score:
-    """The results with their statistics, and the traces kept for figures."""
+    """The results with their statistics, the traces kept for figures, and the files that were read."""
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
+    inputs: tuple[Path, ...] = ()
 
 
 def score(
@@ -87,7 +88,7 @@ def score(
         gathered.add(group, scored)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
-    return Score(evaluate(results, rules), gathered.traces)
+    return Score(evaluate(results, rules), gathered.traces, (Path(triggers), *setup.inputs))
 
 
 def _unlisted(

@@ -122,3 +122,86 @@ def test_a_comparison_never_replaces_the_results_that_it_compares(folder):
             "compare", folder / "old.json", folder / "new.json", "-o", folder / "c.json", "-o", folder / "c.md"
         )
         assert done.status == 0, done.err
+
+
+@pytest.mark.parametrize("name", ["r.png", "r.svg", "r.pdf", "r.traces.json.gz"])
+def test_a_figure_or_traces_of_another_program_are_not_replaced_without_force(folder, name):
+    (folder / name).write_text(TEXT, encoding="utf-8")
+    target = folder / (name if "traces" not in name else "r.json")
+    before = bytes_of(folder)
+    done = cdtool("benchmark", folder / "benchmark.toml", "-o", target)
+    assert done.status == 2 and f"{name}: is there already and holds no" in done.err and "--force" in done.err
+    assert bytes_of(folder) == before
+    done = cdtool("benchmark", folder / "benchmark.toml", "-o", target, "--force")
+    assert done.status == 0, done.err
+    assert (folder / name).read_bytes() != TEXT.encode()
+    assert cdtool("benchmark", folder / "benchmark.toml", "-o", target).status == 0
+
+
+def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
+    signature, plot = folder / "s.json", folder / "p.png"
+    assert learn(folder, signature).status == 0
+    log = (folder / "stiff" / "01.csv", "-m", folder / "machine.toml", "--signature", signature)
+    commands = (
+        ("detect", *log, "--plot", plot),
+        ("explain", *log, "--plot", plot),
+        ("signature", "show", signature, "--plot", plot),
+        ("study", "sensors", "-m", folder / "machine.toml", "--speed", 0.2, "--stiffness", 5e5, "-o", plot),
+    )
+    for words in commands:
+        plot.write_text(TEXT, encoding="utf-8")
+        done = cdtool(*words)
+        assert done.status == 2 and "p.png: is there already and holds no figure of cdtool" in done.err, words
+        assert plot.read_text(encoding="utf-8") == TEXT
+        assert [cdtool(*words, "--force").status, cdtool(*words).status] == [0, 0], words
+
+
+def test_a_folder_with_anything_but_a_report_keeps_it(folder):
+    report = folder / "report"
+    report.mkdir()
+    (report / "notes.txt").write_text(TEXT, encoding="utf-8")
+    before = bytes_of(folder)
+    done = cdtool("benchmark", folder / "benchmark.toml", "-o", report)
+    assert done.status == 2 and "notes.txt: is no part of a report of cdtool" in done.err and done.err.count("\n") == 1
+    assert bytes_of(folder) == before
+    assert cdtool("benchmark", folder / "benchmark.toml", "-o", report, "--force").status == 0
+    assert (report / "notes.txt").read_text(encoding="utf-8") == TEXT and (report / "report.html").exists()
+
+
+def test_a_report_folder_is_swapped_in_as_a_whole_and_what_is_no_longer_drawn_is_gone(folder):
+    report = folder / "report"
+    assert cdtool("benchmark", folder / "benchmark.toml", "-o", report).status == 0
+    shutil.copyfile(report / "latency.png", report / "triggers_of-last-year.png")
+    assert cdtool("benchmark", folder / "benchmark.toml", "-o", report).status == 0
+    assert not (report / "triggers_of-last-year.png").exists() and (report / "triggers_stiff.png").exists()
+    assert not [name for name in bytes_of(folder) if ".cdtool-" in name]
+
+
+def test_force_never_reaches_what_the_command_reads(folder):
+    (folder / "stiff" / "01.csv").rename(folder / "stiff" / "contacts.csv")
+    before = bytes_of(folder)
+    for target in (folder / "stiff" / "contacts.csv", folder / "stiff"):
+        done = cdtool("benchmark", folder / "benchmark.toml", "-o", target, "--force")
+        assert done.status == 2 and "is read by this command" in done.err
+    assert bytes_of(folder) == before
+
+
+def test_a_dead_link_is_refused_before_any_work(folder):
+    (folder / "link.json").symlink_to("nowhere.json")
+    for words in (("benchmark", folder / "benchmark.toml"), ("learn-signature", folder / "free" / "01.csv")):
+        more = ("-m", folder / "machine.toml", "-d", "gm", "--force") if words[0] == "learn-signature" else ()
+        done = cdtool(*words, *more, "-o", folder / "link.json")
+        assert done.status == 2 and "is a link to something that is not there" in done.err and done.out == ""
+    assert not (folder / "nowhere.json").exists()
+
+
+def test_dotfiles_are_no_logs_whatever_the_pattern(folder):
+    for name in ("free/.04.csv", "free/.cdtool-0123456789abcdef-0123456789abcdef.tmp", "stiff/.hidden/02.csv"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copyfile(folder / "free" / "03.csv", folder / name)
+    text = (folder / "benchmark.toml").read_text(encoding="utf-8").replace("stiff/*.csv", "stiff/**/*.csv")
+    for pattern in ("free/*", "free/*.csv", "free/**/*"):
+        (folder / "benchmark.toml").write_text(text.replace("free/*.csv", pattern), encoding="utf-8")
+        done = cdtool("benchmark", folder / "benchmark.toml", "--json", "-o", folder / "r.csv")
+        assert done.status == 0 and "stiff/01.csv" in done.out, done.err
+        assert not [name for name in (".hidden", "/.04", ".cdtool-") if name in done.out + done.err]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdtool.errors import UsageError
+from cdtool.files import write_bytes
 from cdtool.plain_text import plain, shorten
 from cdtool.report.figure_text import number
-from cdtool.report.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,8 +28,8 @@ _BACKENDS = {
 }
 # A date, or the version of a library, would make other bytes of the same figure.
 _METADATA: dict[str, dict[str, Any]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
+    ".png": {"Software": "cdtool"},
+    ".svg": {"Date": None, "Creator": "cdtool"},
     ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "cdtool", "Producer": None},
 }
 _STYLE: dict[str, object] = {
@@ -138,7 +139,9 @@ def save(figure: Figure, path: Path) -> None:
     kind = suffix[1:]
     with drawing():
         _settle(figure)
-        write_whole(path, lambda stream: getattr(canvas, f"print_{kind}")(stream, metadata=_METADATA[suffix]))
+        drawn = BytesIO()
+        getattr(canvas, f"print_{kind}")(drawn, metadata=_METADATA[suffix])
+        write_bytes(path, drawn.getvalue())
 
 
 def label(text: object, length: int = 40) -> str:

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cdtool.errors import UsageError
+from cdtool.file_locks import is_temporary
+from cdtool.files import replaced_folder
+from cdtool.foreign_files import FIGURES
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.sensor_ranking import rank_sensors
+from cdtool.plain_text import plain
 from cdtool.report.plots.impact_plots import write_impact_plots
 from cdtool.report.plots.sensor_plot import plot_ranking
 from cdtool.report.plots.transmission_plots import plot_elastic_bode, plot_impact, plot_rigid_bode
@@ -20,12 +25,31 @@ SHARES = (0.01, 0.1, 1.0, 10.0)
 """Stiffnesses of the contact in figure 4.7 as shares of the limit 4.36."""
 
 
-def draw_impact_figures(folder: Path) -> list[Path]:
+def draw_impact_figures(target: Path, *, force: bool = False) -> list[Path]:
     """Draw figures 3.2, 3.4, 3.5 (see `write_impact_plots`), 4.3, 4.4, 4.7 and 4.10 into a folder; their files.
 
-    Raises CdtoolError where it cannot write.
+    A folder that holds figures of cdtool only is replaced as a whole, another one with `force` only: then what has
+    other names stays. Raises CdtoolError where it cannot write.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    with replaced_folder(target, lambda old: _only_figures(old, force=force)) as folder:
+        written = _draw(folder)
+    return [target / path.name for path in written]
+
+
+def _only_figures(folder: Path, *, force: bool) -> bool:
+    for path in sorted(folder.iterdir()):
+        if is_temporary(path.name) or (path.suffix in FIGURES and FIGURES[path.suffix].is_kind_of(path)):
+            continue
+        if force:
+            return False
+        raise UsageError(
+            f"{plain(path)}: is no figure of cdtool, and the folder is replaced as a whole",
+            "choose another folder, or keep what else is in it with --force",
+        )
+    return True
+
+
+def _draw(folder: Path) -> list[Path]:
     course, rigid, elastic = (folder / f"transmission_{name}.png" for name in ("course", "rigid", "elastic"))
     plot_impact(example.impact(), course)
     states = [(depth, SPEED) for depth in DEPTHS]

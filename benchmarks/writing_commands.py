@@ -1,0 +1,153 @@
+"""Every command that writes, as it is killed and made to fail: its arguments, and what was there before."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+Run = Callable[[Sequence[str]], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command: `new` is what is run, `old` is run before to make what is there; {out} is the folder to write to.
+
+    `same_bytes`: it writes the same bytes each time (asammdf stamps a file with the time of writing).
+    """
+
+    name: str
+    new: tuple[str, ...]
+    old: tuple[str, ...] = ()
+    same_bytes: bool = True
+
+    def arguments(self, out: Path, *, old: bool = False) -> list[str]:
+        return [word.replace("{out}", str(out)) for word in (self.old if old else self.new)]
+
+
+def prepare(folder: Path, run: Run) -> None:
+    """Make the inputs: recordings, signatures, results, triggers; `run` runs a command."""
+    gate = folder / "gate"
+    run(["simulate", "gate", "--free", "4", "--holdout", "1", "--stiff", "2", "--soft", "0", "-o", str(gate)])
+    (folder / "benchmark.toml").write_text(
+        'machine = "gate/machine.toml"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
+        '[learn]\nlogs = ["gate/free/*.csv"]\n[impacts.stiff]\nlogs = ["gate/stiff/*.csv"]\n',
+        encoding="utf-8",
+    )
+    free = [str(gate / "free" / f"0{number}.csv") for number in (1, 2, 3)]
+    machine = ("-m", str(gate / "machine.toml"))
+    for name, logs in (("a", free[:2]), ("b", free)):
+        run(["learn-signature", *logs, *machine, "-d", "gm", "--force", "-o", str(folder / f"{name}.json")])
+        detectors = {"a": "pt", "b": "gm"}[name]
+        run(
+            ["benchmark", str(folder / "benchmark.toml"), "--detectors", detectors, "-o", str(folder / f"r{name}.json")]
+        )
+        text = f"recording,time_s\ngate/stiff/01.csv,{2.0 if name == 'a' else 2.5}\n"
+        (folder / f"t{name}.csv").write_text(text, encoding="utf-8")
+    for number in (1, 2):
+        lines = (gate / "stiff" / f"0{number}.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+        (folder / f"{number}.csv").write_text("".join(lines[:800]), encoding="utf-8")
+        run(["convert", str(folder / f"{number}.csv"), str(folder / f"{number}.mcap")])
+        shutil.copy(folder / "rb.json", folder / f"same{number}.json")
+
+
+def cases(inputs: Path) -> list[Case]:
+    """All of them; `prepare` has made their inputs."""
+    gate = inputs / "gate"
+    machine = ("-m", f"{gate}/machine.toml")
+    free = [f"{gate}/free/0{number}.csv" for number in (1, 2, 3, 4)]
+    stiff = [f"{gate}/stiff/0{number}.csv" for number in (1, 2)]
+    a, b = f"{inputs}/a.json", f"{inputs}/b.json"
+    every = [
+        word
+        for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")
+        for word in ("-o", "{out}/r." + suffix)
+    ]
+    learn = ("-d", "gm", "--force", "-o", "{out}/s.json")
+    benchmark = ("benchmark", f"{inputs}/benchmark.toml", "--detectors")
+    score = ("score", "-b", f"{inputs}/benchmark.toml", "-o", "{out}/r.json", "-o", "{out}/r.html")
+    compare = ("-o", "{out}/c.md", "-o", "{out}/c.json")
+    return [
+        Case(
+            "learn-signature",
+            ("learn-signature", *free, *machine, *learn),
+            ("learn-signature", *free[:2], *machine, *learn),
+        ),
+        Case(
+            "signature update",
+            ("signature", "update", "{out}/s.json", free[3], *machine, "--reserve", "30"),
+            ("learn-signature", *free[:3], *machine, *learn),
+        ),
+        Case("signature show", _plot("signature", "show", b), _plot("signature", "show", a)),
+        Case(
+            "signature check",
+            _plot("signature", "check", a, *free, *machine),
+            _plot("signature", "check", a, *free[:3], *machine),
+        ),
+        Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
+        Case("benchmark, folder", (*benchmark, "gm", "-o", "{out}/report"), (*benchmark, "pt", "-o", "{out}/report")),
+        Case(
+            "report, folder",
+            ("report", f"{inputs}/rb.json", "-o", "{out}/report"),
+            ("report", f"{inputs}/ra.json", "-o", "{out}/report"),
+        ),
+        Case("score", (*score, f"{inputs}/tb.csv"), (*score, f"{inputs}/ta.csv")),
+        Case(
+            "compare",
+            ("compare", f"{inputs}/rb.json", f"{inputs}/same1.json", *compare),
+            ("compare", f"{inputs}/ra.json", f"{inputs}/ra.json", *compare),
+        ),
+        Case(
+            "detect",
+            _plot("detect", stiff[1], *machine, "--signature", b),
+            _plot("detect", stiff[0], *machine, "--signature", b),
+        ),
+        Case("detect, folder", ("detect", *stiff, *machine, "--signature", b, "--plot", "{out}/plots")),
+        Case(
+            "explain",
+            _plot("explain", stiff[1], *machine, "--signature", b),
+            _plot("explain", stiff[0], *machine, "--signature", b),
+        ),
+        Case(
+            "recover",
+            ("recover", f"{inputs}/2.mcap", "-o", "{out}/r.mcap", "--force"),
+            ("recover", f"{inputs}/1.mcap", "-o", "{out}/r.mcap", "--force"),
+        ),
+        Case(
+            "init",
+            ("init", f"{inputs}/2.csv", "-o", "{out}/m.toml", "--force"),
+            ("init", f"{inputs}/1.csv", "-o", "{out}/m.toml", "--force"),
+        ),
+        *(
+            Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
+            for kind, some in (
+                ("gate", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0")),
+                ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--format", "mixed")),
+                ("season", ("--runs", "2")),
+            )
+        ),
+        *(
+            Case(
+                f"convert {suffix}",
+                _convert(f"{inputs}/2.csv", suffix, *machine),
+                _convert(f"{inputs}/1.csv", suffix, *machine),
+                suffix not in ("mf4", "tdms"),
+            )
+            for suffix in ("csv", "mcap", "parquet", "feather", "h5", "mf4", "tdms")
+        ),
+        Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
+        Case("study figures", ("study", "figures", "-o", "{out}/figures")),
+    ]
+
+
+def _plot(*words: str) -> tuple[str, ...]:
+    return (*words, "--plot", "{out}/p.png")
+
+
+def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:
+    return ("convert", log, "{out}/x." + suffix, *machine, "--force")
+
+
+def _sensors(machine: Sequence[str], speed: str) -> tuple[str, ...]:
+    return ("study", "sensors", *machine, "--speed", speed, "--stiffness", "5e5", "-o", "{out}/p.svg")

@@ -1,0 +1,167 @@
+"""One writer of a target at a time: a lock that dies with its process, and what dead writers left behind."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import re
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from cdtool.errors import OutputError
+from cdtool.plain_text import plain
+
+LOCK_SECONDS = 60.0
+_PAUSE_SECONDS = 0.01
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+_NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.tmp|\.lock)")
+# The locks of this process: lock file -> its handle. Before it is open the handle is None.
+_handles: dict[tuple[Path, int], int | None] = {}
+
+
+def temporary_name(target: Path, folder: Path) -> Path:
+    """A name in `folder` that nothing bears yet, for what will become `target`."""
+    return folder / f".cdtool-{_key(target)}-{secrets.token_hex(8)}.tmp"
+
+
+def is_temporary(name: str) -> bool:
+    """A name that only a temporary file or a lock of cdtool bears."""
+    return _NAME.fullmatch(name) is not None
+
+
+@contextmanager
+def holding(target: Path, folder: Path, shown: Path, *, needed: bool = False) -> Iterator[None]:
+    """Hold the lock of `target`, whose file is in `folder`; a thread that holds it already goes on.
+
+    Raises OutputError where another process keeps it for a minute, OSError where its file cannot be made. On a file
+    system without locks it goes on without one, unless it is `needed`.
+    """
+    lock = folder / f".cdtool-{_key(target)}.lock"
+    mine = (lock, threading.get_ident())
+    if mine in _handles:
+        yield
+        return
+    try:
+        _handles[mine] = None
+        if _acquire(mine, shown, needed):
+            _remove_left_behind(folder, mine)
+        yield
+    finally:
+        _release(mine)
+
+
+def release_all() -> None:
+    """Give up the locks of this process, for its end: an exception can come between any two steps."""
+    for mine in list(_handles):
+        _release(mine)
+
+
+def _key(target: Path) -> str:
+    return hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
+
+
+def _acquire(mine: tuple[Path, int], shown: Path, needed: bool) -> bool:
+    """Wait for a lock; False where there are none on this file system."""
+    end = time.monotonic() + LOCK_SECONDS
+    try:
+        while not _try(mine):
+            if time.monotonic() > end:
+                raise OutputError(f"{plain(shown)}: another process is writing it", "try again once it has ended")
+            time.sleep(_PAUSE_SECONDS)
+    except OSError as fault:
+        if fault.errno not in _NO_LOCKS or needed:
+            raise
+        mine[0].unlink(missing_ok=True)
+        return False
+    return True
+
+
+def _try(mine: tuple[Path, int], *, create: bool = True) -> bool:
+    """Take a lock if it is free. Its file is removed with it: what was locked must still be what bears the name."""
+    lock = mine[0]
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+    handle = os.open(lock, flags | (os.O_CREAT if create else 0), 0o666)
+    try:
+        if _lock(handle):
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), os.stat(lock, follow_symlinks=False)):  # noqa: PTH116
+                    _handles[mine] = handle
+                    return True
+        return False
+    finally:
+        if _handles.get(mine) != handle:
+            os.close(handle)
+
+
+def _lock(handle: int) -> bool:
+    """Take the lock of an open file; False where another one has it."""
+    try:
+        import fcntl
+    except ImportError:
+        return _lock_on_windows(handle)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as fault:
+        if fault.errno in (errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN):
+            return False
+        raise
+    return True
+
+
+def _lock_on_windows(handle: int) -> bool:
+    import msvcrt
+
+    try:
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
+    except OSError:
+        return False
+    return True
+
+
+def _release(mine: tuple[Path, int]) -> None:
+    with suppress(OSError):
+        if _handles.get(mine) is not None or _try(mine, create=False):
+            mine[0].unlink(missing_ok=True)  # while it is locked: nobody else can hold it
+    handle = _handles.pop(mine, None)
+    if handle is not None:
+        with suppress(OSError):
+            os.close(handle)
+
+
+def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:
+    """Remove temporaries and locks whose writers are dead: those whose lock is free, and those of the lock held."""
+    found: dict[Path, list[Path]] = {}
+    for path in folder.iterdir():
+        if match := _NAME.fullmatch(path.name):
+            found.setdefault(folder / f".cdtool-{match['key']}.lock", []).append(path)
+    for lock, paths in found.items():
+        if lock == own[0]:
+            _remove(path for path in paths if path != lock)
+            continue
+        other = (lock, -own[1])
+        try:
+            if _try(other):
+                _remove(path for path in paths if path != lock)
+        except OSError:
+            continue  # not ours to judge
+        finally:
+            _release(other)
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        with suppress(OSError):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_handles.clear)  # they are the parent's

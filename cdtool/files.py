@@ -1,0 +1,263 @@
+"""The one way in which cdtool writes: whole or not at all, flushed to the disk, by one writer of a target at a time.
+
+Conventions: links are followed before anything is locked or written. What is not whole yet is called
+`.cdtool-<target>-<random>.tmp`, the lock `.cdtool-<target>.lock`, where <target> is a hash of the name: dotfiles, which
+no pattern for logs matches. They are there while a command writes; what a killed one leaves behind is removed by the
+next command that writes into the folder, once no living process holds the lock. An existing file keeps its mode (and
+owner, where that is allowed), a new one gets the mode that the umask leaves.
+"""
+
+from __future__ import annotations
+
+import atexit
+import errno
+import os
+import shutil
+import stat
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+from cdtool.errors import CdtoolError, OutputError, UsageError
+from cdtool.file_locks import holding, release_all, temporary_name
+from cdtool.folder_swap import exchange, has_to_stay
+from cdtool.plain_text import plain
+
+_BINARY = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+_temporaries: set[Path] = set()
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[Path]:
+    """Hold the right to write `path` from reading it to writing it; gives the place where it really is.
+
+    What is written with this module within the block is written under the same lock. Raises OutputError where another
+    process keeps the lock for a minute, or the file system has no locks.
+    """
+    target = resolved(path)
+    with _explained(path, []), holding(target, target.parent, path, needed=True):
+        yield target
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a whole file; a device or pipe is written to directly. Raises OutputError, UsageError."""
+    if _is_special(path):
+        with _explained(path, []), path.open("wb") as stream:
+            stream.write(content)
+        return
+    with replaced(path) as (part,), part.open("wb") as stream:
+        stream.write(content)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a whole file of UTF-8 text with the line ends that it has. Raises OutputError, UsageError."""
+    write_bytes(path, text.encode("utf-8", "replace"))
+
+
+@contextmanager
+def replaced(*paths: Path) -> Iterator[list[Path]]:
+    """An empty temporary file for each of `paths`; all take their places where the block ends without error, or none.
+
+    Raises UsageError where a path is a folder, a device, a link that leads nowhere, or its folder is missing;
+    OutputError where writing fails, in the block or behind it.
+    """
+    targets = [_checked(path) for path in paths]
+    parts = [temporary_name(target, target.parent) for target in targets]
+    names = list(zip(parts, paths, strict=True))
+    with _explained(paths[0], names), ExitStack() as stack:
+        for path, target in sorted(zip(paths, targets, strict=True), key=lambda item: item[1]):
+            stack.enter_context(holding(target, target.parent, path))
+        try:
+            for part, target in zip(parts, targets, strict=True):
+                _temporaries.add(part)
+                os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR | _BINARY, _mode(target) | 0o600))
+            yield parts
+            for part, target in zip(parts, targets, strict=True):
+                _finish(part, target)
+            _put_in_place(list(zip(parts, targets, strict=True)))
+            for folder in {target.parent for target in targets}:
+                _flush(folder)
+        finally:
+            _discard(parts)
+
+
+@contextmanager
+def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = None) -> Iterator[Path]:
+    """A temporary folder that becomes `path` as a whole where the block ends without an error; makes missing parents.
+
+    `may_replace(folder)` says whether everything in an existing folder may go; it raises where nothing may be written
+    there. Where not everything may go, and where a folder cannot be exchanged (a mount point, the current folder, a
+    file system without exchange), each file takes the place of its namesake and the others stay. Raises as `replaced`.
+    """
+    target = resolved(path)
+    if target.exists() and not target.is_dir():
+        raise UsageError(f"{plain(path)}: exists and is no folder", "choose another name")
+    if target.exists() and not os.access(target, os.W_OK | os.X_OK):
+        raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
+    whole = not has_to_stay(target) and (may_replace is None or not target.exists() or may_replace(target))
+    place = target.parent if whole else target
+    part = temporary_name(target, place)
+    with made_folder(target.parent), _explained(path, [(part, path)]), holding(target, place, path):
+        try:
+            _temporaries.add(part)
+            part.mkdir()
+            yield part
+            _flush_tree(part)
+            if target.exists() and may_replace is not None:  # as it is now, not as it was a while ago
+                whole = may_replace(target) and whole
+            if not (whole and _put_whole(part, target)):
+                _put_in_place([(item, target / item.name) for item in sorted(part.iterdir())])
+                _flush(target)
+            _flush(place)
+        finally:
+            _discard([part])
+
+
+@contextmanager
+def made_folder(path: Path) -> Iterator[Path]:
+    """A folder, made with its missing parents; what was made and is empty in the end is removed again."""
+    target = resolved(path)
+    made = [folder for folder in (target, *target.parents) if not folder.exists()]
+    try:
+        with _explained(path, []):
+            target.mkdir(parents=True, exist_ok=True)
+        yield target
+    finally:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def resolved(path: Path) -> Path:
+    """Where a path really is; raises UsageError for a link that leads nowhere."""
+    if path.is_symlink() and not path.exists():
+        raise UsageError(f"{plain(path)}: is a link to something that is not there", "remove the link, or mend it")
+    return Path(os.path.realpath(path))
+
+
+def clean_up() -> None:
+    """Remove the temporary files and locks of this process: a signal's exception can come between any two steps."""
+    _discard(list(_temporaries))
+    release_all()
+
+
+def _checked(path: Path) -> Path:
+    if path.is_dir():
+        raise UsageError(f"{plain(path)}: is a folder", "give the name of a file")
+    if _is_special(path):
+        raise UsageError(f"{plain(path)}: is no regular file", "give the name of a file")
+    target = resolved(path)
+    if not target.parent.is_dir():
+        raise UsageError(f"{plain(path)}: no folder {plain(path.parent)}", "make it first")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
+    return target
+
+
+def _is_special(path: Path) -> bool:
+    """A device or a pipe: nothing can be renamed over it."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+@contextmanager
+def _explained(path: Path, names: Sequence[tuple[Path, Path]]) -> Iterator[None]:
+    """An OSError as one line about `path`; nobody knows a temporary file by its name."""
+    try:
+        yield
+    except CdtoolError as fault:
+        message = fault.message
+        for part, known in names:
+            message = message.replace(str(part), str(known))
+        if message == fault.message:
+            raise
+        raise type(fault)(message, fault.hint) from fault
+    except OSError as fault:
+        why = os.strerror(fault.errno) if fault.errno else " ".join(str(fault).split())[:200]
+        for part, known in names:
+            why = why.replace(str(part), str(known))
+        raise OutputError(f"{plain(path)}: cannot be written: {why}", "check the folder and its space") from fault
+
+
+def _mode(target: Path) -> int:
+    return stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666
+
+
+def _finish(part: Path, target: Path) -> None:
+    """Flush a file, and give it mode and owner of the one that it replaces."""
+    _flush(part)
+    if target.exists():
+        kept = target.stat()
+        if hasattr(os, "chown") and (kept.st_uid, kept.st_gid) != (part.stat().st_uid, part.stat().st_gid):
+            with suppress(OSError):
+                os.chown(part, kept.st_uid, kept.st_gid)
+        part.chmod(stat.S_IMODE(kept.st_mode))
+
+
+def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
+    """Rename each to its target; where one cannot be, those before it are taken back."""
+    done: list[tuple[Path, Path, bool, Path]] = []
+    try:
+        for part, target in pairs:
+            existed, old = target.exists(), temporary_name(target, part.parent)
+            if existed and len(pairs) > 1:
+                _temporaries.add(old)
+                with suppress(OSError):  # a file system without hard links
+                    os.link(target, old)
+            done.append((part, target, existed, old))
+            part.replace(target)
+    except BaseException:
+        for part, target, existed, old in reversed(done):
+            if part.exists():
+                continue  # it was not renamed
+            if not existed:
+                _remove(target)
+            elif old.exists():
+                old.replace(target)
+        raise
+    finally:
+        _discard([old for *_, old in done])
+
+
+def _put_whole(part: Path, target: Path) -> bool:
+    """Let a folder take its place; False where the file system cannot exchange it for the one that is there."""
+    if not target.exists():
+        part.rename(target)
+        return True
+    part.chmod(stat.S_IMODE(target.stat().st_mode))
+    return exchange(part, target)
+
+
+def _flush(path: Path) -> None:
+    """Have the disk keep a file's content, or a folder's names."""
+    if path.is_dir() and not hasattr(os, "O_DIRECTORY"):
+        return  # Windows: a folder cannot be flushed
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | _BINARY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _flush_tree(folder: Path) -> None:
+    for path in sorted(folder.rglob("*")):
+        _flush(path)
+    _flush(folder)
+
+
+def _discard(parts: Sequence[Path]) -> None:
+    for part in parts:
+        with suppress(OSError):
+            _remove(part)
+        _temporaries.discard(part)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+atexit.register(clean_up)
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_temporaries.clear)  # they are the parent's
