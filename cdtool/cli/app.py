@@ -147,7 +147,8 @@ def _main() -> None:
         status = app(standalone_mode=False)
         if fault := lost_output():
             raise CdtoolError(f"standard output: {fault.strerror}", "what was printed is incomplete: check the space")
-        sys.exit(status if isinstance(status, int) else ExitStatus.OK)
+        status = status if isinstance(status, int) else status_of([])
+        sys.exit(status)
     except CdtoolError as fault:
         from cdtool.cli.console import print_error
 
