@@ -20,6 +20,9 @@ from cdtool.operations import Operation
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 
+# From this share of its samples at another speed on, an operation without an alarm is one of another motion.
+_ANOTHER_MOTION = 0.5
+
 
 @dataclass(frozen=True)
 class Stretch:
@@ -227,10 +230,11 @@ def _verdict(
 ) -> Verdict:
     if alarms:
         return Verdict("alarm", alarms, crossings=crossings)
-    if statistic.valid.any():
+    other = float(np.mean(statistic.status == Status.OTHER_SPEED)) if statistic.status.size else 0.0
+    if statistic.valid.any() and other < _ANOTHER_MOTION:
         return Verdict("no alarm", crossings=crossings)
     reason = statistic.why_not()
-    if np.any(statistic.status == Status.OTHER_SPEED):
+    if other:
         reason += f"; learned {' and '.join(motion.described for motion in judgement.classes)}"
     return Verdict("not assessable", reason=reason)
 

@@ -22,6 +22,7 @@ SHOWN = 20
 
 
 def show_explained(explained: Explained) -> None:
+    """Print every event of a log, and the channels beside it."""
     shown = explained.events[:SHOWN]
     for _, item in shown:
         _show_event(item)
@@ -66,6 +67,7 @@ def _show_event(item: Explanation) -> None:
 
 
 def explained_as_json(log: Path, explained: Explained) -> dict[str, Any]:
+    """Return the same as JSON values."""
     from cdtool.cli.contact_rows import contact_as_json
     from cdtool.evaluation.explanation.explanation import AlarmExplanation
 

@@ -17,6 +17,8 @@ _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
 _AVERAGED_SHARE = 0.2
 # Shares of the highest averaged speed above which the axis moves, and of the usual one above which it runs.
 _MOVING, _FAST = 0.1, 0.8
+# A motion goes one way where this share of its travel at speed is left when there and back cancel.
+_ONE_WAY = 0.2
 
 
 @dataclass(frozen=True)
@@ -123,5 +125,7 @@ def _class_of(time: FloatArray, speed: FloatArray, joint: int) -> MotionClass:
     for _ in range(2):
         fast = smooth[size >= _FAST * usual]
         usual = float(np.median(np.abs(fast)))
-    direction = 1 if float(np.sum(fast)) > 0.0 else -1
+    # There and back alike has the direction of its first motion: noise must not decide.
+    lead = float(np.sum(fast)) if abs(float(np.sum(fast))) > _ONE_WAY * float(np.sum(np.abs(fast))) else float(fast[0])
+    direction = 1 if lead > 0.0 else -1
     return MotionClass(direction, usual, joint)

@@ -100,7 +100,7 @@ def test_missing_values_are_told_and_do_not_blind_the_detector(detect, tmp_path,
 def test_a_channel_without_any_value_is_not_assessable_not_quiet(detect, tmp_path, good):
     lines = [good[0], *(",".join([*line.split(",")[:4], "nan", *line.split(",")[5:]]) for line in good[1:])]
     done = detect(written(tmp_path / "blind.csv", "\n".join(lines) + "\n"))
-    assert done.status == 0 and "not assessable" in done.out and "missing samples" in done.out
+    assert done.status == 3 and "not assessable" in done.out and "missing samples" in done.out
 
 
 def test_a_half_written_last_line_is_dropped_and_told(detect, tmp_path, good, gate_folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -71,7 +72,9 @@ def test_learning_writes_a_signature_file_and_tells_its_class(feekf_signature, g
     logs = sorted((gate_folder / "free").glob("*.csv"))
     machine = gate_folder / "machine.toml"
     done = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "gm.json", "--json")
-    assert json.loads(done.out)["classes"] == [{"direction": 1, "nominal_speed": pytest.approx(0.2), "runs": 11}]
+    assert json.loads(done.out)["classes"] == [
+        {"direction": 1, "nominal_speed": pytest.approx(0.2, rel=0.01), "runs": 11}
+    ]
 
 
 def test_too_few_runs_end_with_2_and_say_how_many_are_missing(gate_folder, tmp_path):
@@ -148,10 +151,13 @@ def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp
     assert done.status == 2 and "minimum_speed" in done.err
 
 
-def test_a_log_of_another_speed_is_not_assessable_not_silent(gate_folder, feekf_signature, tmp_path):
+def test_a_log_of_another_speed_is_judged_no_longer_than_it_may_be_a_contact_and_says_so(
+    gate_folder, feekf_signature, tmp_path
+):
     write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
-    assert done.status == 0 and "not assessable" in done.out and "no signature for its class" in done.out
+    # The class that it fitted while it began to move judges it for 1 s more; from then on nothing does, and it says so.
+    assert done.status == 0 and re.search(r"1\.9\d to 8\.20 s\s+\(0\.18\d to 1\.45 m\) other speed", done.out)
 
 
 def test_a_log_that_was_learned_from_is_told_and_shows_nothing(gate_folder, feekf_signature):
@@ -167,7 +173,7 @@ def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path)
     assert done.status == 0, done.err
     assert "friction_ekf" in done.out and "n.a.: not assessable" in done.out
     values = json.loads(results.read_text())
-    assert values["schema_version"] == 2
+    assert values["schema_version"] == 3
     assert len(values["contacts"]) == 20 and len(values["exposure"]) == 15
     stiff = {c["detector"]: c["latency_ms"] for c in values["contacts"] if c["recording"] == "stiff/01.csv"}
     assert stiff["pure_inertia"] < stiff["friction_ekf"] < stiff["momentum"] < stiff["pure_torque"]

@@ -92,3 +92,9 @@ def test_a_class_survives_json():
     assert loaded == common and loaded.course is not None and common.course is not None
     np.testing.assert_array_equal(loaded.course.by_travel.mean, common.course.by_travel.mean)
     assert MotionClass.from_dict(common.without_course.to_dict()).course is None
+
+
+def test_there_and_back_alike_has_the_direction_of_its_first_motion():
+    for seed in range(8):
+        assert measured_class(log((0.3, 3.0), (-0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == 1
+        assert measured_class(log((-0.3, 3.0), (0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == -1
