@@ -50,6 +50,8 @@ FAULTS = {
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 _STATUS_OF = {signal.SIGTERM: 143, signal.SIGINT: 130}
+# Lines about what was read, which have nothing to do with writing.
+_OF_THE_WORK = ("warning: ", "note: ", "left out: ", "damaged: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
 _OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "asammdf", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
 Snapshot = dict[str, tuple[int, bytes]]
@@ -301,7 +303,7 @@ def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
         return ""  # what failed was not needed
     if done.status != 2:
         return f"status: {done.status} {done.error.strip()[-200:]}"
-    lines = [line for line in done.error.splitlines() if not line.startswith(("warning: ", "note: "))]
+    lines = [line for line in done.error.splitlines() if not line.startswith(_OF_THE_WORK)]
     return "" if len(lines) == 1 and lines[0].startswith("error: ") else f"lines: {' / '.join(lines)[-300:]}"
 
 

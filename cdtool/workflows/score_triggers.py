@@ -148,7 +148,7 @@ def _detection(operation: Operation, detector: str, said: Triggered, shift: floa
 
 def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[float, ...]:
     """When each trigger is released [s]: it is held for a while after the last one that belongs to it."""
-    after = [*(item.time for item in alarms[1:]), math.inf][: len(alarms)]
+    after = [*(item.time for item in alarms[1:]), math.inf][: len(alarms)]  # there may be none
     return tuple(
         max(item.time for item in crossings if alarm.time <= item.time < end) + _HELD
         for alarm, end in zip(alarms, after, strict=True)
