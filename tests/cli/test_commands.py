@@ -151,9 +151,7 @@ def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp
     assert done.status == 2 and "minimum_speed" in done.err
 
 
-def test_a_log_of_another_speed_is_judged_no_longer_than_it_may_be_a_contact_and_says_so(
-    gate_folder, feekf_signature, tmp_path
-):
+def test_a_log_of_another_speed_is_judged_as_long_as_it_may_be_a_contact(gate_folder, feekf_signature, tmp_path):
     write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
     # The class that it fitted while it began to move judges it for 1 s more; from then on nothing does, and it says so.
