@@ -31,7 +31,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,8 @@ _OF_THE_WORK = ("warning: ", "note: ", "left out: ", "damaged: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
 _OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "asammdf", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
 Snapshot = dict[str, tuple[int, bytes]]
+# A folder whose files are written one by one: each log has its own.
+_PLOTS = "plots"
 
 
 @dataclass(frozen=True)
@@ -254,13 +256,10 @@ def _hard_kill(known: Known, left: Snapshot, out: Path) -> str:
     """After SIGKILL: each file or folder old or new; hidden temporaries may be left until the next write."""
     from cdtool.files import write_text
 
-    temporary = {name for name in left if Path(name).parts[0].startswith(".cdtool-")}
-    units = {Path(name).parts[0] for name in {*left, *known.old_files, *known.new_files}} - {
-        Path(name).parts[0] for name in temporary
-    }
-    for unit in sorted(units):
-        states = [_part(files, unit) for files in (known.old_files, known.new_files)]
-        if _part(left, unit) not in states:
+    whole = {name: value for name, value in left.items() if ".cdtool-" not in name}
+    for unit in sorted({_unit(name) for name in {*whole, *known.old_files, *known.new_files}}):
+        states = [_of(_unit, files, unit) for files in (known.old_files, known.new_files)]
+        if _of(_unit, whole, unit) not in states:
             return f"corrupt: {unit}"
     write_text(out / "next", "")
     for folder in (out, *(path for path in out.iterdir() if path.is_dir())):
@@ -272,22 +271,29 @@ def _hard_kill(known: Known, left: Snapshot, out: Path) -> str:
 
 def _soft_end(known: Known, left: Snapshot) -> str:
     strays = sorted({*left} - {*known.old_files} - {*known.new_files})
-    if strays:
-        return f"strays: {strays[0]}"
+    empty = [name for name in left if name == _PLOTS and not any(other.startswith(f"{_PLOTS}/") for other in left)]
+    if strays or empty:
+        return f"strays: {[*strays, *empty][0]}"
     for target in sorted({_target(name) for name in {*left, *known.old_files, *known.new_files}}):
-        states = [_of_target(files, target) for files in (known.old_files, known.new_files)]
-        if _of_target(left, target) not in states:
+        states = [_of(_target, files, target) for files in (known.old_files, known.new_files)]
+        if _of(_target, left, target) not in states:
             return f"corrupt: {target}"
     return ""
 
 
+def _unit(name: str) -> str:
+    """What a file is old or new with: its folder, if that is swapped in as a whole, else itself."""
+    first = Path(name).parts[0]
+    return name if first == _PLOTS else first
+
+
 def _target(name: str) -> str:
-    """What a file belongs to: its folder, results with their traces, a converted log with its machine file."""
-    return Path(name).parts[0].replace(".traces.json.gz", ".json").replace(".machine.toml", "")
+    """The same after an orderly end: results go with their traces, a converted log with its machine file, too."""
+    return _unit(name).replace(".traces.json.gz", ".json").replace(".machine.toml", "")
 
 
-def _of_target(files: Snapshot, target: str) -> Snapshot:
-    return {name: value for name, value in files.items() if _target(name) == target}
+def _of(belongs_to: Callable[[str], str], files: Snapshot, target: str) -> Snapshot:
+    return {name: value for name, value in files.items() if belongs_to(name) == target}
 
 
 def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
@@ -305,10 +311,6 @@ def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
         return f"status: {done.status} {done.error.strip()[-200:]}"
     lines = [line for line in done.error.splitlines() if not line.startswith(_OF_THE_WORK)]
     return "" if len(lines) == 1 and lines[0].startswith("error: ") else f"lines: {' / '.join(lines)[-300:]}"
-
-
-def _part(files: Snapshot, unit: str) -> Snapshot:
-    return {name: value for name, value in files.items() if Path(name).parts[0] == unit}
 
 
 def snapshot(folder: Path) -> Snapshot:
@@ -357,6 +359,9 @@ def _child(words: Sequence[str], calls: Any, strike: Strike, out: Path, begun: i
     from cdtool.cli.app import main as cdtool
     from cdtool.files import clean_up
 
+    # As in a terminal: what runs in the background of a script ignores SIGINT, and its children with it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     sys.argv = ["cdtool", *words]
     sys.stdout, sys.stderr = (os.fdopen(handle, "w", closefd=False) for handle in (1, 2))
     if calls:
