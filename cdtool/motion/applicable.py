@@ -19,6 +19,8 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 
 # A departure that begins while a class fits is judged by that class for so long [s]: the matching window.
 HOLD = 1.0
+# A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
+_COMPLETED = 0.05
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ def judging_classes(
     fits = np.zeros((n, count), dtype=np.bool_)
     fresh = np.zeros(n, dtype=np.bool_)
     firsts = [int(np.searchsorted(speed.time, item.applies, side="left")) for item in strokes]
+    completed_by = np.zeros(n)
     for item, first, last in zip(strokes, firsts, [*firsts[1:], n], strict=True):
         if first >= last:
             continue
@@ -58,17 +61,22 @@ def judging_classes(
             begun[first:last, j] = started[-(last - first) :]
             fits[first:last, j] = agrees[-(last - first) :]
         fresh[first] = True
+        completed_by[first] = item.rests - _COMPLETED
     known: BoolArray = np.all(np.isfinite(speed.values[:, [motion.joint for motion in classes]]), axis=1)
     now = np.zeros((n, count), dtype=np.bool_)
     before = np.zeros((n, count), dtype=np.bool_)
-    _judge(speed.time, begun, fits, known, fresh, hold, now, before)
-    return _on_clock(speed.time, known, now, before, firsts, clock, hold)
+    opposed = np.array(
+        [[one.joint == other.joint and one.direction != other.direction for other in classes] for one in classes]
+    )
+    _judge(speed.time, begun, fits, known, fresh, completed_by, opposed, hold, now, before)
+    return _on_clock(speed.time, known, now, now & begun, before, firsts, clock, hold)
 
 
 def _on_clock(
     time: FloatArray,
     known: BoolArray,
     now: BoolArray,
+    started: BoolArray,
     before: BoolArray,
     firsts: Sequence[int],
     clock: FloatArray,
@@ -83,8 +91,8 @@ def _on_clock(
     stroke = np.searchsorted(firsts, at, side="right") - 1
     found = []
     for j in range(now.shape[1]):
-        # What departed in an earlier stroke: the last one in which it judged.
-        judged_in = np.where(now[:, j], np.searchsorted(firsts, np.arange(len(time)), side="right") - 1, -1)
+        # What departed in an earlier stroke: the last one that it had begun and judged in.
+        judged_in = np.where(started[:, j], np.searchsorted(firsts, np.arange(len(time)), side="right") - 1, -1)
         held_from = np.maximum.accumulate(judged_in)
         for number in range(len(firsts)):
             own = now[at, j] & (stroke == number)
@@ -95,37 +103,46 @@ def _on_clock(
     return found
 
 
-@kernel(f"void({READ_ONLY}, b1[:,::1], b1[:,::1], b1[::1], b1[::1], float64, b1[:,::1], b1[:,::1])")
+@kernel(
+    f"void({READ_ONLY}, b1[:,::1], b1[:,::1], b1[::1], b1[::1], float64[::1], b1[:,::1], float64, b1[:,::1], b1[:,::1])"
+)
 def _judge(
     time: FloatArray,
     begun: BoolArray,
     fits: BoolArray,
     known: BoolArray,
     fresh: BoolArray,
+    completed_by: FloatArray,
+    opposed: BoolArray,
     hold: float,
     now: BoolArray,
     before: BoolArray,
 ) -> None:
-    """`now`: classes that judge their current stroke; `before`: those that departed in an earlier one."""
+    """`now`: classes that judge their current stroke; `before`: those that departed in an earlier one.
+
+    Where a stroke is `fresh`, a class that fitted until `completed_by` [s] has completed the one before. A class joins
+    at its begin, unless one of the `opposed` direction has departed: a contact throws an axis back.
+    """
     count = begun.shape[1]
     member = np.zeros(count, dtype=np.bool_)
     held = np.zeros(count, dtype=np.bool_)
     started = np.zeros(count, dtype=np.bool_)
     fitting = np.zeros(count, dtype=np.bool_)
     last_fit = np.zeros(count)
-    held_fit = np.zeros(count)
+    departed = np.zeros(count)
+    held_since = np.zeros(count)
     fitting_since = np.zeros(count)
     for k in range(len(time)):
         if fresh[k]:
             for j in range(count):
-                # A class that fits at the end of its stroke has completed it; one that has departed is held.
-                if member[j] and started[j] and not fitting[j]:
+                if member[j] and started[j] and last_fit[j] < completed_by[k]:
                     held[j] = True
-                    held_fit[j] = last_fit[j]
+                    held_since[j] = departed[j]
                 member[j] = not begun[k, j]
                 last_fit[j] = time[k]
+                departed[j] = time[k]
                 started[j] = False
-                fitting[j] = False
+                fitting[j] = True
         if not known[k]:
             for j in range(count):
                 now[k, j] = member[j]
@@ -133,23 +150,29 @@ def _judge(
             continue
         any_held = False
         for j in range(count):
-            if held[j] and time[k] - held_fit[j] > hold:
+            if held[j] and time[k] - held_since[j] > hold:
                 held[j] = False
             any_held = any_held or held[j]
-        any_member = False
         for j in range(count):
             if fits[k, j]:
                 if not fitting[j]:
                     fitting_since[j] = time[k]
                 last_fit[j] = time[k]
+            elif fitting[j]:
+                departed[j] = time[k]
             fitting[j] = fits[k, j]
-            if member[j] and time[k] - last_fit[j] > hold:
+            if member[j] and not fitting[j] and time[k] - departed[j] > hold:
                 member[j] = False
+        any_member = False
+        for j in range(count):
             if begun[k, j] and not started[j]:
                 # At its begin: it judges if it fits, beside others.
                 started[j] = True
-                member[j] = fits[k, j] and not any_held
                 fitting_since[j] = time[k]
+                member[j] = fits[k, j] and not any_held
+                for i in range(count):
+                    if opposed[i, j] and member[i] and started[i] and not fitting[i]:
+                        member[j] = False
             any_member = any_member or (member[j] and started[j])
         for j in range(count):
             if not member[j] and fits[k, j]:

@@ -11,71 +11,104 @@ import numpy.typing as npt
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.progress import START_SHARE
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import FloatArray, Recording, Series
 
 # A rest this long [s] ends a stroke; a shorter one is a pause in it.
 SHORTEST_REST = 0.2
-# Consecutive samples backward that end a stroke without a rest.
+# The speed is averaged over this long [s] back, and over this many samples at least: noise is no motion, and no rest.
+_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
+# Fewer samples than this have no average.
+_FEWEST = 3
+# Consecutive averages backward that end a stroke without a rest.
 _CONFIRM = 3
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """A stroke judged from `applies` [s] on, with what was logged since `start` [s] <= `applies`."""
+    """A stroke judged from `applies` [s] on, with what was logged since `start` [s] <= `applies`.
+
+    `rests` [s]: when the stroke before came to rest, or turned round.
+    """
 
     start: float
     applies: float
+    rests: float = -np.inf
 
 
 def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass]) -> list[Stroke]:
     """Return the strokes of a log, each decided at or before it applies; one of the whole log where it is not cut.
 
-    By "motion" a stroke ends with a rest of 0.2 s after a motion, or where the motion turns round. The axis rests below
-    10 % of the slowest class's nominal speed; without classes, below 10 % of the highest speed of any joint so far. By
-    "trigger" a stroke begins at each rising edge.
+    By "motion" a stroke ends with a rest of 0.2 s after a motion, or where the motion turns round. A joint rests where
+    its speed, averaged over the last 0.1 s, is below 10 % of the nominal speed of the slowest class that it leads;
+    without classes, below 10 % of the highest speed of any joint so far. By "trigger" a stroke begins at each rising
+    edge.
     """
     begin = Stroke(-np.inf, -np.inf)
     if how == "trigger" and "trigger" in recording:
         series = recording["trigger"]
         high = np.nan_to_num(series.values[:, 0]) > 0.5
-        edges = np.flatnonzero(high[1:] & ~high[:-1]) + 1
-        return [begin, *(Stroke(float(series.time[k]), float(series.time[k])) for k in edges)]
-    if how != "motion" or "speed" not in recording:
+        edges = [float(series.time[k]) for k in np.flatnonzero(high[1:] & ~high[:-1]) + 1]
+        return [begin, *(Stroke(edge, edge, edge) for edge in edges)]
+    if how != "motion" or "speed" not in recording or not len(recording["speed"]):
         return [begin]
-    speed = recording["speed"]
-    if classes:
-        slowest = min(classes, key=lambda item: item.nominal_speed)
-        values = np.ascontiguousarray(speed.values[:, slowest.joint])
-        resting = np.full(len(values), START_SHARE * slowest.nominal_speed)
+    time, speed = recording["speed"].time, averaged_so_far(recording["speed"])
+    leads = sorted({item.joint for item in classes})
+    if leads:
+        slowest = [min(item.nominal_speed for item in classes if item.joint == joint) for joint in leads]
+        levels = speed[:, leads] / (START_SHARE * np.array(slowest))
     else:
-        values = np.max(np.abs(speed.values), axis=1)
-        resting = START_SHARE * np.fmax.accumulate(values)
-    start = np.empty(len(speed.time), dtype=np.int64)
-    applies = np.empty(len(speed.time), dtype=np.int64)
-    count = _cut(speed.time, values, resting, SHORTEST_REST, start, applies)
-    cuts = zip(speed.time[start[:count]].tolist(), speed.time[applies[:count]].tolist(), strict=True)
-    return [begin, *(Stroke(first, last) for first, last in cuts)]
+        leads, fastest = [0], np.max(np.abs(speed), axis=1)
+        levels = (fastest / np.maximum(START_SHARE * np.fmax.accumulate(fastest), 1e-300))[:, np.newaxis]
+    moves_most = np.argmax(np.abs(np.nan_to_num(levels)), axis=1)
+    level = np.ascontiguousarray(levels[np.arange(len(levels)), moves_most])
+    start = np.empty(len(time), dtype=np.int64)
+    applies = np.empty(len(time), dtype=np.int64)
+    count = _cut(time, level, moves_most.astype(np.int64), SHORTEST_REST, start, applies)
+    return [
+        begin,
+        *(
+            Stroke(float(time[first]) - _AVERAGED_SECONDS, float(time[last]), float(time[first]))
+            for first, last in zip(start[:count], applies[:count], strict=True)
+        ),
+    ]
 
 
-@kernel(f"int64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, int64[::1], int64[::1])")
+def averaged_so_far(series: Series) -> FloatArray:
+    """Return the mean (n, J) over the last 0.1 s, and the last 5 samples at least; NaN below 3 samples."""
+    time, values = series.time, series.values
+    present = np.isfinite(values)
+    nothing = np.zeros((1, values.shape[1]))
+    total = np.vstack((nothing, np.cumsum(np.where(present, values, 0.0), axis=0)))
+    number = np.vstack((nothing, np.cumsum(present, axis=0)))
+    last = np.arange(1, len(time) + 1)
+    first = np.minimum(np.searchsorted(time, time - _AVERAGED_SECONDS, side="right"), last - _AVERAGED_SAMPLES)
+    first = np.maximum(first, 0)
+    count = number[last] - number[first]
+    mean: FloatArray = np.divide(total[last] - total[first], count, out=np.full(values.shape, np.nan), where=count >= _FEWEST)
+    return mean
+
+
+@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64[::1], float64, int64[::1], int64[::1])")
 def _cut(
     time: FloatArray,
-    speed: FloatArray,
-    resting: FloatArray,
+    level: FloatArray,
+    joint: npt.NDArray[np.int64],
     shortest: float,
     start: npt.NDArray[np.int64],
     applies: npt.NDArray[np.int64],
 ) -> int:
+    """`level`: speed of the joint that moves most as a multiple of the one below which it rests."""
     count = 0
     direction = 0
+    leads = -1
     backward = 0
     still_since = -1
     turned_at = 0
     for k in range(len(time)):
-        value = speed[k]
+        value = level[k]
         if np.isnan(value):
             continue
-        if abs(value) < resting[k]:
+        if abs(value) < 1.0:
             backward = 0
             if still_since < 0:
                 still_since = k
@@ -88,7 +121,8 @@ def _cut(
         sign = 1 if value > 0.0 else -1
         if direction == 0:
             direction = sign
-        elif sign != direction:
+            leads = joint[k]
+        elif joint[k] == leads and sign != direction:
             if backward == 0:
                 turned_at = still_since if still_since >= 0 else k
             backward += 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +23,7 @@ _OFF, _OFF_SHARE = 0.1, 0.1
 # Fewer runs show no common speed along the stroke.
 _ENOUGH = 3
 _POINTS = 100
-_AVERAGED_SECONDS = 0.1
+_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5.0
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,9 @@ def by_class(operations: Sequence[Operation]) -> tuple[list[list[Operation]], li
     odd: list[Skipped] = []
     for members in (group for kind in kinds.values() for group in _by_speed(kind)):
         usual, others = _alike(members)
-        classes.append(usual)
-        odd += others
+        usual, far = _near_their_median(usual)
+        classes.append([run.operation for run in usual])
+        odd += [*others, *far]
     place = {id(operation): i for i, operation in enumerate(operations)}
     for group in classes:
         group.sort(key=lambda operation: place[id(operation)])
@@ -72,11 +73,10 @@ def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
     return [group for group in made if group]
 
 
-def _alike(runs: list[_Run]) -> tuple[list[Operation], list[Skipped]]:
+def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
     """The runs of a class whose speed along the stroke is that of the others, and the others by name."""
-    everyone = [run.operation for run in runs]
     if len(runs) < _ENOUGH or runs[0].motion.direction == 0:
-        return everyone, []
+        return runs, []
     nominal = float(np.median([run.motion.nominal_speed for run in runs]))
     courses = [_course(run, nominal) for run in runs]
     furthest = float(np.median([travel[-1] if len(travel) else 0.0 for travel, _ in courses]))
@@ -90,9 +90,9 @@ def _alike(runs: list[_Run]) -> tuple[list[Operation], list[Skipped]]:
     )
     off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > _OFF * nominal)
     share = off.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    alike = [run.operation for run, part in zip(runs, share, strict=True) if part <= _OFF_SHARE]
+    alike = [run for run, part in zip(runs, share, strict=True) if part <= _OFF_SHARE]
     if len(alike) < max(_ENOUGH, len(runs) // 2):
-        return everyone, []
+        return runs, []
     odd = []
     for run, where, speed, part in zip(runs, off, speeds, share, strict=True):
         if part > _OFF_SHARE:
@@ -108,6 +108,22 @@ def _alike(runs: list[_Run]) -> tuple[list[Operation], list[Skipped]]:
     return alike, odd
 
 
+def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
+    """The runs whose nominal speed lies near the median of those that stay, and the others by name."""
+    left_out: list[Skipped] = []
+    while True:
+        median = float(np.median([run.motion.nominal_speed for run in runs]))
+        far = [
+            run for run in runs if not replace(run.motion, nominal_speed=median).matches(run.motion, SPEED_TOLERANCE)
+        ]
+        if not far:
+            return runs, left_out
+        worst = max(far, key=lambda run: abs(run.motion.nominal_speed - median))
+        words = f"left out: runs {worst.motion.described}, the other {len(runs) - 1} at {median:.3g}/s"
+        left_out.append(Skipped(worst.operation.name, words))
+        runs = [run for run in runs if run is not worst]
+
+
 def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
     """Averaged forward speed over rising travel."""
     motion, recording = run.motion, run.operation.recording
@@ -115,6 +131,9 @@ def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
     where = stroke_progress(recording, motion.direction, nominal, motion.joint)
     speed = motion.direction * series.values[:, motion.joint]
     use = np.isfinite(where.travel) & np.isfinite(speed)
-    travel, smooth = where.travel[use], averaged(series.time[use], speed[use], _AVERAGED_SECONDS)
+    travel, smooth = (
+        where.travel[use],
+        averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, 5.0 * series.period)),
+    )
     rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)
     return travel[rising], smooth[rising]

@@ -173,3 +173,51 @@ def test_a_contact_that_throws_the_axis_back_is_still_judged_by_the_class_that_i
     departs = at(recording, 2.5)
     assert found[departs : departs + 950, 0].all()
     assert not found[departs + 200 : departs + 900, 1].any()
+
+
+def test_an_axis_that_a_contact_stops_is_judged_for_the_matching_window_where_the_log_is_cut_too():
+    recording = log((0.3, 2.0), (0.0, 4.0), seed=3, noise=0.002)
+    speed = recording["speed"].values.copy()
+    hit = at(recording, 2.0)
+    speed[hit:, 0] = 0.002 * np.random.default_rng(0).standard_normal(len(speed) - hit)
+    travel = recording["position"].values[:, 0]
+    position = np.concatenate((travel[:hit], np.full(len(travel) - hit, travel[hit])))
+    time = recording["speed"].time
+    stopped = Recording(
+        "stopped", "made up", ("axis",), {"speed": Series(time, speed, "m/s"), "position": Series(time, position, "m")}
+    )
+    items = judging_classes(stopped, [FAST], strokes_so_far(stopped, "motion", [FAST]), time)
+    first = np.zeros(len(time), dtype=bool)
+    for item in items:
+        first |= item.where & (item.stroke == min(each.stroke for each in items))
+    assert len(strokes_so_far(stopped, "motion", [FAST])) == 2
+    assert first[hit : hit + 990].all()
+
+
+def test_a_class_the_other_way_does_not_join_while_a_contact_throws_the_axis_back():
+    recording = log((0.3, 2.0), (-0.3, 1.6), seed=13, noise=0.002)
+    found = judges(recording, FAST, BACK)
+    departs = at(recording, 2.5)
+    assert found[departs : departs + 950, 0].all()
+    assert not found[departs + 200 : departs + 900, 1].any()
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.02, 0.03])
+def test_noise_of_the_speed_neither_hides_a_rest_nor_chops_a_stroke(noise):
+    recording = log((0.3, 2.0), (0.0, 2.2), (0.3, 2.0), (0.0, 1.5), noise=noise, seed=14)
+    assert len(strokes_so_far(recording, "motion", [SLOW, FAST])) == 3
+
+
+def test_strokes_are_cut_by_the_joints_that_the_classes_lead():
+    one = log((0.3, 2.0), (0.0, 2.2), (0.3, 2.0), (0.0, 1.5), noise=0.002, seed=15)
+    time, moving = one["speed"].time, one["speed"].values[:, 0]
+    both = np.column_stack((np.zeros(len(time)), moving))
+    robot = Recording("robot", "made up", ("a", "b"), {"speed": Series(time, both, "rad/s")})
+    assert len(strokes_so_far(robot, "motion", [MotionClass(1, 0.2, 0), MotionClass(1, 0.3, 1)])) == 3
+
+
+def test_turning_round_without_a_rest_completes_a_stroke():
+    turning = learned((0.3, 3.0), (-0.3, 0.9))
+    recording = log((0.3, 3.0), (-0.3, 4.0), (0.0, 1.0), seed=16, noise=0.002)
+    found = judges(recording, turning, BACK, how="motion")
+    assert found[at(recording, 4.6) : at(recording, 7.0), 1].all()

@@ -98,3 +98,15 @@ def test_there_and_back_alike_has_the_direction_of_its_first_motion():
     for seed in range(8):
         assert measured_class(log((0.3, 3.0), (-0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == 1
         assert measured_class(log((-0.3, 3.0), (0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == -1
+
+
+def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
+    rng = np.random.default_rng(3)
+    runs = []
+    for number in range(32):
+        speed = (0.1, 0.115)[number % 2] * (1.0 + 0.03 * rng.standard_normal())
+        runs.append(operation(log((speed, 6.0), noise=0.001, seed=number), f"run{number}"))
+    classes, odd = by_class(runs)
+    for group in classes:
+        common_class([item.recording for item in group])
+    assert sum(map(len, classes)) + len(odd) == len(runs)
