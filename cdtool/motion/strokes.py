@@ -74,7 +74,7 @@ def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass
 
 
 def averaged_so_far(series: Series) -> FloatArray:
-    """Return the mean (n, J) over the last 0.1 s, and the last 5 samples at least; NaN below 3 samples."""
+    """Return the mean (n, J) over the last 0.1 s, and the last 5 samples at least; NaN below 3, and at first."""
     time, values = series.time, series.values
     present = np.isfinite(values)
     nothing = np.zeros((1, values.shape[1]))
@@ -83,8 +83,10 @@ def averaged_so_far(series: Series) -> FloatArray:
     last = np.arange(1, len(time) + 1)
     first = np.minimum(np.searchsorted(time, time - _AVERAGED_SECONDS, side="right"), last - _AVERAGED_SAMPLES)
     first = np.maximum(first, 0)
-    count = number[last] - number[first]
-    mean: FloatArray = np.divide(total[last] - total[first], count, out=np.full(values.shape, np.nan), where=count >= _FEWEST)
+    count = np.where((time >= time[0] + _AVERAGED_SECONDS)[:, np.newaxis], number[last] - number[first], 0.0)
+    mean: FloatArray = np.divide(
+        total[last] - total[first], count, out=np.full(values.shape, np.nan), where=count >= _FEWEST
+    )
     return mean
 
 

@@ -41,6 +41,8 @@ def test_every_file_of_the_folder_with_a_threshold_is_registered():
         "autoregression",
         "whitening",
         "sequential",
+        "normal_motion",
+        "normal_curves",
     }
     assert {path.stem for path in folder.glob("*.py")} - helpers == set(THRESHOLDS.table)
 
