@@ -21,6 +21,8 @@ _FEWEST = 10
 _SHARE_OF_PEAK = 0.01
 # A force left at the log's end [s] is next to nothing below this share of the peak.
 _TAIL, _NEXT_TO_NOTHING = 0.2, 0.05
+# ... and above so many standard deviations of its noise, which are so many median deviations.
+_SIGMAS, _OF_NORMAL = 3.0, 1.4826
 
 
 def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Finding]:
@@ -28,7 +30,7 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     if "force" not in recording:
         return []
     found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]
-    found += [item for item in [_not_back(recording["force"], contacts)] if item]
+    found += [item for item in [_not_back(recording["force"], contacts, rule)] if item]
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
         name = f" of {joint}" if len(recording.joints) > 1 else ""
@@ -37,14 +39,18 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     return found
 
 
-def _not_back(force: Series, contacts: Sequence[Contact]) -> Finding | None:
+def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     """A warning where the last contact lasts to the end of the log at a force next to nothing."""
     present = np.isfinite(force.values[:, 0])
     time, reading = force.time[present], force.values[present, 0]
     if not contacts or not len(time) or contacts[-1].found_by != "load cell" or contacts[-1].end < time[-1]:
         return None
     contact = contacts[-1]
-    left = float(np.median(reading[time >= time[-1] - _TAIL])) - contact.rest
+    tail = reading[time >= time[-1] - _TAIL]
+    left = float(np.median(tail)) - contact.rest
+    noise = _OF_NORMAL * float(np.median(np.abs(tail - np.median(tail))))
+    if abs(left) <= max(rule.back_to or 0.0, _SIGMAS * noise):
+        return None  # below the level at which a contact ends: the log was cut off while the axis rebounds
     if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
         return None
     return Finding(
