@@ -15,7 +15,7 @@ from cdtool.formats.groups import Group, Part, Parts, Written, need_clocks, stor
 from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.parquet import OWN_CLOCKS
 from cdtool.formats.source import Column
-from cdtool.recording import FloatArray
+from cdtool.recording import BoolArray, FloatArray
 
 # What is written at once: so many numbers, 8 MiB of them, but no fewer rows.
 _VALUES, _FEWEST_ROWS = 2**20, 2**14
@@ -81,16 +81,16 @@ def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[C
 
 def _of_one(arrow: Any, group: Group, part: Part | None) -> list[Any]:
     if part is None:
-        return [arrow.array(np.empty(0)) for _ in range(group.own_clock + len(list(chain(*group.flat))))]
+        return [_array(arrow, np.empty(0)) for _ in range(group.own_clock + len(list(chain(*group.flat))))]
     values = [part.time, *part.flat] if group.own_clock else part.flat
-    return [arrow.array(column) for column in values]
+    return [_array(arrow, column) for column in values]
 
 
 def _of_several(arrow: Any, groups: Sequence[Group], ready: Sequence[Part | None]) -> list[Any]:
     """The times of any clock, then each column at the rows of its own."""
     times = [np.empty(0) if part is None or part.time is None else part.time for part in ready]
     table, rows = _rows(times)
-    arrays = [arrow.array(table)]
+    arrays = [_array(arrow, table)]
     for group, part, places in zip(groups, ready, rows, strict=True):
         empty = [np.empty(0)] * len(list(chain(*group.flat)))
         arrays += [_spread(arrow, values, places, len(table)) for values in (part.flat if part is not None else empty)]
@@ -124,4 +124,11 @@ def _spread(arrow: Any, values: FloatArray, rows: Any, count: int) -> Any:
     """Values at their rows of a longer table, null elsewhere."""
     spread, absent = np.zeros(count), np.ones(count, dtype=bool)
     spread[rows], absent[rows] = values, False
-    return arrow.array(spread, mask=absent)
+    return _array(arrow, spread, absent)
+
+
+def _array(arrow: Any, values: FloatArray, absent: BoolArray | None = None) -> Any:
+    """An arrow array of numbers, null where absent; made from its buffers, since pyarrow's own way imports pandas."""
+    data = np.ascontiguousarray(values, dtype=np.float64)
+    present = None if absent is None else arrow.py_buffer(np.packbits(~absent, bitorder="little"))
+    return arrow.Array.from_buffers(arrow.float64(), len(data), [present, arrow.py_buffer(data)])

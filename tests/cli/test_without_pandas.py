@@ -1,4 +1,7 @@
-"""No command imports pandas: it is installed for what comes later, and would double the start of each command."""
+"""No command imports pandas: it is installed for what comes later, and would double the start of each command.
+
+Reading Parquet and Feather is left out: pyarrow imports it by itself there.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +33,8 @@ commands = [
     ("compare", folder / "results.json", folder / "other.json", "-o", folder / "compared.md"),
     ("plan", "--difference-ms", "5", "--std-ms", "3"),
     *(("convert", log, folder / f"to{suffix}") for suffix in (".csv", ".mcap", ".parquet", ".feather", ".h5", ".tdms")),
-    *(("info", folder / f"to{suffix}") for suffix in (".mcap", ".parquet", ".feather", ".h5", ".tdms")),
-    ("recover", folder / "log.mcap", folder / "recovered.mcap"),
+    *(("info", folder / f"to{suffix}") for suffix in (".mcap", ".h5", ".tdms")),
+    ("recover", folder / "log.mcap", "-o", folder / "recovered.mcap"),
     ("signature", "show", signature),
     ("signature", "check", signature, *sorted(folder.glob("free/*.csv")), "-m", machine),
     ("signature", "update", signature, folder / "holdout" / "01.csv", "-m", machine),

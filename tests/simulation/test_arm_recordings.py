@@ -99,7 +99,7 @@ def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: 
     assert list(values["impacts"]) == ["soft"]
     assert values["signature"] == {"position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
     assert values["activation"] == {"debounce": 7}
-    assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "samples": 3}
+    assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
 
 
 def test_true_contacts_are_listed_beside_the_logs(folder: Path) -> None:

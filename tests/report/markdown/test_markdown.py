@@ -361,7 +361,8 @@ def test_a_report_of_5000_recordings_fits_a_comment_and_says_what_it_left_out(fi
     assert missed and int(missed[1]) == sum("no alarm in its window" in row for row in rows(text)) > 10
     whole_blocks(text)
     assert "Contacts missed (6250)" in text
-    assert ["campaign 1/stiff/recording_00000.mcap", "half of it is missing"] in rows(text)
+    left_out = [row for row in rows(text) if row[-1].startswith("half of it is missing")]
+    assert len(left_out) == 1 and "recording_00000.mcap" in left_out[0][0]
 
 
 @pytest.mark.parametrize("most", [4000, 4444, 6000, 9000, 15_000, 30_000])
