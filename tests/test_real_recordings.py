@@ -63,7 +63,7 @@ def test_an_added_force_on_an_emps_stroke_is_found(emps):
     torque = strokes[0].recording["torque"]
     pushed = replace(torque, values=torque.values + 60.0 * (torque.time > 1.2)[:, np.newaxis])
     channels = {**strokes[0].recording.channels, "torque": pushed}
-    hit = replace(strokes[0], recording=replace(strokes[0].recording, channels=channels))
+    hit = replace(strokes[0], recording=replace(strokes[0].recording, channels=channels), log=None, cut="whole")
     detection = detect_operation(hit, machine_file.machine, detector, fitted, Activation())
     assert 1.2 < detection.verdict.alarms[0].time < 1.3
 

@@ -42,7 +42,8 @@ def judging_classes(
     """Return where on `clock` (n,) [s] each class judges in each stroke; a class that judges nowhere is left out.
 
     Until a class has begun its stroke all of them judge. Then those judge that have fitted since they began; one that
-    has departed judges for `hold` [s] more, also beyond the end of its stroke. It judges again once it fits and no
+    has departed judges for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke judges
+    the rest behind it as long. It judges again once it fits and no
     other class does, or has fitted for `hold`. Where no speed has come for `hold`, none judges.
     """
     speed = recording["speed"]
@@ -126,6 +127,7 @@ def _judge(
     count = begun.shape[1]
     member = np.zeros(count, dtype=np.bool_)
     held = np.zeros(count, dtype=np.bool_)
+    resting = np.zeros(count, dtype=np.bool_)
     started = np.zeros(count, dtype=np.bool_)
     fitting = np.zeros(count, dtype=np.bool_)
     last_fit = np.zeros(count)
@@ -135,9 +137,10 @@ def _judge(
     for k in range(len(time)):
         if fresh[k]:
             for j in range(count):
-                if member[j] and started[j] and last_fit[j] < completed_by[k]:
-                    held[j] = True
-                    held_since[j] = departed[j]
+                if member[j] and started[j]:
+                    resting[j] = last_fit[j] >= completed_by[k]
+                    held[j] = not resting[j]
+                    held_since[j] = time[k] if resting[j] else departed[j]
                 member[j] = not begun[k, j]
                 last_fit[j] = time[k]
                 departed[j] = time[k]
@@ -146,12 +149,13 @@ def _judge(
         if not known[k]:
             for j in range(count):
                 now[k, j] = member[j]
-                before[k, j] = held[j]
+                before[k, j] = held[j] or resting[j]
             continue
         any_held = False
         for j in range(count):
-            if held[j] and time[k] - held_since[j] > hold:
+            if time[k] - held_since[j] > hold:
                 held[j] = False
+                resting[j] = False
             any_held = any_held or held[j]
         for j in range(count):
             if fits[k, j]:
@@ -183,6 +187,8 @@ def _judge(
         for j in range(count):
             any_started = any_started or (member[j] and started[j])
         for j in range(count):
-            # Once a class has begun, one that has not judges only while the motion may still be its own.
+            # Once a class has begun, one that rests behind its stroke judges no more, and one that has not begun
+            # judges only while the motion may still be its own.
             now[k, j] = member[j] and (started[j] or not any_started or fits[k, j])
-            before[k, j] = held[j]
+            resting[j] = resting[j] and not any_started
+            before[k, j] = held[j] or resting[j]

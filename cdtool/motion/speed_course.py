@@ -35,6 +35,11 @@ class SpeedCurve:
     mean: FloatArray
     spread: FloatArray
 
+    @property
+    def last(self) -> float:
+        """The last grid point but one."""
+        return self.step * max(len(self.mean) - 2, 0)
+
     def at(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return mean and spread (n,) at the places of `axis`; those of the first point where it is NaN."""
         grid = self.step * np.arange(len(self.mean))
@@ -136,6 +141,9 @@ def fitting_samples(
         mean, spread = course.expected(where)
         reach = np.maximum(_SPREADS * spread, least)
         lowest, highest = mean - reach, mean + reach
+        # A stroke that ends at rest slows down within its last grid step.
+        ends = where.running & (np.nan_to_num(where.travel) >= course.by_travel.last) & (mean < 0.5 * nominal_speed)
+        lowest = np.where(ends, np.minimum(lowest, -least), lowest)
     fits = (forward >= lowest) & (forward <= highest)
     backward = confirmed(forward <= -START_SHARE * nominal_speed)
     return begun, np.where(begun, fits, ~backward)

@@ -47,7 +47,7 @@ def test_the_others_go_on_and_its_contacts_are_not_assessable_with_the_reason(fo
         (item["group"], item["detector"]): (item["hours"], item["not_assessable"]) for item in results["exposure"]
     }
     assert watched["holdout", "pure_inertia"] == (0.0, 1) and watched["holdout", "momentum"][0] > 0.0
-    assert re.search(r"stiff +pure_inertia +- +- +- +- +0 +- +1 +- +1", done.out)
+    assert re.search(r"stiff +pure_inertia +- +- +0 +- +1 +- +1", done.out)
     assert "1 not assessable" in (folder / "r.md").read_text(encoding="utf-8")
 
 
