@@ -103,7 +103,7 @@ def thesis_rule(work: Path, names: Sequence[str]) -> str:
         settings = '[activation]\ndebounce = 1\n\n[signature]\nrule = "thesis"\n'
         old = re.sub(r"\[impacts\.\w+\]\nlogs = .*\n", "", text)
         kept = re.search(r"\[signature\]\n((?:(?!\[|debounce).*\n)*)", old)
-        old = re.sub(r"\[signature\]\n(?:(?!\[).*\n)*", "", old)
+        old = re.sub(r"\[(?:signature|activation)\]\n(?:(?!\[).*\n)*", "", old)
         plain.write_text(old + "\n" + settings + (kept.group(1) if kept else ""), encoding="utf-8")
         alarmed = [_alarmed(cdtool.benchmark(item)) for item in (plain, file)]
         for detector, share in alarmed[0].items():

@@ -119,3 +119,17 @@ def test_the_check_of_an_accelerometer_takes_no_longer_than_the_log_is_long():
     (found,) = accelerometer_findings(recording)
     assert process_time() - begin < 2.0  # 18,000 windows of 20 samples: not all samples for each of them
     assert "fits the speed" in found.message
+
+
+def test_a_torque_without_any_value_is_no_traceback(tmp_path):
+    from tests.command import cdtool as command
+
+    made = command("simulate", "gate", "--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0, "-o", tmp_path / "gate")
+    assert made.status == 0
+    path = tmp_path / "gate" / "free" / "01.csv"
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    at = header.split(",").index("i_motor")
+    blind = [",".join("" if i == at else cell for i, cell in enumerate(row.split(","))) for row in rows]
+    path.write_text("\n".join([header, *blind]) + "\n", encoding="utf-8")
+    done = command("info", path, "-m", tmp_path / "gate" / "machine.toml")
+    assert "Traceback" not in done.err and done.status in (0, 3)

@@ -82,8 +82,8 @@ def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[C
 def _of_one(arrow: Any, group: Group, part: Part | None) -> list[Any]:
     if part is None:
         return [_array(arrow, np.empty(0)) for _ in range(group.own_clock + len(list(chain(*group.flat))))]
-    values = [part.time, *part.flat] if group.own_clock else part.flat
-    return [_array(arrow, column) for column in values]
+    own = [part.time] if group.own_clock and part.time is not None else []
+    return [_array(arrow, column) for column in (*own, *part.flat)]
 
 
 def _of_several(arrow: Any, groups: Sequence[Group], ready: Sequence[Part | None]) -> list[Any]:

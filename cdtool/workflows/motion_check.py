@@ -150,8 +150,11 @@ def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[
     inertia = float(machine_file.machine.nominal_inertia[motion.joint])
     if inertia <= 0.0:
         return []
-    force = np.nanmedian(np.abs(recording["torque"].values[:, motion.joint]))
-    friction = float(force) / motion.nominal_speed
+    torque = recording["torque"].values[:, motion.joint]
+    torque = torque[np.isfinite(torque)]
+    if not len(torque):
+        return []
+    friction = float(np.median(np.abs(torque))) / motion.nominal_speed
     poles, _ = detector.steady_state(inertia, motion.nominal_speed, friction, recording["speed"].period)
     slow, quick = float(poles[0]), float(poles[1])
     text = f"poles at {motion.nominal_speed:.3g} {recording['speed'].unit}: {slow:.3g} and {quick:.3g} rad/s"

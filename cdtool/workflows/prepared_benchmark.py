@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.plausible import PlausibleRanges
@@ -71,7 +72,9 @@ def prepare_benchmark(
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
-        if stored.joints != setup.watched:
+        # A file that names no joints watches all of the machine's; a signal of the whole machine has one column.
+        everything = (tuple(machine_file.machine.joints), WHOLE_MACHINE)
+        if stored.joints != setup.watched and (setup.watched or stored.joints not in everything):
             names = [", ".join(joints) or "all joints" for joints in (stored.joints, setup.watched)]
             raise UsageError(f"the signature watches {names[0]}, {file} {names[1]}", "learn one for the same joints")
         thresholds: Mapping[str, Any] = {instance.name: stored.current}

@@ -184,3 +184,12 @@ def test_a_detector_has_to_be_named_where_the_file_names_several():
     assert done.status == 2 and "does not name detector 'vo'" in done.err
     done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi", "--limit", 3)
     assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
+
+
+def test_a_signature_of_all_joints_fits_a_benchmark_file_that_names_none(tmp_path):
+    gate = Path(__file__).parents[2] / "sample_logs" / "gate"
+    logs = sorted((gate / "free").iterdir())
+    made = cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", tmp_path / "s.json")
+    assert made.status == 0, made.err
+    done = cdtool("detect", gate / "stiff" / "03.csv", "-b", gate / "benchmark.toml", "-s", tmp_path / "s.json")
+    assert done.status == 0 and "alarm" in done.out, done.err
