@@ -36,7 +36,7 @@ from damaged_logs import KINDS, Fault, damaged, random_faults
 
 CELLS = [(detector, threshold) for detector in DETECTORS.names() for threshold in THRESHOLDS.names()]
 AT_ONCE = Activation(debounce=1)
-LEARNED, OTHERS, JUDGED = 10, 6, 3
+LEARNED, OTHERS, JUDGED = 12, 12, 3
 # Faults may move the largest exceedance of a run by this share of what impact-free runs reach: before, it was 7 to 39.
 SHARE = 1.6
 CHANNELS = ("torque", "speed", "position", "acceleration")
