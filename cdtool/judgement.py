@@ -78,10 +78,11 @@ class Judgement:
             rows = slice(0, len(self.signal.time))
             return tuple(_Share(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1])
         judging = judging_classes(self.recording, self.classes, self.strokes, self.signal.time, self.hold)
-        return tuple(self._share(self.thresholds[item.motion], item.stroke, item.where) for item in judging)
+        learned = [item for item in self.thresholds if class_of(item) is not None]
+        return tuple(self._share(learned[item.motion], item.stroke, item.where) for item in judging)
 
     def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
-        """A class in a stroke: its signal is that of no other motion, so that a filter starts anew behind such."""
+        """A class in a stroke: its signal is that of no other motion, so that a filter starts again behind such."""
         stroke = self.strokes[number]
         after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
         whole = len(self.strokes) == 1
@@ -136,5 +137,11 @@ def judged(
 
 def classes_of(thresholds: Sequence[FittedThreshold]) -> tuple[MotionClass, ...]:
     """Return the classes of motion that thresholds were learned for; a threshold without one serves any motion."""
-    classes = (getattr(item, "motion", None) for item in thresholds)
+    classes = (class_of(item) for item in thresholds)
     return tuple(item for item in classes if item is not None)
+
+
+def class_of(threshold: FittedThreshold) -> MotionClass | None:
+    """Return the class of motion that a threshold was learned for; None where it serves any motion."""
+    motion: MotionClass | None = getattr(threshold, "motion", None)
+    return motion

@@ -43,10 +43,12 @@ def judging_classes(
 
     Until a class has begun its stroke all of them judge. Then those judge that have fitted since they began; one that
     has departed judges for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke judges
-    the rest behind it as long. It judges again once it fits and no
-    other class does, or has fitted for `hold`. Where no speed has come for `hold`, none judges.
+    the rest behind it as long. It judges again once it fits and no other class does, or has fitted for `hold`. Where no
+    speed has come for `hold`, none judges.
     """
     speed = recording["speed"]
+    if not len(speed):
+        return []
     n, count = len(speed.time), len(classes)
     begun = np.zeros((n, count), dtype=np.bool_)
     fits = np.zeros((n, count), dtype=np.bool_)
@@ -89,18 +91,17 @@ def _on_clock(
     at = np.maximum(at, 0)
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(time)), -1))[at]
     recent = there & (last_known >= 0) & (clock - time[np.maximum(last_known, 0)] <= hold)
-    stroke = np.searchsorted(firsts, at, side="right") - 1
+    stroke_of = np.searchsorted(firsts, np.arange(len(time)), side="right") - 1
+    stroke = stroke_of[at]
     found = []
     for j in range(now.shape[1]):
         # What departed in an earlier stroke: the last one that it had begun and judged in.
-        judged_in = np.where(started[:, j], np.searchsorted(firsts, np.arange(len(time)), side="right") - 1, -1)
-        held_from = np.maximum.accumulate(judged_in)
-        for number in range(len(firsts)):
-            own = now[at, j] & (stroke == number)
-            held = before[at, j] & (held_from[at] == number) & (stroke > number)
-            where = (own | held) & recent
-            if where.any():
-                found.append(Judging(number, j, where))
+        held_from = np.maximum.accumulate(np.where(started[:, j], stroke_of, -1))[at]
+        own = now[at, j] & recent
+        held = before[at, j] & recent & (held_from >= 0) & (held_from < stroke)
+        for number in np.union1d(stroke[own], held_from[held]).tolist():
+            where = (own & (stroke == number)) | (held & (held_from == number))
+            found.append(Judging(number, j, where))
     return found
 
 

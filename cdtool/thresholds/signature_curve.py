@@ -18,6 +18,8 @@ from cdtool.recording import FloatArray
 COVERAGE = 0.8
 # The spread is nowhere below this share of its median: a quantised signal may not vary at all at some points.
 _SMALLEST_SPREAD = 0.1
+# A sample stands for a grid point at most so many steps before it: of the grid, or of the log where those are wider.
+_FURTHEST_STEPS = 2.0
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,8 @@ class Curve:
 def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) -> FloatArray:
     """One run's values (g, J) on a curve's grid: the sample of the first passage of each grid point, NaN without one.
 
-    A sample, not a value between two: interpolation would average their noise and make the spread too small.
+    A sample, not a value between two: interpolation would average their noise and make the spread too small. Of a log
+    with fewer samples than grid points each sample stands for those that it has passed since the last one.
     """
     result = np.full((len(curve.count), signal.values.shape[1]), np.nan)
     grid = curve.grid
@@ -161,7 +164,8 @@ def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) ->
         along, values = along[passing], signal.values[use, j][passing]
         at = np.searchsorted(along, grid, side="left")
         # Behind a stretch without valid samples the next sample is too far on to stand for the grid point.
+        usual = float(np.median(np.diff(along))) if len(along) > 1 else 0.0
         reached = np.flatnonzero(at < len(along))
-        near = reached[along[at[reached]] - grid[reached] <= 2.0 * curve.step]
+        near = reached[along[at[reached]] - grid[reached] <= _FURTHEST_STEPS * max(curve.step, usual)]
         result[near, j] = values[at[near]]
     return result

@@ -127,6 +127,15 @@ def test_without_a_speed_for_the_matching_window_nothing_judges():
     assert found[: 1500 + 900].all() and not found[2600:3800].any()
 
 
+@pytest.mark.parametrize("how", ["whole", "motion"])
+def test_a_log_without_a_single_sample_of_speed_is_judged_by_no_class(how):
+    recording = log((0.3, 3.0), (0.0, 1.5))
+    nothing = Series(np.empty(0), np.empty((0, 1)), "m/s")
+    silent = Recording("silent", "made up", ("axis",), {**recording.channels, "speed": nothing})
+    clock = recording["position"].time
+    assert judging_classes(silent, (FAST, BACK), strokes_so_far(silent, how, (FAST, BACK)), clock) == []
+
+
 def test_a_class_that_was_not_learned_is_told_by_its_nominal_speed_alone():
     plain = MotionClass(1, 0.3)
     assert judges(log((0.3, 3.0), seed=8), plain).all()

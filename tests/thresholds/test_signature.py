@@ -14,6 +14,7 @@ from cdtool.errors import SignatureError, UsageError
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
+from tests.thresholds import strokes
 
 N = 4000
 TIME = np.arange(N) * 1e-3
@@ -65,6 +66,17 @@ def test_before_the_motion_starts_no_limit_is_known():
     statistic, _ = Signature().fit(runs(12)).evaluate(stroke(), signal(np.zeros(N)))
     assert (statistic.status[:390] == Status.NO_LIMIT).all()
     assert statistic.valid[500:3900].all()
+
+
+@pytest.mark.parametrize("rate", [10, 25, 50, 100])
+def test_a_log_with_fewer_samples_than_grid_points_has_a_limit_all_along(rate):
+    time, rng = np.arange(4 * rate) / rate, np.random.default_rng(3)
+    moving = strokes.stroke(time=time)
+    learned = [(moving, strokes.signal(100.0 + rng.normal(size=len(time)), time)) for _ in range(40)]
+    statistic, band = Signature(safety_factor=5.0).fit(learned).evaluate(moving, learned[0][1])
+    # The last sample is beyond the last point of the grid, by less than a step of it.
+    assert statistic.valid[time > 0.4 + 3.0 / rate][:-1].all()
+    assert np.median(band.upper[statistic.valid]) == pytest.approx(105.0, abs=0.5)
 
 
 def test_beyond_the_learned_travel_no_limit_is_known():
