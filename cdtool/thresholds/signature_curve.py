@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from cdtool.detection import Signal
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
-from cdtool.recording import FloatArray
+from cdtool.recording import BoolArray, FloatArray
 
 # A grid point has a limit once this share of the runs has been there.
 COVERAGE = 0.8
@@ -99,20 +100,32 @@ class Curve:
         """Mean and spread (g, J), NaN where too few runs have been.
 
         Pooled: the mean smoothed over the window, and the spread from the variance pooled over the window, the mean's
-        deviation from its smoothed course included. Otherwise point by point.
+        deviation from its smoothed course included. Otherwise point by point. Read-only: both are computed once.
         """
+        return self._pooled_band if pooled else self._own_band
+
+    @cached_property
+    def _pooled_band(self) -> tuple[FloatArray, FloatArray]:
         known = self.count >= self.enough
-        mean, variance = self.mean, self._variance()
-        if pooled:
-            reach = round(self.window / self.step)
-            mean = moving_mean(self.mean, known, reach)
-            variance = moving_mean(variance + (self.mean - mean) ** 2, known, reach)
+        reach = round(self.window / self.step)
+        mean = moving_mean(self.mean, known, reach)
+        return self._where_known(mean, moving_mean(self._variance() + (self.mean - mean) ** 2, known, reach), known)
+
+    @cached_property
+    def _own_band(self) -> tuple[FloatArray, FloatArray]:
+        return self._where_known(self.mean, self._variance(), self.count >= self.enough)
+
+    @staticmethod
+    def _where_known(mean: FloatArray, variance: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
         spread = np.sqrt(variance)
         for j in range(spread.shape[1]):
             if known[:, j].any():
                 floor = _SMALLEST_SPREAD * float(np.median(spread[known[:, j], j]))
                 spread[:, j] = np.maximum(spread[:, j], floor)
-        return np.where(known, mean, np.nan), np.where(known, spread, np.nan)
+        band = np.where(known, mean, np.nan), np.where(known, spread, np.nan)
+        for part in band:
+            part.flags.writeable = False
+        return band
 
     def at(self, values: FloatArray, axis: FloatArray) -> FloatArray:
         """Values given on the grid, between grid points by a straight line; NaN outside the grid."""
