@@ -330,7 +330,9 @@ def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
         return f"lines: {done.error.strip().splitlines()[-1]}"
     if strike.signal:
         expected = _STATUS_OF[signal.Signals(strike.signal)]
-        return "" if done.status == expected else f"status: {done.status} {done.error.strip()[-200:]}"
+        # Before the command has begun the signal itself ends it, which a shell shows as the same status.
+        seen = 128 - done.status if done.status < 0 else done.status
+        return "" if seen == expected else f"status: {done.status} {done.error.strip()[-200:]}"
     if done.status == known.outcome.status and left == known.new_files:
         return ""  # what failed was not needed
     if done.status != 2:
