@@ -25,13 +25,15 @@ _ONE_WAY = 0.2
 class MotionClass:
     """Direction of travel (+1, -1; 0 = no motion), nominal speed [load unit/s] and the joint that leads the motion.
 
-    `course`: speed along the stroke, learned from impact-free runs; None where nothing was learned.
+    `course`: speed along the stroke, learned from impact-free runs; None where nothing was learned. `unit`: that of the
+    speed, for messages; empty where it is not known.
     """
 
     direction: int
     nominal_speed: float
     joint: int = 0
     course: SpeedCourse | None = field(default=None, compare=False, repr=False)
+    unit: str = field(default="", compare=False)
 
     def matches(self, other: MotionClass, tolerance: float) -> bool:
         """Same joint and direction, and speeds that differ by at most the share `tolerance`."""
@@ -48,18 +50,24 @@ class MotionClass:
     def described(self) -> str:
         """For messages: direction and speed."""
         word = {1: "forward", -1: "backward", 0: "at rest"}[self.direction]
-        return f"{word} at {self.nominal_speed:.3g}/s" if self.direction else word
+        return f"{word} at {self.speed_in_words(self.nominal_speed)}" if self.direction else word
+
+    def speed_in_words(self, speed: float) -> str:
+        """For messages: a speed with the unit of this class."""
+        return f"{speed:.3g} {self.unit}" if self.unit else f"{speed:.3g}/s"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the class as JSON values."""
         course = {"course": self.course.to_dict()} if self.course else {}
-        return {"direction": self.direction, "nominal_speed": self.nominal_speed, "joint": self.joint, **course}
+        unit = {"speed_unit": self.unit} if self.unit else {}
+        return {"direction": self.direction, "nominal_speed": self.nominal_speed, "joint": self.joint, **unit, **course}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Return the class that `to_dict` has written; without a course where the file holds none."""
         course = SpeedCourse.from_dict(values["course"]) if values.get("course") else None
-        return cls(int(values["direction"]), float(values["nominal_speed"]), int(values["joint"]), course)
+        unit = str(values.get("speed_unit", ""))
+        return cls(int(values["direction"]), float(values["nominal_speed"]), int(values["joint"]), course, unit)
 
 
 def motion_class(recording: Recording) -> MotionClass:
@@ -85,7 +93,8 @@ def _class_by(recording: Recording, channels: Sequence[str]) -> MotionClass:
             joint = leading_joint(series)
             present = np.isfinite(series.values[:, joint])
             if present.any():
-                return _class_of(series.time[present], series.values[present, joint], joint)
+                found = _class_of(series.time[present], series.values[present, joint], joint)
+                return replace(found, unit=series.unit)
     return MotionClass(0, 0.0)
 
 

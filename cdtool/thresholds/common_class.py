@@ -23,7 +23,7 @@ def common_class(recordings: Sequence[Recording], alignment: str = "time_then_po
     """
     classes = [measured_class(recording) for recording in recordings]
     nominal = float(np.median([item.nominal_speed for item in classes]))
-    common = MotionClass(classes[0].direction, nominal, classes[0].joint)
+    common = replace(classes[0], nominal_speed=nominal)
     if common.direction == 0:
         raise SignatureError(f"{recordings[0].name}: the axis does not move", "learn from runs with motion")
     for recording, item in zip(recordings, classes, strict=True):

@@ -66,7 +66,7 @@ def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
     made: list[list[_Run]] = []
     for group in groups:
         median = float(np.median([run.motion.nominal_speed for run in group]))
-        common = MotionClass(group[0].motion.direction, median, group[0].motion.joint)
+        common = replace(group[0].motion, nominal_speed=median)
         near = [run for run in group if run.motion.matches(common, SPEED_TOLERANCE)]
         far = [run for run in group if not run.motion.matches(common, SPEED_TOLERANCE)]
         made += [near, *(_by_speed(far) if far and near else [])]
@@ -97,12 +97,14 @@ def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
     for run, where, speed, part in zip(runs, off, speeds, share, strict=True):
         if part > _OFF_SHARE:
             first = 1 + int(np.flatnonzero(where)[0])
+            log = run.operation.recording
+            unit = f" {log['position'].unit}" if "position" in log else ""
+            its, theirs = (run.motion.speed_in_words(item[first]) for item in (speed, usual))
             odd.append(
                 Skipped(
                     run.operation.name,
                     f"left out: its speed differs from that of {len(alike)} other runs over {100.0 * part:.0f} % of "
-                    f"the stroke, first after {grid[first]:.3g} of travel: {speed[first]:.3g}/s, not "
-                    f"{usual[first]:.3g}/s",
+                    f"the stroke, first after {grid[first]:.3g}{unit} of travel: {its}, not {theirs}",
                 )
             )
     return alike, odd
@@ -119,7 +121,8 @@ def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
         if not far:
             return runs, left_out
         worst = max(far, key=lambda run: abs(run.motion.nominal_speed - median))
-        words = f"left out: runs {worst.motion.described}, the other {len(runs) - 1} at {median:.3g}/s"
+        usual = worst.motion.speed_in_words(median)
+        words = f"left out: runs {worst.motion.described}, the other {len(runs) - 1} at {usual}"
         left_out.append(Skipped(worst.operation.name, words))
         runs = [run for run in runs if run is not worst]
 
@@ -133,7 +136,7 @@ def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
     use = np.isfinite(where.travel) & np.isfinite(speed)
     travel, smooth = (
         where.travel[use],
-        averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, 5.0 * series.period)),
+        averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * series.period)),
     )
     rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)
     return travel[rising], smooth[rising]

@@ -114,7 +114,7 @@ def test_a_stray_run_of_another_speed_is_left_out_and_the_others_are_learned(gat
     logs = sorted((gate_folder / "free").glob("*.csv"))
     machine = ("-m", gate_folder / "machine.toml")
     done = cdtool("learn-signature", *logs, tmp_path / "slow.csv", *machine, "-d", "gm", "-o", tmp_path / "s.json")
-    assert done.status == 3 and "slow.csv" in done.err and "forward at 0.1/s" in done.err
+    assert done.status == 3 and "slow.csv" in done.err and "forward at 0.1 m/s" in done.err
     assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
 
 

@@ -53,7 +53,7 @@ def test_it_is_not_learned_from_and_named_with_force_and_time(mixed, tmp_path):
     assert done.status == 3
     (line,) = [line for line in done.err.splitlines() if line.startswith("left out:")]
     assert f"04.csv: {SHOWN}" in line and "--onset-above" in line and " s: not an impact-free run" in line
-    assert "forward at 0.201/s     3" in done.out
+    assert "forward at 0.201 m/s     3" in done.out
     checked = cdtool(
         "signature", "check", tmp_path / "s.json", *sorted((mixed / "free").glob("*")), "-m", mixed / "machine.toml"
     )
@@ -65,7 +65,7 @@ def test_it_is_not_learned_from_and_named_with_force_and_time(mixed, tmp_path):
 
 
 def test_a_level_by_hand_lets_it_pass(mixed, tmp_path):
-    assert "forward at 0.201/s     4" in learn(mixed, tmp_path / "s.json", "--onset-above", 1e6).out
+    assert "forward at 0.201 m/s     4" in learn(mixed, tmp_path / "s.json", "--onset-above", 1e6).out
 
 
 def test_a_benchmark_leaves_it_out_of_what_is_learned_and_of_the_hold_out(mixed):

@@ -39,7 +39,7 @@ def check(signature: Path, gate_folder: Path, *arguments: object) -> Outcome:
 def test_show_tells_what_the_file_holds(signature, tmp_path):
     done = cdtool("signature", "show", signature, "--plot", tmp_path / "s.png")
     assert done.status == 0, done.err
-    for words in ("friction_ekf", "safety factor 5.5 by default", "debounce 9 ms", "forward at 0.201/s", "11"):
+    for words in ("friction_ekf", "safety factor 5.5 by default", "debounce 9 ms", "forward at 0.201 m/s", "11"):
         assert words in done.out, done.out
     assert (tmp_path / "s.png").stat().st_size > 10_000
     values = json.loads(cdtool("signature", "show", signature, "--json").out)
