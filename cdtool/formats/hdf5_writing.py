@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from io import FileIO
 from itertools import chain
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Parts, Written, stored
+from cdtool.formats.held_signals import held_signals
 from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.source import Column
 
@@ -22,14 +23,22 @@ def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
     Raises OSError where the disk is full or cannot be written.
     """
     h5py = library("h5py", "hdf5", path)
-    with _Disk(path, "wb+") as disk:
+    # An exception in what the library calls to write would leave it with a file that it cannot close.
+    with held_signals() as deliver, _Disk(path, "wb+") as disk:
+
+        def check() -> None:
+            deliver()
+            disk.check()
+
         with h5py.File(disk, "w", track_order=True) as file:
-            names = _write(file, disk, groups, parts, provenance)
-        disk.check()
+            names = _write(file, check, groups, parts, provenance)
+        check()
     return names
 
 
-def _write(file: Any, disk: _Disk, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
+def _write(
+    file: Any, check: Callable[[], None], groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]
+) -> Written:
     names: Written = []
     datasets: list[list[Any]] = []
     for key, value in stored(provenance).items():
@@ -48,7 +57,7 @@ def _write(file: Any, disk: _Disk, groups: Sequence[Group], parts: Parts, proven
                 values = [part.time, *part.flat] if groups[number].own_clock else part.flat
                 for dataset, column in zip(datasets[number], values, strict=True):
                     dataset[rows] = column
-                    disk.check()
+                    check()
                 done[number] = rows.stop
     return names
 

@@ -1,0 +1,78 @@
+"""Signals that end a program do so between two calls of a library, never inside what it calls."""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+from cdtool.formats import hdf5_writing
+from cdtool.formats.held_signals import held_signals
+from cdtool.workflows.converting import convert
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
+    def end(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, end)
+    try:
+        reached = []
+        with pytest.raises(KeyboardInterrupt), held_signals():
+            signal.raise_signal(number)
+            reached.append("behind the signal")
+        with pytest.raises(KeyboardInterrupt), held_signals() as deliver:
+            signal.raise_signal(number)
+            deliver()
+            reached.append("behind its delivery")
+        assert reached == ["behind the signal"]
+        assert signal.getsignal(number) is end
+    finally:
+        signal.signal(number, before)
+
+
+def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        with held_signals() as deliver:
+            signal.raise_signal(signal.SIGTERM)
+            deliver()
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+        seen = []
+
+        def elsewhere() -> None:
+            with held_signals():
+                seen.append(signal.getsignal(signal.SIGTERM))
+
+        thread = threading.Thread(target=elsewhere)
+        thread.start()
+        thread.join()
+        assert seen == [signal.SIG_IGN]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("call", [1, 5, 8])
+def test_an_interruption_while_hdf5_writes_is_one_and_leaves_nothing(tmp_path, monkeypatch, call):
+    pytest.importorskip("h5py")
+    rows = "\n".join(f"{k * 0.001:.3f},{value}" for k, value in enumerate(np.sin(np.arange(500) / 50.0)))
+    (tmp_path / "log.csv").write_text(f"time [s],torque [N m]\n{rows}\n", encoding="utf-8")
+    write, calls = hdf5_writing._Disk.write, []
+
+    def struck(self: hdf5_writing._Disk, data: object) -> int:
+        calls.append(data)
+        if len(calls) == call:
+            signal.raise_signal(signal.SIGINT)
+        return write(self, data)
+
+    monkeypatch.setattr(hdf5_writing._Disk, "write", struck)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            convert(tmp_path / "log.csv", tmp_path / "log.h5")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(calls) >= call and not (tmp_path / "log.h5").exists()
