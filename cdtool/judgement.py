@@ -13,7 +13,7 @@ import numpy as np
 
 from cdtool.detection import Band, Signal, Status
 from cdtool.motion import MotionClass
-from cdtool.motion.applicable import HOLD, judging_classes
+from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
@@ -100,7 +100,9 @@ class Judgement:
             return checked_evaluation(changed(shares[0].threshold), shares[0].recording, shares[0].signal)
         shape = self.signal.values.shape
         values, unit = self.signal.values.copy(), self.signal.unit
-        status = np.where(self.signal.valid, Status.OTHER_SPEED, self.signal.status).astype(np.uint8)
+        recent = speed_is_recent(self.recording, self.classes, self.signal.time, self.hold)[:, np.newaxis]
+        unjudged = np.where(recent, Status.OTHER_SPEED, Status.GAP)
+        status = np.where(self.signal.valid, unjudged, self.signal.status).astype(np.uint8)
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
         open_below, open_above, limited = (np.zeros(shape, dtype=bool) for _ in range(3))
         for share in shares:

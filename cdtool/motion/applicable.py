@@ -15,7 +15,7 @@ from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.speed_course import fitting_samples
 from cdtool.motion.strokes import Stroke
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A departure that begins while a class fits is judged by that class for so long [s]: the matching window.
 HOLD = 1.0
@@ -65,32 +65,46 @@ def judging_classes(
             fits[first:last, j] = agrees[-(last - first) :]
         fresh[first] = True
         completed_by[first] = item.rests - _COMPLETED
-    known: BoolArray = np.all(np.isfinite(speed.values[:, [motion.joint for motion in classes]]), axis=1)
+    known = _known(speed, classes)
     now = np.zeros((n, count), dtype=np.bool_)
     before = np.zeros((n, count), dtype=np.bool_)
     opposed = np.array(
         [[one.joint == other.joint and one.direction != other.direction for other in classes] for one in classes]
     )
     _judge(speed.time, begun, fits, known, fresh, completed_by, opposed, hold, now, before)
-    return _on_clock(speed.time, known, now, now & begun, before, firsts, clock, hold)
+    recent = speed_is_recent(recording, classes, clock, hold)
+    return _on_clock(speed.time, now, now & begun, before, firsts, clock, recent)
+
+
+def speed_is_recent(
+    recording: Recording, classes: Sequence[MotionClass], clock: FloatArray, hold: float = HOLD
+) -> BoolArray:
+    """Return where on `clock` (n,) [s] the last `hold` [s] brought a speed of every joint that leads a class."""
+    speed = recording["speed"]
+    last = speed.time[_known(speed, classes)]
+    if not len(last):
+        return np.zeros(len(clock), dtype=bool)
+    at = np.searchsorted(last, clock, side="right") - 1
+    recent: BoolArray = (at >= 0) & (clock - last[np.maximum(at, 0)] <= hold)
+    return recent
+
+
+def _known(speed: Series, classes: Sequence[MotionClass]) -> BoolArray:
+    known: BoolArray = np.all(np.isfinite(speed.values[:, [motion.joint for motion in classes]]), axis=1)
+    return known
 
 
 def _on_clock(
     time: FloatArray,
-    known: BoolArray,
     now: BoolArray,
     started: BoolArray,
     before: BoolArray,
     firsts: Sequence[int],
     clock: FloatArray,
-    hold: float,
+    recent: BoolArray,
 ) -> list[Judging]:
-    """The decision at the last speed sample at or before each time of `clock`."""
-    at = np.searchsorted(time, clock, side="right") - 1
-    there = at >= 0
-    at = np.maximum(at, 0)
-    last_known = np.maximum.accumulate(np.where(known, np.arange(len(time)), -1))[at]
-    recent = there & (last_known >= 0) & (clock - time[np.maximum(last_known, 0)] <= hold)
+    """The decision at the last speed sample at or before each time of `clock`, where one is `recent`."""
+    at = np.maximum(np.searchsorted(time, clock, side="right") - 1, 0)
     stroke_of = np.searchsorted(firsts, np.arange(len(time)), side="right") - 1
     stroke = stroke_of[at]
     found = []

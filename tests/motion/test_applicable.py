@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.detection import Signal, Status
+from cdtool.judgement import judged
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes
 from cdtool.motion.strokes import strokes_so_far
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
+from cdtool.thresholds.signature import Signature
 
 PERIOD = 1e-3
 RAMP = 0.4  # m/s2
@@ -230,3 +233,23 @@ def test_turning_round_without_a_rest_completes_a_stroke():
     recording = log((0.3, 3.0), (-0.3, 4.0), (0.0, 1.0), seed=16, noise=0.002)
     found = judges(recording, turning, BACK, how="motion")
     assert found[at(recording, 4.6) : at(recording, 7.0), 1].all()
+
+
+def test_where_no_speed_came_samples_are_missing_and_not_of_another_speed():
+    recordings = [log((0.3, 3.0), (0.0, 1.5), seed=200 + i) for i in range(12)]
+    rng = np.random.default_rng(1)
+
+    def signal_of(recording: Recording) -> Signal:
+        values = rng.standard_normal((len(recording["speed"].time), 1))
+        status = np.zeros(values.shape, dtype=np.uint8)
+        return Signal(recording["speed"].time, values, status, "N", joints=("axis",))
+
+    fitted = Signature(safety_factor=8.0).fit([(item, signal_of(item)) for item in recordings])
+    recording = log((0.3, 3.0), (0.0, 1.5), seed=7)
+    speed = recording["speed"].values.copy()
+    speed[1500:3800] = np.nan
+    series = Series(recording["speed"].time, speed, "m/s")
+    holed = Recording("holed", "made up", ("axis",), {**recording.channels, "speed": series})
+    statistic, _ = judged(holed, signal_of(holed), [fitted]).evaluated
+    assert (statistic.status[2600:3800] == Status.GAP).all()
+    assert not (statistic.status == Status.OTHER_SPEED).any()
