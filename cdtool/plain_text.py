@@ -10,6 +10,7 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # What is printed about one fault, warning or note, with all that comes from files [characters].
 LINE_LENGTH = 300
+_SINGULAR = {"are": "is", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
 
@@ -42,9 +43,25 @@ def digits(value: float, least: int = 6) -> str:
     return f"{Decimal(f'{value:.{max(least, before_point)}g}'):f}"
 
 
-def counted(count: float, thing: str) -> str:
-    """A number with its noun: "1 hour", "2.5 hours"."""
-    return f"{digits(count)} {thing}" if count == 1 else f"{digits(count)} {thing}s"
+def counted(count: float, thing: str, verb: str = "") -> str:
+    """Return a number with its noun, and with a verb that is given in the plural.
+
+    >>> counted(1, "hour"), counted(2.5, "hour"), counted(2, "entry")
+    ('1 hour', '2.5 hours', '2 entries')
+    >>> counted(1, "value", "are"), counted(2, "value", "are"), counted(1, "stamp", "repeat")
+    ('1 value is', '2 values are', '1 stamp repeats')
+    """
+    if count != 1:
+        return " ".join([digits(count), plural(thing), *verb.split()])
+    first, *rest = verb.split() or [""]
+    return " ".join([digits(count), thing, *([_SINGULAR.get(first, f"{first}s"), *rest] if first else [])])
+
+
+def plural(thing: str) -> str:
+    """Return the plural of a noun: "hours", "entries", "losses"."""
+    if thing.endswith("y") and thing[-2:-1] not in "aeiou":
+        return f"{thing[:-1]}ies"
+    return f"{thing}es" if thing.endswith(("s", "x", "ch", "sh")) else f"{thing}s"
 
 
 def _is_active(character: str) -> bool:

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.plain_text import counted
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
 
 # No channel of a machine reaches this in SI: 1e9 N m, rad/s or rad.
@@ -188,11 +189,12 @@ def _findings(name: str, series: Series, wrong: BoolArray, known: ChannelRange, 
     found = []
     for j in np.flatnonzero(wrong.any(axis=0)).tolist():
         rows = np.flatnonzero(wrong[:, j])
+        verb = "is" if len(rows) == 1 else "are"
         joint = f" of joint {joints[j]}" if series.joint_count > 1 else ""
         text = (
-            f"{len(rows)} values{joint} are none that its sensor gives (first {series.values[rows[0], j]:.4g} "
-            f"{series.unit} at {series.time[rows[0]]:.3f} s; usual are {known.centre[j]:.3g} +- {known.reach:.3g} "
-            f"{series.unit}): masked"
+            f"{counted(len(rows), 'value')}{joint} {verb} none that its sensor gives (first "
+            f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual are "
+            f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}): masked"
         )
         found.append(Finding(text, name, "loss"))
     return found

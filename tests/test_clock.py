@@ -41,9 +41,9 @@ def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
     np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
     np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
     told = " ".join(str(item) for item in clean.findings)
-    assert "1 time stamps are no number (line 8)" in told
-    assert "1 time stamps run backward (line 6)" in told
-    assert "1 time stamps repeat (line 5)" in told
+    assert "1 time stamp is no number (line 8)" in told
+    assert "1 time stamp runs backward (line 6)" in told
+    assert "1 time stamp repeats (line 5)" in told
 
 
 @settings(max_examples=100, deadline=None)
@@ -68,15 +68,15 @@ def test_whatever_the_stamps_the_clean_ones_strictly_increase(stamps):
             "loss",
         ),
         ([0, 1, 2, 3, 4, 5, 6, 0, 1, 2], "the clock starts again there", "loss"),
-        ([*range(200), 150, *range(200, 400)], "1 time stamps run backward (sample 200): dropped, 0.25 %", "warning"),
-        ([*range(200), 199, *range(200, 400)], "1 time stamps repeat (sample 200): dropped, 0.25 %", "warning"),
-        ([*range(30), 29, *range(30, 40)], "1 time stamps repeat (sample 30): dropped, 2.4 %", "loss"),
+        ([*range(200), 150, *range(200, 400)], "1 time stamp runs backward (sample 200): dropped, 0.25 %", "warning"),
+        ([*range(200), 199, *range(200, 400)], "1 time stamp repeats (sample 200): dropped, 0.25 %", "warning"),
+        ([*range(30), 29, *range(30, 40)], "1 time stamp repeats (sample 30): dropped, 2.4 %", "loss"),
         ([*range(30), np.nan, np.nan, *range(30, 40)], "2 time stamps are no number (sample 30, 31)", "loss"),
         ([*range(65500, 65536), *range(20)], "counter of 16 bits wraps there", "loss"),
         ([*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)], "add 4294967296 to the stamps", "loss"),
         ([*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)], "counter of 32 bits wraps there", "loss"),
         ([*range(65490, 65500), *range(20)], "the clock starts again there", "loss"),
-        ([*range(50), 60000, *range(50, 60)], "1 time stamps lie far off those around them (sample 50)", "loss"),
+        ([*range(50), 60000, *range(50, 60)], "1 time stamp lies far off those around them (sample 50)", "loss"),
         ([*range(99), *range(60000, 60051), *range(99, 600)], "or has jumped ahead before", "loss"),
     ],
     ids=["restart", "cut", "stray", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "wild", "ahead"],
@@ -143,8 +143,8 @@ def test_gaps_jitter_and_missing_values_are_told():
     values = np.zeros(200)
     values[5] = np.nan
     told = " ".join(str(item) for item in gap_findings(series(time, values), "speed"))
-    assert "1 gaps after 0.099 s (101 ms)" in told
-    assert "1 of 200 values are missing" in told
+    assert "1 gap after 0.099 s (101 ms)" in told
+    assert "1 of 200 values is missing" in told
 
 
 def test_how_long_a_value_is_held_depends_on_the_rate_so_far_and_not_on_a_later_one():

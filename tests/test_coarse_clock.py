@@ -54,7 +54,7 @@ def test_a_pause_moves_what_comes_after_it_and_is_told_as_one_gap():
     assert clean.keep.all() and not losses(clean)
     assert np.abs(clean.time - true).max() < 1e-3
     assert np.median(np.diff(clean.time[2100:])) == pytest.approx(1e-3, rel=1e-3)
-    assert gaps(clean) == ["time: 1 gaps after 2.000 s (2001 ms)"]
+    assert gaps(clean) == ["time: 1 gap after 2.000 s (2001 ms)"]
 
 
 @pytest.mark.parametrize("pause", [0.04, 0.3, 60.0])

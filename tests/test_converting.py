@@ -292,9 +292,9 @@ def unverified_log(path):
 def test_what_no_checksum_covered_gets_none_by_converting_and_says_so(tmp_path):
     log = unverified_log(tmp_path / "log.mcap")
     done = cdtool("convert", log, tmp_path / "out.mcap")
-    assert done.status == 0 and "20 of 20 messages carry no checksum: unverified" in done.err
+    assert done.status == 0 and "20 of 20 messages without a checksum: unverified" in done.err
     assert any(
-        "20 of 20 messages carry no checksum" in str(finding) for finding in survey(tmp_path / "out.mcap").findings
+        "20 of 20 messages without a checksum" in str(finding) for finding in survey(tmp_path / "out.mcap").findings
     )
 
 

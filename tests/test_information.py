@@ -39,7 +39,7 @@ def test_gaps_backward_time_and_missing_values_are_all_told_at_once(tmp_path):
     values[[7, 8]] = np.nan
     info = cdtool.info(write(tmp_path / "a.csv", "t,v", [time, values]))
     told = " ".join(map(str, info.findings))
-    for words in ("1 time stamps run backward (line 502)", "gaps after 0.999 s (401 ms)", "v: 2 of 2000 values"):
+    for words in ("1 time stamp runs backward (line 502)", "gap after 0.999 s (401 ms)", "v: 2 of 2000 values"):
         assert words in told
 
 

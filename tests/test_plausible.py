@@ -84,7 +84,7 @@ def test_a_value_that_no_sensor_gives_is_masked_in_its_own_row_only(runs, channe
     assert np.flatnonzero(found[channel][:, 0]).tolist() == [at]
     assert sum(int(mask.sum()) for mask in found.values()) == 1
     finding = ranges.masked(wrong.recording, wrong.factors).findings[-1]
-    assert (finding.channel, finding.severity) == (channel, "loss") and "1 values" in finding.message
+    assert (finding.channel, finding.severity) == (channel, "loss") and "1 value is" in finding.message
 
 
 @pytest.mark.parametrize("raw", [-32768.0, 32767.0, 65535.0])
@@ -204,7 +204,7 @@ def test_a_log_is_held_against_what_was_learned(gate, tmp_path):
     assert cdtool("detect", log, "-m", gate / "machine.toml", "-s", signature).status == 0
     spoil(log, 1, [900], "-3e7")
     done = cdtool("detect", log, "-m", gate / "machine.toml", "-s", signature)
-    assert done.status == 3 and "1 values are none that its sensor gives" in done.err
+    assert done.status == 3 and "1 value is none that its sensor gives" in done.err
 
 
 def test_min_and_max_of_the_machine_file_mask_and_are_a_loss(gate):

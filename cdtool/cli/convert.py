@@ -11,6 +11,7 @@ import typer
 from cdtool.cli.console import leave_with, plain, print_json
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
+from cdtool.plain_text import counted
 
 
 def convert(
@@ -37,7 +38,7 @@ def convert(
     if as_json:
         print_json(asdict(done))
     else:
-        clocks = f"{done.clocks} {'clock' if done.clocks == 1 else 'clocks'}"
+        clocks = f"{counted(done.clocks, 'clock')}"
         typer.echo(f"{', '.join(map(plain, done.files))}: {done.columns} columns on {clocks}")
         for path in done.machine_files:
             typer.echo(f"{plain(path)}: the machine file that reads it")

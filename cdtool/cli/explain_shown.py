@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.console import number, say, table
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.explanation.cause import Cause
@@ -27,14 +28,14 @@ def show_explained(explained: Explained) -> None:
     for _, item in shown:
         _show_event(item)
     if len(explained.events) > len(shown):
-        typer.echo(f"and {len(explained.events) - len(shown)} events more (--json has all)")
+        typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
     pairs = zip(explained.found.detections, explained.explanations, strict=True)
     quiet = [detection for detection, events in pairs if not events]
     for detection in quiet[:SHOWN]:
         why = detection.verdict.reason or "no alarm, and no contact without one"
         say(f"{detection.operation.name}, {detection.detector}: {why}")
     if len(quiet) > SHOWN:
-        typer.echo(f"and {len(quiet) - SHOWN} operations more without an event")
+        typer.echo(f"and {counted(len(quiet) - SHOWN, 'more operation')} without an event")
 
 
 def _show_event(item: Explanation) -> None:

@@ -12,6 +12,7 @@ from cdtool.cli.options import ForceOption, JobsOption, JsonOption, MachineOptio
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import UsageError
 from cdtool.exit_status import Fact, statuses_words
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
@@ -168,9 +169,8 @@ def update(
         reasons = [{"recording": item.recording, "reason": item.reason} for item in done.refused]
         print_json({"file": str(file), "added": list(done.added), "refused": reasons})
     else:
-        many = "run" if len(done.added) == 1 else "runs"
         counts = f"{len(done.refused)} refused; {len(done.file.runs)} in all"
-        typer.echo(f"{len(done.added)} {many} added to {plain(file)}, {counts}")
+        typer.echo(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
     leave(done.refused, () if done.added else [Fact.NOTHING_USABLE])
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.console import number, plain, table
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
@@ -110,7 +111,7 @@ def show_class(item: CheckedClass) -> None:
 def _show_coverage(found: Coverage) -> None:
     factors = [run.critical_factor for run in found.runs if math.isfinite(run.critical_factor)]
     nearest = f", the nearest at {100.0 * max(factors) / found.safety_factor:.0f} % of its limit" if factors else ""
-    judged = f"{len(found.runs)} runs, each judged by the others: {found.alarms} with an alarm{nearest}"
+    judged = f"{counted(len(found.runs), 'run')}, each judged by the others: {found.alarms} with an alarm{nearest}"
     typer.echo(f"coverage: {judged}")
     typer.echo(f"  {plain(found.verdict)}")
     for gap in found.gaps[:_SHOWN]:
@@ -121,7 +122,7 @@ def _show_coverage(found: Coverage) -> None:
 
 def _show_drift(found: DriftAudit) -> None:
     for joint in found.joints:
-        typer.echo(f"season: {len(joint.runs)} runs, {plain(joint.joint)}")
+        typer.echo(f"season: {counted(len(joint.runs), 'run')}, {plain(joint.joint)}")
         for verdict in joint.verdicts:
             typer.echo(f"  {plain(verdict)}")
         step = max(1, math.ceil(len(joint.runs) / _SHOWN))

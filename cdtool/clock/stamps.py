@@ -11,6 +11,7 @@ import numpy.typing as npt
 from cdtool.clock.coarse import line_through
 from cdtool.clock.wild import EPOCH, WildStamps, leading_wild
 from cdtool.errors import RecordingError
+from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, Finding, FloatArray, Series
 
 # A pause of more than this many periods between samples is a gap.
@@ -102,8 +103,8 @@ def epoch_start(stamps: FloatArray, factor: float) -> float:
     return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0
 
 
-def gap_findings(series: Series, channel: str) -> list[Finding]:
-    """Gaps and jitter of one channel's clock, and its missing values, all at once."""
+def gap_findings(series: Series, channel: str, masked: int = 0) -> list[Finding]:
+    """Gaps and jitter of one channel's clock, and its missing values, of which `masked` are reported elsewhere."""
     found: list[Finding] = []
     if len(series) > 2:
         steps = np.diff(series.time)
@@ -112,7 +113,7 @@ def gap_findings(series: Series, channel: str) -> list[Finding]:
         if len(gaps):
             at = ", ".join(f"{series.time[i]:.3f} s ({steps[i] * 1e3:.0f} ms)" for i in gaps[:3])
             more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
-            found.append(Finding(f"{len(gaps)} gaps after {at}{more}", channel))
+            found.append(Finding(f"{counted(len(gaps), 'gap')} after {at}{more}", channel))
         regular = steps[steps <= GAP_PERIODS * period]
         jitter = float(np.std(regular)) / period
         if jitter > 0.1:
@@ -122,10 +123,15 @@ def gap_findings(series: Series, channel: str) -> list[Finding]:
                     channel,
                 )
             )
-    missing = int(np.count_nonzero(~np.isfinite(series.values)))
-    if missing:
-        found.append(Finding(f"{missing} of {series.values.size} values are missing (NaN)", channel))
-    return found
+    absent = int(np.count_nonzero(~np.isfinite(series.values)))
+    return found + missing_findings(absent, series.values.size, channel, masked)
+
+
+def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:
+    """Of so many values those that are `absent`; what is `masked` among these has a finding of its own."""
+    missing = absent - masked
+    verb = "is" if missing == 1 else "are"
+    return [Finding(f"{missing} of {counted(values, 'value')} {verb} missing (NaN)", channel)] if missing else []
 
 
 class _Told:
@@ -142,7 +148,7 @@ class _Told:
         share = len(rows) / self._count
         shown = ", ".join(str(int(row) + self._first_row) for row in rows[:3])
         where = f"{self._name} {shown}{', ...' if len(rows) > 3 else ''}"
-        text = f"{len(rows)} time stamps {what} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
+        text = f"{counted(len(rows), 'time stamp', what)} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
         severity: Literal["warning", "loss"] = "loss" if why or share > _STRAY_SHARE else "warning"
         self.findings.append(Finding(text, "time", severity))
 

@@ -10,17 +10,19 @@ from cdtool.evaluation.results import Skipped
 # Up to so many are each said; of more the first, and so many names of the others.
 _EACH, _NAMED = 3, 3
 _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
+_LISTED = re.compile(r"(#[^,;]*)(?:, \1)+(?: and # more|, \.\.\.)?")
+_AS_PLURAL = {"is": "are", "has": "have"}
 
 
 def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
     """Names with texts in the order of their first ones; texts that differ in numbers only are one, with a count.
 
-    >>> grouped([("a", "3 gaps"), ("b", "1 gaps"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
+    >>> grouped([("a", "3 gaps"), ("b", "1 gap"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
     [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]
     """
     groups: dict[str, list[tuple[str, str]]] = {}
     for name, text in items:
-        groups.setdefault(_NUMBERS.sub("#", text), []).append((name, text))
+        groups.setdefault(_words(text), []).append((name, text))
     found: list[tuple[str, str]] = []
     for (name, text), *others in groups.values():
         if len(others) < _EACH:
@@ -30,6 +32,12 @@ def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
         listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
         found.append((name, f"{text}; {len(others)} more like it{f' ({listed})' if listed else ''}"))
     return found
+
+
+def _words(text: str) -> str:
+    """The words of a text without its numbers, the length of its lists, and singular or plural."""
+    bare = _LISTED.sub(r"\1", _NUMBERS.sub("#", text))
+    return " ".join(_AS_PLURAL.get(word, word.rstrip("s")) for word in bare.split(" "))
 
 
 def alike(items: Sequence[Skipped]) -> list[Skipped]:

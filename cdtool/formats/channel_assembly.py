@@ -21,6 +21,7 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
 from cdtool.formats.written_origin import with_written_origin
+from cdtool.plain_text import counted
 from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
 
@@ -104,8 +105,11 @@ class _Assembly:
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         if not len(clock.time):
             raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
-        series = Series(clock.time, self._scaled(item, self._kept(item, values, clock.keep)), item.unit)
-        self.findings += [found for found in gap_findings(series, item.channel) if found.message not in self.gaps]
+        scaled, masked = in_si(item, self._kept(item, values, clock.keep))
+        self.findings += masked.findings(item, self.channels.joints)
+        series = Series(clock.time, scaled, item.unit)
+        odd = gap_findings(series, item.channel, masked.total)
+        self.findings += [found for found in odd if found.message not in self.gaps]
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _table_clock(self) -> CleanTime:
@@ -160,11 +164,6 @@ class _Assembly:
         check_width(self.source.path, item, table.shape[1])
         return table if keep.all() else table[keep]
 
-    def _scaled(self, item: ChannelSource, values: FloatArray) -> FloatArray:
-        scaled, masked = in_si(item, values)
-        self.findings += masked.findings(item, self.channels.joints)
-        return scaled
-
 
 def check_width(path: Path, item: ChannelSource, width: int) -> None:
     """Raise RecordingError where a channel's samples have not one value a joint."""
@@ -197,11 +196,22 @@ class Masked:
             (self.impossible, "none that a sensor gives", "loss"),
         )
         return [
-            Finding(f"{count} values{of_joint(joints, j, len(counts))} are {what}: masked", item.channel, severity)
+            Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}: masked", item.channel, severity)
             for counts, what, severity in kinds
             for j, count in enumerate(counts.tolist())
             if count
         ]
+
+    @property
+    def total(self) -> int:
+        """How many values are masked in all."""
+        return int(sum(counts.sum() for counts in (self.infinite, self.saturated, self.impossible)))
+
+
+def _counted(count: int, of: str) -> str:
+    return (
+        counted(count, "value", "are") if not of else f"{counted(count, 'value')}{of} {'is' if count == 1 else 'are'}"
+    )
 
 
 def of_joint(joints: Sequence[str], joint: int, count: int) -> str:

@@ -20,6 +20,7 @@ from cdtool.formats.mcap.gathering import Gathering
 from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.pieces import Piece, Pieces, joined
 from cdtool.formats.source import Column, Source, with_topics
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 _BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
@@ -181,7 +182,7 @@ class _Bag:
         why = f": {self._end}" if self._end else ""
         found = [
             Finding(
-                f"{self.topics[topic][1] - count} of {self.topics[topic][1]} messages cannot be read{why}",
+                f"{self.topics[topic][1] - count} of {counted(self.topics[topic][1], 'message')} cannot be read{why}",
                 topic,
                 "loss",
             )

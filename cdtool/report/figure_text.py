@@ -60,11 +60,6 @@ def rate(count: int, figure: Interval, at_most: float) -> str:
     return f"{with_interval(figure) if count else 0}: at most {number(at_most)}"
 
 
-def counted(count: int, thing: str) -> str:
-    """A count with its noun: "1 contact", "2 contacts"."""
-    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
-
-
 def _written(value: float, decimals: int) -> str:
     if math.isnan(value):
         return NOTHING

@@ -19,6 +19,7 @@ from cdtool.evaluation.truth.labels import LABEL_FILE, Labels
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
+from cdtool.plain_text import counted
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.benchmark_sections import (
@@ -175,7 +176,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
     """Raise ConfigurationError where limits set by hand stand beside a budget, or beside more than one detector."""
     if setup.limits_by_hand and (setup.budget or len(setup.detectors) > 1):
-        what = "a false-alarm budget" if setup.budget else f"{len(setup.detectors)} detectors"
+        what = "a false-alarm budget" if setup.budget else f"{counted(len(setup.detectors), 'detector')}"
         raise ConfigurationError(
             f"{setup.path}: threshold.limits: are set by hand beside {what}", "they belong to one detector alone"
         )

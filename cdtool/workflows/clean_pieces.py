@@ -11,6 +11,7 @@ from cdtool.clock import GAP_PERIODS
 from cdtool.clock.stamps import FAR_OFF
 from cdtool.clock.wild import WildStamps
 from cdtool.formats.distribution import Distribution
+from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, Finding, FloatArray
 
 _SHOWN = 3
@@ -36,7 +37,9 @@ class _Dropped:
         name, share = "line" if first_row else "sample", self.count / rows
         shown = ", ".join(str(row + first_row) for row in self._first)
         where = f"{name} {shown}{', ...' if self.count > _SHOWN else ''}"
-        text = f"{self.count} time stamps {self.what} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
+        text = (
+            f"{counted(self.count, 'time stamp', self.what)} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
+        )
         return Finding(text, "time", "loss" if why or share > _STRAY_SHARE else "warning")
 
 
@@ -191,7 +194,7 @@ class Gaps:
             return found
         if self._count:
             more = f" and {self._count - _SHOWN} more" if self._count > _SHOWN else ""
-            found.append(Finding(f"{self._count} gaps after {', '.join(self._shown)}{more}", self._channel))
+            found.append(Finding(f"{counted(self._count, 'gap')} after {', '.join(self._shown)}{more}", self._channel))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
         if jitter > 0.1:
             text = f"the sample period varies by {100 * jitter:.0f} % (std) about {self._period * 1e3:.3g} ms"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.clock.stamps import missing_findings
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Finding, Recording, Series, worst_first
 from cdtool.workflows.accelerometer_check import accelerometer_findings
@@ -74,11 +75,8 @@ def _survey(log: Path) -> Info:
     channels = [_described(column, figures, clock.figures if clock else None) for column in source.columns.values()]
     findings = [*source.findings, *(clock.findings if clock else ())]
     findings += clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
-    findings += [
-        Finding(f"{channel.missing} of {channel.samples} values are missing (NaN)", channel.name)
-        for channel in channels
-        if channel.missing
-    ]
+    for channel in channels:
+        findings += missing_findings(channel.missing, channel.samples, channel.name)
     dialect = source.dialect if isinstance(source, TableSource) else ""
     return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), dialect)
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.channels import ChannelSource
+from cdtool.clock.stamps import missing_findings
 from cdtool.errors import RecordingError
 from cdtool.formats.channel_assembly import (
     apart_findings,
@@ -92,10 +93,7 @@ class LoggedChannel:
         found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
         found += self._masked.findings(self.item, self._names)
         found += self._gaps.findings() if self._gaps is not None else []
-        if self._missing:
-            text = f"{self._missing} of {self.rows * self.joints} values are missing (NaN)"
-            found.append(Finding(text, self.item.channel))
-        return found
+        return found + missing_findings(self._missing, self.rows * self.joints, self.item.channel, self._masked.total)
 
 
 class LoggedFile:

@@ -10,6 +10,7 @@ from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile
 from cdtool.motion import motion_class
 from cdtool.operations import operations_of
+from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray, Recording, Series
 
 # Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
@@ -41,8 +42,7 @@ def motion_findings(recording: Recording) -> list[Finding]:
     except CdtoolError:
         strokes = 0
     word = "forward" if motion.direction > 0 else "backward"
-    cut = f"{strokes} {'stroke' if strokes == 1 else 'strokes'} by motion"
-    text = f"{cut}; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
+    text = f"{counted(strokes, 'stroke')} by motion; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
     return [Finding(text, "speed", "note"), *_consistency(recording)]
 
 

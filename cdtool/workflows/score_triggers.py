@@ -18,6 +18,7 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
+from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -100,7 +101,8 @@ def _unlisted(
     for detector, by_name in said.items():
         missing = sorted(set(known) - set(by_name))
         if missing:
-            words = f"{detector}: {len(missing)} of {len(known)} recordings have no row: {became}; first {missing[0]}"
+            share = f"{len(missing)} of {counted(len(known), 'recording')}"
+            words = f"{detector}: {share} without a row: {became}; first {missing[0]}"
             found.append(Skipped(str(given.path), words))
     return found
 
@@ -117,7 +119,9 @@ def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock:
     outside = [begin for begin, end in rows if all(end < first or begin > last for first, last in spans)]
     if not outside:
         return []
-    words = f"{detector}: {len(outside)} of {len(rows)} rows lie in no operation, the first at {outside[0]:.3f} s"
+    words = (
+        f"{detector}: {len(outside)} of {counted(len(rows), 'row')} in no operation, the first at {outside[0]:.3f} s"
+    )
     first, last = spans[0][0], spans[-1][1]
     if any(not first <= at <= last for at in outside):
         other = "recording" if clock == "source" else "source"

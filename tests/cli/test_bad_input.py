@@ -79,7 +79,7 @@ def test_backward_and_repeated_time_is_told_and_the_rest_is_used(detect, tmp_pat
     lines = [*good[:3001], good[2500], *good[3001:4001], good[4000], *good[4001:]]
     path = written(tmp_path / "time.csv", "\n".join(lines) + "\n")
     told = cdtool("info", path, "-m", gate_folder / "machine.toml").out
-    assert "1 time stamps run backward" in told and "1 time stamps repeat" in told
+    assert "1 time stamp runs backward" in told and "1 time stamp repeats" in told
     assert "3002" in told
     done = detect(path)
     assert done.status == 0 and "alarm" in done.out

@@ -108,7 +108,7 @@ def test_a_late_alarm_and_none_are_missed_contacts_at_the_end_of_the_window(logs
     assert outcomes["stiff/01.csv"] == outcomes["stiff/02.csv"] == outcomes["soft/02.csv"] == ("missed", None)
     assert outcomes["soft/01.csv"] == ("detected", pytest.approx(200.0))
     assert all(row["watched_ms"] == pytest.approx(1000.0, abs=300.0) for row in values["contacts"])
-    assert "plc: 1 of 6 recordings have no row: taken as watched without an alarm; first soft/02.csv" in err
+    assert "plc: 1 of 6 recordings without a row: taken as watched without an alarm; first soft/02.csv" in err
 
 
 def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_exposure(logs, measured):
@@ -170,7 +170,7 @@ def test_triggers_on_the_source_clock_are_moved_and_on_the_wrong_clock_are_told(
     assert values["provenance"]["trigger_clock"] == "source"
     wrong, err = scored(tmp_path, rows, status=3)
     assert {row["outcome"] for row in wrong["contacts"]} == {"missed"}
-    assert "1 of 1 rows lie in no operation" in err and "try --clock source" in err
+    assert "1 of 1 row in no operation" in err and "try --clock source" in err
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 

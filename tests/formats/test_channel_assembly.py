@@ -81,15 +81,15 @@ def test_odd_stamps_are_dropped_from_every_channel_with_their_lines(log, machine
     columns["t"][[10, 20]] = [50.0, np.nan]
     recording = read_recording(log(table(columns)), machine())
     assert len(recording["torque"]) == len(recording["speed"]) == 48
-    assert "1 time stamps run backward (line 12): dropped" in told(recording)
-    assert "1 time stamps are no number (line 22): dropped" in told(recording)
+    assert "1 time stamp runs backward (line 12): dropped" in told(recording)
+    assert "1 time stamp is no number (line 22): dropped" in told(recording)
     assert np.isclose(recording["torque"].values[10, 0], 0.1 * 11 * 0.5 / RATIO)
 
 
 def test_a_gap_of_the_clock_is_told_once_not_for_each_channel(log, machine):
     columns = gate_columns()
     columns["t"][25:] += 500.0
-    assert told(read_recording(log(table(columns)), machine())).count("gaps after") == 1
+    assert told(read_recording(log(table(columns)), machine())).count("gap after") == 1
 
 
 def test_missing_infinite_and_saturated_values_are_masked_and_counted(log, machine):
@@ -108,9 +108,9 @@ def test_missing_infinite_and_saturated_values_are_masked_and_counted(log, machi
     recording = read_recording(log(table(columns)), found)
     missing = np.flatnonzero(np.isnan(recording["torque"].values[:, 0]))
     assert missing.tolist() == [3, 4, *range(40, 50)]
-    assert "torque: 1 values are infinite" in told(recording)
+    assert "torque: 1 value is infinite" in told(recording)
     assert "torque: 10 values are at the sensor's limit" in told(recording)
-    assert "torque: 12 of 50 values are missing" in told(recording)
+    assert "torque: 1 of 50 values is missing" in told(recording)
 
 
 def test_a_time_offset_moves_one_channel(log, machine):

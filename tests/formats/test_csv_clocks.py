@@ -79,7 +79,7 @@ def test_a_stray_step_back_is_no_full_hour_and_is_told(log, machine):
     times = [*np.arange(1800.0, 1810.0), 1801.5, *np.arange(1810.0, 1820.0)]
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS))
     assert recording["speed"].time.tolist() == [*np.arange(1800.0, 1820.0)]
-    assert "1 time stamps run backward (line 12)" in said(recording)
+    assert "1 time stamp runs backward (line 12)" in said(recording)
 
 
 def test_half_days_without_their_letters_go_on_past_noon(log, machine):

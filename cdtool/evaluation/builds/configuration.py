@@ -11,7 +11,7 @@ from typing import Any
 from cdtool.activation import DEBOUNCE_TIME
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.truth.labels import LABEL_FILE
-from cdtool.plain_text import shorten
+from cdtool.plain_text import counted, shorten
 
 # Provenance keys that decide how figures come about, and where the benchmark file sets them.
 _RULES = {
@@ -103,7 +103,9 @@ def _other_runs(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[Changed]
     if sorted(map(str, before.values())) == sorted(map(str, after.values())):
         return []
     both = len({str(value) for value in before.values()} & {str(value) for value in after.values()})
-    return [Changed("learned_runs", f"{len(before)} runs", f"{len(after)} runs, {both} of them the same")]
+    return [
+        Changed("learned_runs", counted(len(before), "run"), f"{counted(len(after), 'run')}, {both} of them the same")
+    ]
 
 
 def _only(values: Any, names: Sequence[str] | None) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from cdtool.evaluation.builds.pairs import Pairing
 from cdtool.evaluation.builds.questions import Figure
 from cdtool.evaluation.builds.rows import INCONCLUSIVE, NOTHING_SHOWN, BuildRow, Question
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.plain_text import shorten
+from cdtool.plain_text import counted, shorten
 
 # As many are named in the line of the verdict; all stand in `only_old`.
 _NAMED = 3
@@ -40,14 +40,15 @@ def overall_words(
     if verdict == INCONCLUSIVE:
         if not any(_could_show(row) for row in rows):
             return f"{INCONCLUSIVE}: this sample is too small to detect any change"
-        return f"{INCONCLUSIVE}: in {unresolved} of {len(rows)} rows this sample is too small to rule out {relevant}"
+        where = f"in {unresolved} of {counted(len(rows), 'row')}"
+        return f"{INCONCLUSIVE}: {where} this sample is too small to rule out {relevant}"
     if verdict == NOTHING_SHOWN and not asked:
         return f"{NOTHING_SHOWN}: every outcome is the same"
     how = f"of {asked} questions at a level of {significance:g} for all together"
     if verdict == NOTHING_SHOWN:
         return f"no change shown ({how})"
     ways = [f"{count} {way}" for count, way in zip(counts, ("worse", "better"), strict=True) if count]
-    open_rows = f"; {INCONCLUSIVE} in {unresolved} of {len(rows)} rows" if unresolved else ""
+    open_rows = f"; {INCONCLUSIVE} in {unresolved} of {counted(len(rows), 'row')}" if unresolved else ""
     return f"{verdict}: {' and '.join(ways)} {how}{open_rows}"
 
 
@@ -68,8 +69,8 @@ def pairing_words(pairings: Mapping[str, Pairing]) -> list[str]:
                 )
         elif pairing.old_alone or pairing.new_alone:
             words.append(
-                f"{group}: {len(pairing.partners)} recordings are paired; {pairing.old_alone} that only old holds and "
-                f"{pairing.new_alone} that only new holds count in false alarms alone"
+                f"{group}: {counted(len(pairing.partners), 'recording', 'are')} paired; {pairing.old_alone} that only "
+                f"old holds and {pairing.new_alone} that only new holds count in false alarms alone"
             )
     return words
 

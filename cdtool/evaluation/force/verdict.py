@@ -17,6 +17,7 @@ import numpy as np
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
+from cdtool.plain_text import counted
 
 Outcome = Literal["pass", "fail", "not_assessable"]
 
@@ -190,11 +191,11 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
 
 
 def _counted(tests: int, average_of: int) -> str:
-    counted = f"{tests} {'test' if tests == 1 else 'tests'}"
+    given = counted(tests, "test")
     if average_of == 1:
-        return f"highest of {counted}"
+        return f"highest of {given}"
     asked = "" if tests == average_of else f" where the profile averages {average_of}"
-    return f"mean of {counted}{asked}"
+    return f"mean of {given}{asked}"
 
 
 def _worst(outcomes: Sequence[Outcome]) -> Outcome:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
+from cdtool.plain_text import counted
 
 COMMENTS = ("#", "%", "//")
 _RULER, _DRAWN = re.compile(r"[-=+|\s:]*"), re.compile(r"[-=]{2}")
@@ -102,7 +103,7 @@ def shown_lines(numbers: Sequence[int]) -> str:
     if numbers[-1] - numbers[0] == len(numbers) - 1:
         return f"lines {numbers[0]} to {numbers[-1]}"
     listed = ", ".join(str(number) for number in numbers[:3])
-    return f"{len(numbers)} lines ({listed}{', ...' if len(numbers) > 3 else ''})"
+    return f"{counted(len(numbers), 'line')} ({listed}{', ...' if len(numbers) > 3 else ''})"
 
 
 def _joined(raw: list[bytes], first: int) -> int:

@@ -18,6 +18,7 @@ from cdtool.clock import EPOCH
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.source import Column, split_unit
+from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
 
@@ -127,7 +128,9 @@ def own_clocks(
         columns[key] = Column(key, values[key][timed], time[timed] - origin, told_unit(dialect, key))
         lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
         if lost:
-            findings.append(Finding(f"{lost} values stand in rows in which its clock is empty: left out", key, "loss"))
+            findings.append(
+                Finding(f"{counted(lost, 'value')} in rows in which its clock is empty: left out", key, "loss")
+            )
     return columns, origin, findings
 
 

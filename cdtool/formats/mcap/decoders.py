@@ -15,6 +15,7 @@ from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.fields import Field, FieldMissingError, missing
 from cdtool.formats.mcap.stamp_order import Stamps
 from cdtool.formats.mcap.taken import Recipe
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 
@@ -89,7 +90,7 @@ class Decoders:
         """The finding about messages that could not be decoded."""
         if not self.failed:
             return []
-        text = f"{self.failed} of {self.failed + self.decoded} messages cannot be decoded: {self.reason}"
+        text = f"{self.failed} of {counted(self.failed + self.decoded, 'message')} cannot be decoded: {self.reason}"
         return [Finding(text, topic, "loss")]
 
     def told(self, path: str, topic: str) -> list[Finding]:

@@ -20,6 +20,7 @@ from cdtool.formats.mcap.rows import Rows
 from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
 from cdtool.formats.mcap.taken import Bound, Destination, Numbers, Part
 from cdtool.formats.source import Column
+from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 
 
@@ -149,7 +150,9 @@ class Gathering:
             if not there.any():
                 raise missing(self.where, text, FieldMissingError("no message names this joint", field.names))
             left_out = len(there) - int(np.count_nonzero(there))
-            findings.append(Finding(f"{left_out} messages name other joints only: left out", name, "note"))
+            findings.append(
+                Finding(f"{counted(left_out, 'message', 'name')} other joints only: left out", name, "note")
+            )
         empty = field.widths.pop(0, 0)
         if len(field.widths) > 1:
             found = ", ".join(f"{width} in {count}" for width, count in field.widths.most_common())
@@ -158,7 +161,7 @@ class Gathering:
                 "name one element, e.g. position[0]",
             )
         if empty:
-            findings.append(Finding(f"{empty} messages hold an empty array: NaN", name))
+            findings.append(Finding(f"{counted(empty, 'message', 'hold')} an empty array: NaN", name))
             if not field.widths:
                 values = np.full((len(values), 1), np.nan)
         if there is not None:

@@ -26,6 +26,7 @@ from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
 from cdtool.formats.mcap_writing import EXACT_TIME, exact_times
 from cdtool.formats.pieces import Piece, Pieces
 from cdtool.formats.source import Column, Source, with_topics
+from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 
 
@@ -168,7 +169,9 @@ class _Topic:
         if course.elsewhere:
             if not course.rows:
                 raise missing(self.where, text, FieldMissingError("no message names this joint", course.names))
-            findings.append(Finding(f"{course.elsewhere} messages name other joints only: left out", name, "note"))
+            findings.append(
+                Finding(f"{counted(course.elsewhere, 'message', 'name')} other joints only: left out", name, "note")
+            )
         empty = course.widths.pop(0, 0)
         if len(course.widths) > 1:
             found = ", ".join(f"{width} in {count}" for width, count in course.widths.most_common())
@@ -177,6 +180,6 @@ class _Topic:
                 "name one element, e.g. position[0]",
             )
         if empty:
-            findings.append(Finding(f"{empty} messages hold an empty array: NaN", name))
+            findings.append(Finding(f"{counted(empty, 'message', 'hold')} an empty array: NaN", name))
         shape = (0, course.width or 1) if course.width is not None or empty else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
@@ -67,7 +68,7 @@ class StampOrder:
         if not self._behind or self._lowest is None:
             return []
         period = (self._highest - self._lowest) / max(1, self._count - 1)
-        text = f"{self._behind} of {self._count} messages stand behind later ones, by up to {self._back / 1e6:.4g} ms"
+        text = f"{self._behind} of {counted(self._count, 'message')} out of order, by up to {self._back / 1e6:.4g} ms"
         if self._back <= _PERIODS * period:
             return [Finding(f"{text}: sorted by time", topic, "note")]
         where = f"message {self._first} is stamped {self._back / 1e9:.4g} s before one ahead of it"

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
-from cdtool.report.figure_text import NOTHING, counted, number
+from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.html.forces import force_counts, force_table, points_table
 from cdtool.report.html.plots import plot_data
 from cdtool.report.html.provenance import provenance_tables

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from cdtool.evaluation.results import ContactResult, RecordingResult, Results, Skipped
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.report.figure_text import NOTHING, counted, number, percent
+from cdtool.plain_text import counted
+from cdtool.report.figure_text import NOTHING, number, percent
 from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, shown
 from cdtool.report.html.tables import outcome_cell
 

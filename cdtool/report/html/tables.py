@@ -12,13 +12,13 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
+from cdtool.plain_text import counted
 from cdtool.report.comparison_words import without_finding
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_figure, latency_words
 from cdtool.report.figure_text import (
     NOT_ASSESSABLE,
     NOT_REACHED,
     NOTHING,
-    counted,
     missed,
     number,
     rate,

@@ -12,12 +12,12 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import ForceResult, ForceStepResult, LimitResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
+from cdtool.plain_text import counted
 from cdtool.report.comparison_words import TOO_FEW, without_finding
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_words
 from cdtool.report.figure_text import (
     NOT_ASSESSABLE,
     NOTHING,
-    counted,
     missed,
     number,
     rate,

@@ -10,8 +10,8 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.results import LimitResult, Results
+from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
-from cdtool.report.figure_text import counted
 from cdtool.report.markdown.details import details
 from cdtool.report.markdown.figures import comparison_section, force_sections, group_section, limit_sections
 from cdtool.report.markdown.text import Section, escape, fitted

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from cdtool.plain_text import plain, shorten
-from cdtool.report.figure_text import counted
+from cdtool.plain_text import counted, plain, shorten
 
 _ACTIVE = re.compile(r"([\\`*\[\]<>|&$#~:!]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9]))")
 # GitHub and GitLab look for @name and #12 in the rendered text, where no escape is left: only another character helps.

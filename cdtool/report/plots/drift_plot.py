@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.evaluation.upkeep.audit import DriftAudit, JointDrift
+from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.plots.style import DEVIATION_COLOURS, LIMIT, UNJUDGED
@@ -38,9 +39,12 @@ def plot_drift(audit: DriftAudit, path: Path) -> None:
 def _figure(audit: DriftAudit) -> Figure:
     joints = sorted(audit.joints, key=lambda item: (not item.shown, -_largest_margin(item)))[:_MOST_JOINTS]
     told = [line for joint in joints for line in _told(joint, named=len(audit.joints) > 1)]
-    heading = [f"{audit.motion.described}, {len(audit.names)} runs, safety factor {audit.safety_factor:.4g}", *told]
+    heading = [
+        f"{audit.motion.described}, {counted(len(audit.names), 'run')}, safety factor {audit.safety_factor:.4g}",
+        *told,
+    ]
     if len(joints) < len(audit.joints):
-        heading.append(f"{len(audit.joints) - len(joints)} joints more are not drawn")
+        heading.append(f"{counted(len(audit.joints) - len(joints), 'more joint', 'are')} not drawn")
     width = max(_WIDTH, 5.0 * len(joints))
     text = "\n".join(fill(line, round(_LINE * width / _WIDTH)) for line in heading)
     figure = new_figure(width, 0.9 + sum(_HEIGHTS) + 0.17 * (text.count("\n") + 1))

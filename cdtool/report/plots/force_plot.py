@@ -15,6 +15,7 @@ from cdtool.detection import Status
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
 from cdtool.evaluation.traces.decimation import kept_samples
+from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 from cdtool.report.plots.force_time_axis import set_time, time_nodes
@@ -182,7 +183,7 @@ def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
     counts = ", ".join(
         f"{outcomes.count(outcome)} {outcome.replace('_', ' ')}" for outcome in _ORDER if outcome in outcomes
     )
-    lines = [f"{len(curves)} {'contact' if len(curves) == 1 else 'contacts'}:", *fill(counts, 30).splitlines()]
+    lines = [f"{counted(len(curves), 'contact')}:", *fill(counts, 30).splitlines()]
     lines.append(f"worst: {label(worst.label, 26)}")
     lines += [_told(step) for step in worst.verdict.steps]
     if math.isfinite(worst.verdict.time_budget):

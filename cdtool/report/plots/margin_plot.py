@@ -16,6 +16,7 @@ from cdtool.evaluation.explanation.words import words
 from cdtool.evaluation.traces.decimation import decimate
 from cdtool.evaluation.traces.trace import Course, Span
 from cdtool.pipeline import Detection
+from cdtool.plain_text import counted
 from cdtool.recording import FloatArray, Recording
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
@@ -132,7 +133,7 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     axes.axhspan(0.0, high, color=BAND, linewidth=0, zorder=0)
     if isinstance(item, AlarmExplanation):
         axes.axvspan(item.left, item.alarm.time, color=colour, alpha=0.25, linewidth=0)
-        waited = f"outside for {item.debounce} {'sample' if item.debounce == 1 else 'samples'}"
+        waited = f"outside for {counted(item.debounce, 'sample')}"
         _write(axes, waited, (item.left, 0.0), (-4, 4), "right")
         return
     for nearest in [found.nearest for found in item.approaches[:1]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cdtool.plain_text import counted
 from cdtool.report.plots.figures import label
 from cdtool.workflows.detection import Detected
 
@@ -15,20 +16,20 @@ def outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> st
         words.append(f"detected after {late[0]:.0f} ms" if late else matches[0].outcome.replace("_", " "))
     elif matches:
         spread = f" after {min(late):.0f} to {max(late):.0f} ms" if late else ""
-        words.append(f"{len(late)} of {len(matches)} contacts detected{spread}")
+        words.append(f"{len(late)} of {counted(len(matches), 'contact')} detected{spread}")
     extra = sum(len(matching.false_alarms) for matching in found.matchings)
     alarms = sum(len(item.verdict.alarms) for item in found.detections)
     if matches and extra:
-        words.append(f"{extra} false {'alarm' if extra == 1 else 'alarms'}")
+        words.append(f"{counted(extra, 'false alarm')}")
     elif not matches:
-        words.append("no alarm" if not alarms else f"{alarms} {'alarm' if alarms == 1 else 'alarms'}")
+        words.append("no alarm" if not alarms else f"{counted(alarms, 'alarm')}")
     blind = [item for item in found.detections if item.verdict.outcome == "not assessable"]
     if blind:
         share = f" in {len(blind)} of {len(found.detections)} operations" if len(found.detections) > 1 else ""
         words = [word for word in words if word not in ("no alarm", "not assessable")]
         words.append(f"not assessable{share}: {label(blind[0].verdict.reason, 70)}")
     if len(found.detections) > 1:
-        words.append(f"{len(found.detections)} operations")
+        words.append(counted(len(found.detections), "operation"))
     if len(alarming) > len(joints):
         words.append(f"{len(joints)} of {len(alarming)} alarming joints shown")
     elif len(found.joints) > len(joints):

@@ -20,6 +20,7 @@ from cdtool.impact.rigidity import rigidity
 from cdtool.impact.transfer import Transfer, second_order
 from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
 from cdtool.impact.transmission_simulation import Motion
+from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, new_figure, save
 
@@ -76,7 +77,7 @@ def plot_impact(motion: Motion, path: Path) -> None:
             fontsize=8,
         )
         panels[0, 0].annotate(
-            f"{len(motion.contacts)} contacts, the last one stays",
+            f"{counted(len(motion.contacts), 'contact')}, the last one stays",
             (0.97, 0.85),
             xycoords="axes fraction",
             ha="right",

@@ -9,6 +9,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
+from cdtool.plain_text import counted
 from cdtool.report.plots.figures import Margins, drawing, label, save, stacked_panels, text_width, unit_label
 from cdtool.report.plots.panels import (
     Legend,
@@ -151,7 +152,7 @@ def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
         reason = (seen.reason if seen else "") or row.reason
         return "not assessable", fill(label(reason, 66), 24, break_on_hyphens=False)
     count = len(row.false_alarms)
-    false = f"{count} false {'alarm' if count == 1 else 'alarms'}" if count else ""
+    false = f"{counted(count, 'false alarm')}" if count else ""
     if seen is None:
         return (false or "no alarm"), ""
     if seen.outcome == "detected":

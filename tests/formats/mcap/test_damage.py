@@ -93,7 +93,7 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     found, findings, log = read(path)
     assert found == sent[:-1]
     assert 0 < log.unverified < len(found)
-    assert f"{log.unverified} of {len(found)} messages carry no checksum: unverified" in str(findings[-1])
+    assert f"{log.unverified} of {len(found)} messages without a checksum: unverified" in str(findings[-1])
 
 
 def test_a_lost_definition_is_taken_from_the_summary(tmp_path):
@@ -128,7 +128,7 @@ def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     assert found == sent
     assert log.unverified == len(sent)
     assert [str(finding) for finding in findings] == [
-        f"{len(sent)} of {len(sent)} messages carry no checksum: unverified"
+        f"{len(sent)} of {len(sent)} messages without a checksum: unverified"
     ]
 
 

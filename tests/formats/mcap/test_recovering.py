@@ -86,7 +86,7 @@ def test_without_any_checksum_nothing_is_kept_unless_it_is_asked_for(tmp_path):
     assert found == sent
     assert log.unverified == len(sent)
     assert not log.summary.verified
-    assert "24 of 24 messages carry no checksum" in str(findings[0])
+    assert "24 of 24 messages without a checksum" in str(findings[0])
 
 
 def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):

@@ -125,7 +125,7 @@ def test_a_chunk_whose_times_are_not_those_of_its_messages_is_found(tmp_path, fi
     assert found == sent
     text = "; ".join(map(str, findings))
     assert "1 chunks have other sizes or times than its index says" in text
-    assert "1 chunks claim other times than their messages have" in text
+    assert "1 chunk claims other times than the messages have" in text
 
 
 def test_a_damaged_summary_is_said_and_the_data_read_without_it(tmp_path):

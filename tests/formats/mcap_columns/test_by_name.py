@@ -248,6 +248,6 @@ def test_a_log_gives_the_named_elements_samples_and_tells_of_the_other_messages(
     assert source.columns["/a pose[b].x"].values.tolist() == [98.0] * 3
     assert source.columns["/a pose[b].x"].time.tolist() == [0.0, 1.0, 3.0]
     assert source.columns["/a pose[a].x"].values.tolist() == [97.0] * 4
-    assert [str(found) for found in source.findings] == ["/a pose[b].x: 1 messages name other joints only: left out"]
+    assert [str(found) for found in source.findings] == ["/a pose[b].x: 1 message names other joints only: left out"]
     with pytest.raises(RecordingError, match=r"no field 'pose\[z\]\.x': no message names this joint"):
         Mcap().columns(path, wanted(("/a", "pose[z].x")))

@@ -21,6 +21,7 @@ from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
 from cdtool.formats.mcap.taken import Part, Taker
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 
@@ -189,14 +190,14 @@ class Log:
         section, statistics = self.section, self.summary.statistics
         found = section.losses.findings(self.count, self.origin)
         if self.summary.problem and not section.losses.stopped:
-            text = f"the summary is damaged ({self.summary.problem}): the {self.count} messages were read without it"
+            text = f"the summary is damaged ({self.summary.problem}): {counted(self.count, 'message')} read without it"
             found.append(Finding(text, severity="loss"))
         if statistics is not None and statistics.message_count != self.count:
             text = f"the file's summary says {statistics.message_count} messages, {self.count} were read"
             found.append(Finding(text, severity="loss"))
         found += self._disagreements()
         if self.unverified:
-            text = f"{self.unverified} of {self.count} messages carry no checksum: unverified"
+            text = f"{self.unverified} of {counted(self.count, 'message')} without a checksum: unverified"
             found.append(Finding(text, severity="note"))
         for topic in self.topics.values():
             if topic.channels > 1 and self._wanted(topic.name):
@@ -226,7 +227,9 @@ class Log:
                 if number:
                     found.append(Finding(f"the summary disagrees with the data: {number} chunks {what}"))
         if section.other_times:
-            found.append(Finding(f"{section.other_times} chunks claim other times than their messages have"))
+            found.append(
+                Finding(f"{counted(section.other_times, 'chunk', 'claim')} other times than the messages have")
+            )
         statistics = summary.statistics
         if statistics is not None and statistics.channel_message_counts:
             stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}

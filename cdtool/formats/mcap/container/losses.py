@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from cdtool.formats.mcap.container.chunks import ChunkHeader
 from cdtool.formats.mcap.container.summary import Summary
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 _LISTED = 10
@@ -72,13 +73,14 @@ class Losses:
         rest = self.places[_LISTED:]
         if rest:
             known = sum(loss.messages or 0 for loss in rest)
-            text = f"damaged at {len(rest)} more places: {sum(loss.size for loss in rest)} bytes"
-            text += f" and {sum(loss.chunks for loss in rest)} chunks lost, {known} messages that indexes name"
+            text = f"damaged at {counted(len(rest), 'more place')}: {counted(sum(loss.size for loss in rest), 'byte')}"
+            chunks = counted(sum(loss.chunks for loss in rest), "chunk")
+            text += f" and {chunks} lost, {counted(known, 'message')} named by indexes"
             found.append(Finding(text, severity="loss"))
             if last is not None:
                 found.append(self._finding(last, True, count, origin))
         for reason, lost in self.messages.items():
-            found.append(Finding(f"{reason}: {lost} messages lost", severity="loss"))
+            found.append(Finding(f"{reason}: {counted(lost, 'message')} lost", severity="loss"))
         return found + self._refused()
 
     def _refused(self) -> list[Finding]:
@@ -86,7 +88,7 @@ class Losses:
         count = sum(loss.refused for loss in self.places)
         if not count:
             return []
-        what = "1 chunk is" if count == 1 else f"{count} chunks are"
+        what = counted(count, "chunk", "are")
         text = f"{what} not damaged but refused: they would grow as only a bomb or images of nothing do"
         way = "If the log is yours, `mcap decompress LOG -o PLAIN` (mcap.dev) makes one that is read whole"
         return [Finding(f"{text}. {way}")]
@@ -95,5 +97,5 @@ class Losses:
         where = f"damaged at byte {loss.at} ({' '.join(loss.reason.split())[:200]})"
         if final:
             behind = f"; {loss.described(origin)}" if loss.size else ""
-            return Finding(f"{where}: only the {count} messages before it were read{behind}", severity="loss")
+            return Finding(f"{where}: only {counted(count, 'message')} before it read{behind}", severity="loss")
         return Finding(f"{where}: {loss.described(origin)}", severity="loss")
