@@ -10,7 +10,7 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # What is printed about one fault, warning or note, with all that comes from files [characters].
 LINE_LENGTH = 300
-_SINGULAR = {"are": "is", "have": "has"}
+_SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
 

@@ -194,7 +194,7 @@ def _findings(name: str, series: Series, wrong: BoolArray, known: ChannelRange, 
         text = (
             f"{counted(len(rows), 'value')}{joint} {verb} none that its sensor gives (first "
             f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual are "
-            f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}): masked"
+            f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}), masked"
         )
         found.append(Finding(text, name, "loss"))
     return found

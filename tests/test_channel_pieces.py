@@ -131,7 +131,7 @@ def test_channels_in_pieces_are_those_in_memory(tmp_path_factory, clock, offset,
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(time_order.by_time, "__defaults__", (waiting,))
         told = " ".join(assert_alike(log, machine(folder, clock, offset)))
-    for words in ("infinite: masked", "at the sensor's limit", "repeat", " after ", "missing (NaN)"):
+    for words in ("infinite, masked", "at the sensor's limit", "repeat", " after ", "missing (NaN)"):
         assert words in told
 
 

@@ -32,8 +32,8 @@ def test_singular_and_plural_and_lists_of_any_length_are_alike():
         ("b", "2 gaps after 0.1 s (4 ms), 0.2 s (5 ms)"),
         ("c", "5 gaps after 0.1 s (4 ms), 0.2 s (5 ms), 0.3 s (6 ms) and 2 more"),
         ("d", "1 gap after 0.4 s (4 ms)"),
-        ("e", "1 value is infinite: masked"),
-        ("f", "2 values are infinite: masked"),
+        ("e", "1 value is infinite, masked"),
+        ("f", "2 values are infinite, masked"),
     ]
     (name, text), *others = grouped(items)
     assert name == "a" and text.endswith("; 3 more like it (b, c, d)")

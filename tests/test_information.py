@@ -116,7 +116,7 @@ def test_the_check_of_an_accelerometer_takes_no_longer_than_the_log_is_long():
     acceleration = Series(time, np.cos(time), "m/s2")
     recording = Recording("hour", "", ("a",), {"speed": speed, "acceleration": acceleration})
     begin = process_time()
-    (found,) = accelerometer_findings(recording)
+    (found,) = accelerometer_findings(recording, ())
     assert process_time() - begin < 2.0  # 18,000 windows of 20 samples: not all samples for each of them
     assert "fits the speed" in found.message
 

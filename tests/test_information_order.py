@@ -79,5 +79,5 @@ def test_many_warnings_bury_no_loss_on_screen(capsys):
     lost = [Skipped("free/07.csv", "damaged, used as far as it goes: time: 3 time stamps run backward")]
     print_skipped(lost, warnings)
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 2 and lines[0].startswith("damaged: free/07.csv")
+    assert len(lines) == 2 and lines[0].startswith("loss: free/07.csv: time: 3")
     assert lines[1].endswith("; 45 more like it (free/01.csv, free/02.csv, free/03.csv, ...)")

@@ -213,7 +213,7 @@ def test_min_and_max_of_the_machine_file_mask_and_are_a_loss(gate):
     machine.write_text(machine.read_text().replace(plain, limited))
     spoil(gate / "free" / "03.csv", 1, [900, 1500], "41")
     losses = [item for item in info(gate / "free" / "03.csv", machine=machine).findings if item.severity == "loss"]
-    assert [str(item) for item in losses] == ["torque: 2 values are none that a sensor gives: masked"]
+    assert [str(item) for item in losses] == ["torque: 2 values are none that a sensor gives, masked"]
 
 
 @pytest.mark.parametrize(

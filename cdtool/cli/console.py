@@ -17,7 +17,7 @@ from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact, status_of
-from cdtool.plain_text import LINE_LENGTH, one_line, shorten
+from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
@@ -53,13 +53,12 @@ def print_json(value: Any) -> None:
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
-    """On stderr what was left out and why, what is damaged, then warnings and notes, what is alike once."""
+    """On stderr what was left out and why, what is lost, then warnings and notes, what is alike once."""
     left_out, damaged = _apart(skipped)
-    for every, word in ((left_out, "left out"), (damaged, "damaged"), (findings, "warning"), (notes, "note")):
-        items = alike([Skipped(item.recording, _without_name(item)) for item in every])
+    for every, word in ((left_out, "left out"), (damaged, "loss"), (findings, "warning"), (notes, "note")):
+        items = alike(list(dict.fromkeys(Skipped(item.recording, _bare(item)) for item in every)))
         for item in items[:_SHOWN]:
-            reason = item.reason.removeprefix("damaged, ")
-            typer.echo(one_line(f"{word}: {item.recording}: {reason}"), err=True)
+            typer.echo(one_line(f"{word}: {item.recording}: {item.reason}"), err=True)
         if len(items) > _SHOWN:
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 
@@ -68,8 +67,9 @@ def leave(skipped: Sequence[Skipped] = (), facts: Iterable[Fact] = ()) -> None:
     """End with the status of these facts, and of what was left out or is damaged; return where all is good."""
     left_out, damaged = _apart(skipped)
     logs = len({item.recording for item in damaged})
-    parts = [f"{len(left_out)} {'item was' if len(left_out) == 1 else 'items were'} left out"] if left_out else []
-    parts += [f"{logs} {'log is' if logs == 1 else 'logs are'} damaged"] if damaged else []
+    items = len({item.recording for item in left_out})
+    parts = [f"{counted(items, 'item', 'were')} left out"] if left_out else []
+    parts += [f"{counted(logs, 'log', 'are')} damaged"] if damaged else []
     if parts:
         typer.echo(f"done, but {' and '.join(parts)}", err=True)
     found = [*facts, *([Fact.LEFT_OUT] if left_out else []), *([Fact.LOST] if damaged else [])]
@@ -167,5 +167,8 @@ def _apart(skipped: Sequence[Skipped]) -> tuple[list[Skipped], list[Skipped]]:
     return [item for item in skipped if item not in damaged], damaged
 
 
-def _without_name(item: Skipped) -> str:
-    return item.reason.removeprefix(f"{item.recording}: ")
+def _bare(item: Skipped) -> str:
+    """A reason without what the line says before it: the word for its kind and the recording."""
+    from cdtool.workflows.runs import DAMAGED
+
+    return item.reason.removeprefix(DAMAGED).removeprefix(f"{item.recording}: ")

@@ -179,8 +179,8 @@ def detect(
     taught = "the signature was learned from it: no alarm here shows nothing"
     learned = [Skipped(str(log), taught) for log, found in done if found.learned]
     absent = [Skipped(str(log), str(item)) for log, found in done for item in absent_truth(found.recording)]
-    doubts = [item for _, found in done for item in found.doubts]
-    print_skipped(skipped, [*learned, *doubts], absent)
+    warnings = [item for _, found in done for item in found.warnings]
+    print_skipped(skipped, [*learned, *warnings], absent)
     if as_json:
         print_json(as_rows(done, forces))
     else:

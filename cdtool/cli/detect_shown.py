@@ -164,8 +164,13 @@ def _as_json(
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
         "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),
-        "findings": [*(str(item) for item in found.recording.findings), *(item.reason for item in found.doubts)],
+        "findings": _findings(found),
     }
+
+
+def _findings(found: Detected) -> list[str]:
+    read, of_log = map(str, found.recording.findings), (item.reason for item in found.warnings)
+    return list(dict.fromkeys([*read, *of_log]))
 
 
 def _force_as_json(force: ForceSummary) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def clean_time(
         step = 1e3 * float(np.median(steps[steps > 0.0]))
         text = f"{100.0 * repeated.mean():.0f} % of the time stamps repeat: a coarse clock of steps of {step:.3g} ms"
         told.findings.append(Finding(f"{text}, replaced by a causal straight line", "time"))
-        told.dropped(index[~on_line], "stand still beyond a coarse clock's step", ": the clock was stuck")
+        told.dropped(index[~on_line], "stand still beyond a coarse clock's step", "; the clock was stuck")
         index, kept = index[on_line], line[on_line]
     else:
         told.dropped(index[repeated], "repeat")
@@ -148,7 +148,7 @@ class _Told:
         share = len(rows) / self._count
         shown = ", ".join(str(int(row) + self._first_row) for row in rows[:3])
         where = f"{self._name} {shown}{', ...' if len(rows) > 3 else ''}"
-        text = f"{counted(len(rows), 'time stamp', what)} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
+        text = f"{counted(len(rows), 'time stamp', what)} ({where}), dropped ({100.0 * share:.2g} % of the rows){why}"
         severity: Literal["warning", "loss"] = "loss" if why or share > _STRAY_SHARE else "warning"
         self.findings.append(Finding(text, "time", severity))
 

@@ -196,7 +196,7 @@ class Masked:
             (self.impossible, "none that a sensor gives", "loss"),
         )
         return [
-            Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}: masked", item.channel, severity)
+            Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)
             for counts, what, severity in kinds
             for j, count in enumerate(counts.tolist())
             if count

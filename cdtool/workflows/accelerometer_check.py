@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from cdtool.errors import RecordingError
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Finding, FloatArray, Recording
+from cdtool.recording import Contact, Finding, FloatArray, Recording
 
 # Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.
 _WINDOW = 0.2
-# Below this correlation the motion does not say enough.
-_TELLING = 0.5
+# Below this correlation the motion does not say enough about the sign, or about the scale.
+_TELLING, _TELLING_SCALE = 0.5, 0.8
 _STANDARD_GRAVITY = 9.80665
 
 
-def accelerometer_findings(recording: Recording) -> list[Finding]:
-    """Slope of the measured acceleration over the speed's derivative, joint by joint, as findings."""
-    recording = _before_contact(recording)
+def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
+    """Slope of the measured acceleration over the speed's derivative before the first contact, joint by joint."""
+    recording = _before_contact(recording, contacts)
     if "acceleration" not in recording or "speed" not in recording:
         return []
     found = []
@@ -30,12 +29,8 @@ def accelerometer_findings(recording: Recording) -> list[Finding]:
     return found
 
 
-def _before_contact(recording: Recording) -> Recording:
+def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Recording:
     """In a contact the elastic drive parts motor and load: only what lies before the first one can be compared."""
-    try:
-        contacts = find_contacts(recording, OnsetRule())
-    except RecordingError:
-        return recording
     since = contacts[0].end if contacts and contacts[0].in_progress else -np.inf
     first = next((contact.start for contact in contacts if not contact.in_progress), np.inf)
     return recording.between(since, first) if contacts else recording
@@ -52,15 +47,17 @@ def _judge(expected: FloatArray, measured: FloatArray, name: str) -> Finding:
     figures = f"slope {slope:.3g}, correlation {correlation:.2f} over the speed's derivative"
     if slope < 0.0:
         return Finding(f"accelerometer{name} has the opposite sign ({figures}): give scale = -1", "acceleration")
+    if 0.7 < slope < 1.4:
+        return Finding(f"accelerometer{name} fits the speed ({figures})", "acceleration", "note")
+    if correlation < _TELLING_SCALE:
+        return Finding(f"accelerometer{name}: its scale cannot be checked ({figures})", "acceleration", "note")
     for factor, advice in (
         (_STANDARD_GRAVITY, "the log may hold m/s2, not g"),
         (1 / _STANDARD_GRAVITY, "the log may hold g"),
     ):
         if 0.7 < slope / factor < 1.4:
             return Finding(f"accelerometer{name} has the wrong scale ({figures}): {advice}", "acceleration")
-    if not 0.7 < slope < 1.4:
-        return Finding(f"accelerometer{name} has the wrong scale ({figures}): check unit and ratio", "acceleration")
-    return Finding(f"accelerometer{name} fits the speed ({figures})", "acceleration", "note")
+    return Finding(f"accelerometer{name} has the wrong scale ({figures}): check unit and ratio", "acceleration")
 
 
 def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:

@@ -37,9 +37,8 @@ class _Dropped:
         name, share = "line" if first_row else "sample", self.count / rows
         shown = ", ".join(str(row + first_row) for row in self._first)
         where = f"{name} {shown}{', ...' if self.count > _SHOWN else ''}"
-        text = (
-            f"{counted(self.count, 'time stamp', self.what)} ({where}): dropped, {100.0 * share:.2g} % of the rows{why}"
-        )
+        stamps = counted(self.count, "time stamp", self.what)
+        text = f"{stamps} ({where}), dropped ({100.0 * share:.2g} % of the rows){why}"
         return Finding(text, "time", "loss" if why or share > _STRAY_SHARE else "warning")
 
 

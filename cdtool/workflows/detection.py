@@ -40,7 +40,7 @@ class Detected:
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     `normals`: what impact-free runs look like, or why that is not known.
     `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
-    `not_scored` names contacts without an onset, `doubts` warns about the load cell.
+    `not_scored` names contacts without an onset, `warnings` are about the log itself.
     """
 
     recording: Recording
@@ -53,7 +53,7 @@ class Detected:
     window: float = 1.0
     contact_rows: tuple[tuple[ContactResult, ...], ...] = ()
     not_scored: tuple[Skipped, ...] = ()
-    doubts: tuple[Skipped, ...] = ()
+    warnings: tuple[Skipped, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
 
     @property
@@ -139,7 +139,7 @@ def detect(
         rules.window,
         matched.contacts,
         matched.not_scored,
-        matched.doubts,
+        matched.warnings,
         normals,
     )
 
@@ -167,7 +167,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
-        matched.doubts,
+        matched.warnings,
         benchmark.normals,
     )
 

@@ -14,8 +14,10 @@ import numpy as np
 from cdtool.clock.stamps import missing_findings
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Finding, Recording, Series, worst_first
-from cdtool.workflows.accelerometer_check import accelerometer_findings
-from cdtool.workflows.motion_check import bandwidth_findings, motion_findings
+from cdtool.workflows.log_findings import IN_PROGRESS, log_findings
+from cdtool.workflows.motion_check import bandwidth_findings
+from cdtool.workflows.scoring_rules import ScoringRules
+from cdtool.workflows.true_contacts import any_contacts
 
 if TYPE_CHECKING:
     from cdtool.formats.source import Column
@@ -113,10 +115,12 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
         for name, series in recording.channels.items()
         for j in range(series.joint_count)
     ]
-    findings = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording)]
-    findings += bandwidth_findings(recording, machine_file)
+    rules = ScoringRules()
+    contacts = any_contacts(recording, rules)
+    findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
+    findings += [Finding(IN_PROGRESS.format(end=item.end), "force") for item in contacts if item.in_progress]
     dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
-    found = worst_first(dict.fromkeys(findings))
+    found = worst_first(findings)
     return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
 
 

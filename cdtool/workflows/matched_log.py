@@ -9,12 +9,12 @@ from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse, force_course
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
-from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.matching import match
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.scoring_rules import ScoringRules
 
 
@@ -23,7 +23,7 @@ class MatchedLog:
     """What became of a log's contacts and alarms.
 
     `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
-    number; `not_scored` names contacts that have no onset or lie in no operation, `doubts` warns about the load cell.
+    number; `not_scored` names contacts that have no onset or lie in no operation, `warnings` are about the log itself.
     """
 
     judged: tuple[Judged, ...]
@@ -31,7 +31,7 @@ class MatchedLog:
     false_alarms: tuple[FalseAlarmResult, ...]
     courses: dict[int, ForceCourse]
     not_scored: tuple[Skipped, ...]
-    doubts: tuple[Skipped, ...]
+    warnings: tuple[Skipped, ...]
 
 
 def match_log(
@@ -50,7 +50,7 @@ def match_log(
     """
     inside = _by_operation(operations, contacts)
     courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
-    warned = [Skipped(recording.name, str(item)) for item in truth_findings(recording, contacts, rules.onset)]
+    warned = log_warnings(recording, contacts, rules.onset)
     crossings = _pooled(found)
     judged = []
     for operation, own, detections in zip(operations, inside, found, strict=True):
@@ -105,8 +105,7 @@ def _not_scored(
     found = []
     for contact in contacts:
         if contact.in_progress:
-            text = f"a contact is in progress when it begins, until {contact.end:.3f} s: its onset is not recorded"
-            found.append(Skipped(recording.name, f"{text}, it is not scored"))
+            found.append(Skipped(recording.name, f"{IN_PROGRESS.format(end=contact.end)}, it is not scored"))
         elif not any(contact in own for own in inside):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
             found.append(Skipped(recording.name, text))

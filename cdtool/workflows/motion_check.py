@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.clock import integrate, previous_value
+from cdtool.clock import GAP_PERIODS, integrate, previous_value
 from cdtool.detectors.base import of_joint
 from cdtool.errors import CdtoolError
 from cdtool.machine_file import MachineFile
@@ -60,24 +60,21 @@ def _consistency(recording: Recording) -> list[Finding]:
         if moved[j] <= _HARDLY * max(moved):
             continue
         of = f"of {recording.joints[j]}: " if len(recording.joints) > 1 else ""
-        way = _travelled(speed, j)
-        seen = float(np.nanmax(position.values[:, j]) - np.nanmin(position.values[:, j]))
-        signed = (
-            float(position.values[-1, j] - position.values[0, j])
-            if np.isfinite(position.values[[0, -1], j]).all()
-            else 0.0
-        )
-        if way[1] <= 0.0 or seen <= 0.0:
+        integrated, travelled = _without_gaps(speed, position, j)
+        if not len(travelled):
             continue
-        if not 0.8 < way[1] / seen < 1.25:
-            ratio = max(way[1] / seen, seen / way[1])
+        way, seen = float(np.ptp(integrated)), float(np.ptp(travelled))
+        if way <= 0.0 or seen <= 0.0:
+            continue
+        if not 0.8 < way / seen < 1.25:
+            ratio = max(way / seen, seen / way)
             text = (
-                f"{of}integrates to {way[1]:.4g} {position.unit}, the position spans {seen:.4g} {position.unit} "
+                f"{of}integrates to {way:.4g} {position.unit}, the position spans {seen:.4g} {position.unit} "
                 f"(a factor of {ratio:.4g}{_as_between(ratio)}): check the units of speed (read as {speed.unit}) "
                 f"and position (read as {position.unit})"
             )
             found.append(Finding(text, "speed"))
-        elif abs(signed) > 0.5 * seen and np.sign(signed) != np.sign(way[0]):
+        elif abs(travelled[-1]) > 0.5 * seen and np.sign(travelled[-1]) != np.sign(integrated[-1]):
             found.append(Finding(f"{of}has the opposite sign of the position's derivative", "speed"))
     return [*found, *_swapped(recording)]
 
@@ -132,9 +129,24 @@ def _swapped(recording: Recording) -> list[Finding]:
     return found
 
 
-def _travelled(speed: Series, joint: int) -> tuple[float, float]:
-    path = integrate(speed, "").values[:, joint]
-    return float(path[-1]), float(path.max() - path.min())
+def _without_gaps(speed: Series, position: Series, joint: int) -> tuple[FloatArray, FloatArray]:
+    """Return the integral of a joint's speed and its position, both from 0 and without what lies in gaps of a clock.
+
+    A gap has one speed before and one behind it: nothing that could be integrated.
+    """
+    path = previous_value(integrate(speed, position.unit), position.time)[:, joint]
+    place, time = position.values[:, joint], position.time
+    known = np.isfinite(place) & np.isfinite(path)
+    path, place, time = path[known], place[known], time[known]
+    if len(time) < 2:
+        return np.empty(0), np.empty(0)
+    pauses = np.concatenate(([0], np.cumsum(np.diff(speed.time) > GAP_PERIODS * speed.period)))
+    at = np.searchsorted(speed.time, time, side="right") - 1
+    behind = np.minimum(at + 1, len(speed.time) - 1)
+    logged = np.diff(time) <= GAP_PERIODS * position.period
+    logged &= pauses[behind[1:]] - pauses[at[:-1]] == 0
+    steps = (np.where(logged, np.diff(values), 0.0) for values in (path, place))
+    return tuple(np.concatenate(([0.0], np.cumsum(step))) for step in steps)  # type: ignore[return-value]
 
 
 def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:

@@ -19,6 +19,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
 from cdtool.workflows.impact_free import contacts_shown, unchecked, without_contacts
+from cdtool.workflows.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -156,10 +157,11 @@ def load_runs(
             skipped.append(unread(path, base, loaded))
             continue
         recording, parts = loaded
-        free, touched = without_contacts(parts, contacts_shown(recording, rule))
+        contacts = contacts_shown(recording, rule)
+        free, touched = without_contacts(parts, contacts)
         operations.extend(free)
         skipped.extend(touched)
-        findings.extend(told(recording))
+        findings.extend(log_warnings(recording, contacts, rule))
         skipped.extend(lost(recording))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
@@ -182,11 +184,6 @@ def check_joints(joints: Sequence[str], machine: Any) -> None:
     for joint in joints:
         if joint not in machine.joints:
             raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
-
-
-def told(recording: Recording) -> list[Skipped]:
-    """The warnings among a recording's findings, under its name."""
-    return [Skipped(recording.name, str(item)) for item in recording.findings if item.severity == "warning"]
 
 
 def lost(recording: Recording) -> list[Skipped]:

@@ -22,8 +22,9 @@ from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.force_rows import force_rows
 from cdtool.workflows.impact_free import without_contacts
 from cdtool.workflows.judged import Judged, not_assessable
+from cdtool.workflows.log_findings import log_warnings
 from cdtool.workflows.matched_log import MatchedLog, match_log
-from cdtool.workflows.runs import absent_truth, load_operations, lost, told, unread
+from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
 from cdtool.workflows.true_contacts import any_contacts, true_contacts, unwanted_contacts
 
 
@@ -119,19 +120,20 @@ def score_log(
         return scored
     scored.reading = perf_counter() - begin
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
-    scored.findings = told(recording)
     scored.skipped += lost(recording)
     if group == HOLDOUT:
-        operations, touched = without_contacts(operations, unwanted_contacts(recording, setup))
+        unwanted = unwanted_contacts(recording, setup)
+        operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
         if not operations:
+            scored.findings = log_warnings(recording, unwanted, setup.onset)
             return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     found = detect(operations, scored)
     matched = match_log(recording, operations, contacts, found, group, rules, setup.activation.wait, setup.operations)
     scored.skipped += matched.not_scored
-    scored.findings += matched.doubts
+    scored.findings += matched.warnings
     scored.matched, courses = matched, matched.courses
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:

@@ -81,8 +81,8 @@ def test_odd_stamps_are_dropped_from_every_channel_with_their_lines(log, machine
     columns["t"][[10, 20]] = [50.0, np.nan]
     recording = read_recording(log(table(columns)), machine())
     assert len(recording["torque"]) == len(recording["speed"]) == 48
-    assert "1 time stamp runs backward (line 12): dropped" in told(recording)
-    assert "1 time stamp is no number (line 22): dropped" in told(recording)
+    assert "1 time stamp runs backward (line 12), dropped" in told(recording)
+    assert "1 time stamp is no number (line 22), dropped" in told(recording)
     assert np.isclose(recording["torque"].values[10, 0], 0.1 * 11 * 0.5 / RATIO)
 
 

@@ -146,7 +146,7 @@ def test_a_ragged_row_is_an_error_with_its_line(log, machine, row, width):
 def test_a_half_written_last_line_is_dropped_with_a_finding(log, machine, last):
     source = read(log(f"t,i_motor,n_motor\n0,1,2\n1,2,3\n{last}"), machine().columns)
     assert values(source, "n_motor") == [2, 3]
-    assert str(source.findings[0]) == "the last line (4) is cut off: dropped"
+    assert str(source.findings[0]) == "the last line (4) is cut off, dropped"
 
 
 def test_a_short_last_line_with_its_end_is_ragged(log):

@@ -16,7 +16,7 @@ def test_what_is_dropped_behind_a_clocks_restart_is_a_loss(log, machine):
     columns["t"][40:] = 10.0 * np.arange(10)
     found = [item for item in read_recording(log(table(columns)), machine()).findings if item.severity == "loss"]
     assert [item.channel for item in found] == ["time"]
-    assert "10 time stamps run backward (line 42, 43, 44, ...): dropped, 20 % of the rows" in found[0].message
+    assert "10 time stamps run backward (line 42, 43, 44, ...), dropped (20 % of the rows)" in found[0].message
     assert "the clock starts again there" in found[0].message
 
 

@@ -102,7 +102,7 @@ def end_findings(
         findings += _judge_last_line(dialect, rows, asked, before)
     if odd.cut_line or dialect.text.padding:
         line = odd.cut_line or rows.line(rows.count)
-        findings.insert(0, Finding(f"the last line ({line}) is cut off: dropped", severity="loss"))
+        findings.insert(0, Finding(f"the last line ({line}) is cut off, dropped", severity="loss"))
     if dialect.text.padding:
         text = f"the file ends in {dialect.text.padding} NUL bytes: was the power lost?"
         findings.append(Finding(text, severity="loss"))
@@ -226,5 +226,5 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
     rows.not_rows = np.append(rows.not_rows, line)
     if dialect.text.padding:
         return []
-    text = f"the last line ({line}) has no line end, and '{cell}' may be cut off: dropped"
+    text = f"the last line ({line}) has no line end, and '{cell}' may be cut off, dropped"
     return [Finding(text, severity="loss")]
