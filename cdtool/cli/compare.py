@@ -76,26 +76,31 @@ def compare(
 
 def _show(found: BuildComparison) -> None:
     """What one file lacks, the figures, then every row in words, what differs, and the verdict last."""
-    from cdtool.report.build_report import both, contacts_of
+    from cdtool.report.build_report import both, contacts_of, ranges_of
+    from cdtool.report.few_contacts import EXPLAINED
     from cdtool.report.figure_text import NOTHING
 
     for which, names in (("old", found.only_old), ("new", found.only_new)):
         for name in names:
             _say(f"only in {which}, not compared: {name}")
-    heads = ("contacts", "latency\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
+    heads = ("contacts", "latency\nms", "range\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
     columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
-    figures: tuple[Figure, ...] = ("latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n")
+    figures: tuple[Figure, ...] = ("missed", "not_assessable", "false_alarms", "force_at_alarm_n")
     rows = [
         (
             shorten(row.group, _LONGEST_GROUP),
             shorten(row.detector, _LONGEST_DETECTOR),
             contacts_of(row),
+            both(row, "latency_ms"),
+            ranges_of(row),
             *(both(row, figure) for figure in figures),
         )
         for row in found.rows
     ]
     table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
     _say("old / new; contacts: the same in both, unless two numbers stand there; n.a.: not assessable")
+    if any(row.few for row in found.rows):
+        _say(EXPLAINED)
     typer.echo()
     for row in found.rows:
         _say(f"{shorten(row.group, 2 * _LONGEST_GROUP)}, {shorten(row.detector, 2 * _LONGEST_DETECTOR)}: {row.words}")

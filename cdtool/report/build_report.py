@@ -14,6 +14,7 @@ from cdtool.evaluation.builds.rows import BuildRow
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind, refuse_other_kind
 from cdtool.plain_text import plain
+from cdtool.report.few_contacts import EXPLAINED
 from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.markdown.text import Table, escape
 from cdtool.report.verdict_words import NO_CERTIFICATE
@@ -23,12 +24,13 @@ _HEADS = (
     *("group", "detector", "contacts", "latency ms", "missed", "not assessable", "false alarms", "force at alarm N"),
     "found",
 )
+_RANGE = "range ms"
 _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
-    "Two figures are old / new. Contacts: the same ones in both, unless two numbers stand there. Latency is a mean and "
-    "the force at the alarm a median, of the contacts that both detected; changes are means of their pairs. *No change "
-    "shown* is not *no change*: the change in brackets would have been shown with 80 % power. "
-    "A change has an interval from ten recordings or campaigns on."
+    "Two figures are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
+    "fewer than ten contacts a median) and the force at the alarm a median, of the contacts that both detected; "
+    "changes are means of their pairs. *No change shown* is not *no change*: the change in brackets would have been "
+    "shown with 80 % power. A change has an interval from ten recordings or campaigns on."
 )
 
 
@@ -36,10 +38,12 @@ def to_markdown(comparison: BuildComparison) -> str:
     """A table with a row a detector and group, the verdict above it, what differs below."""
     parts = [
         f"**cdtool compare: {escape(comparison.words)}**",
-        _table(_HEADS, [_cells(row) for row in comparison.rows]),
+        _rows_table(comparison.rows),
         f"{_HOW_TO_READ} *Inconclusive*: these recordings could not have shown a change for the worse of "
         f"{100.0 * comparison.relevant_change:g} %. {NO_CERTIFICATE}",
     ]
+    if any(row.few for row in comparison.rows):
+        parts.append(EXPLAINED)
     if comparison.changed:
         rows = [tuple(escape(text) for text in (item.key, item.old, item.new)) for item in comparison.changed]
         parts += ["Under test, and different:", _table(("setting", "old", "new"), rows)]
@@ -63,6 +67,14 @@ def both(row: BuildRow, figure: Figure, digits: int = 3) -> str:
     if figure in _MEANS:
         return f"{number(found.old, digits)} / {number(found.new, digits)}"
     return f"{found.old:.0f} / {found.new:.0f}"
+
+
+def ranges_of(row: BuildRow) -> str:
+    """The shortest and longest latency of both builds as "25.0 to 28.0 / 30.0 to 34.0"; empty from ten contacts on."""
+    latency = row.question("latency_ms")
+    if latency is None or latency.ranges is None:
+        return ""
+    return " / ".join(" to ".join(dict.fromkeys(map(number, ends))) for ends in latency.ranges)
 
 
 def contacts_of(row: BuildRow) -> str:
@@ -108,6 +120,14 @@ def _cells(row: BuildRow) -> tuple[str, ...]:
         both(row, "force_at_alarm_n", 4),
         escape(row.words),
     )
+
+
+def _rows_table(rows: Sequence[BuildRow]) -> str:
+    """A row a detector and group; the ranges of latency where any row has too few contacts for a mean."""
+    few, at = any(row.few for row in rows), _HEADS.index("latency ms") + 1
+    heads = [*_HEADS[:at], *([_RANGE] if few else []), *_HEADS[at:]]
+    cells = [[*_cells(row)[:at], *([ranges_of(row) or NOTHING] if few else []), *_cells(row)[at:]] for row in rows]
+    return _table(heads, cells)
 
 
 def _table(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

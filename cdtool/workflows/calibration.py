@@ -14,7 +14,8 @@ from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of
+from cdtool.workflows.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of, with_left_out
+from cdtool.workflows.left_out import LeftOut
 
 # Runs are judged by what the other nine tenths teach.
 FOLDS = 10
@@ -44,11 +45,12 @@ def learn_thresholds(
     """
     learned = LearnedThresholds({}, [], [], [], {})
     fit = fitting(setup.rule)
+    left_out = LeftOut()
     for detector in detectors:
         try:
-            pairs, left_out = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
+            pairs, unusable = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
             pairs = in_fixed_order(pairs)
-            fitted = fit(pairs)
+            fitted = with_left_out(fit, [*unread, *unusable])(pairs)
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
             learned.blind.append(Skipped(detector.name, f"not assessable: {fault.message}"))
@@ -57,7 +59,7 @@ def learn_thresholds(
             learned.thresholds[detector.name] = ()
             learned.lacking[detector.name] = fault.reason
             continue
-        learned.skipped.extend([*left_out, *fitted.skipped])
+        left_out.add(detector.name, [*unusable, *fitted.skipped])
         thresholds = fitted.thresholds
         if setup.budget:
             made = calibrate(setup.budget, detector.name, kept(pairs, fitted.skipped), fit, setup.activation)
@@ -68,6 +70,7 @@ def learn_thresholds(
                 )
             )
         learned.thresholds[detector.name] = thresholds
+    learned.skipped.extend(left_out.said_once())
     if learned.lacking and len(learned.lacking) == len(detectors):
         raise _none_usable(learned.lacking, known=bool(operations))
     return learned

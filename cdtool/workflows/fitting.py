@@ -12,6 +12,7 @@ from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import Skipped
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector_on_each
+from cdtool.plain_text import counted
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.contract import checked_fit
 from cdtool.thresholds.settings import with_context
@@ -70,16 +71,7 @@ def signals_of(
     skipped: list[Skipped] = []
     refused: list[CdtoolError] = []
     pairs: list[Pair] = []
-    seen: dict[tuple[str, int], str] = {}
-    once: list[Operation] = []
-    for operation in operations:
-        run = (operation.recording.digest, operation.number)
-        if run[0] and run in seen:
-            skipped.append(Skipped(operation.name, f"holds the same bytes as {seen[run]}: counts once"))
-            continue
-        seen[run] = operation.name
-        once.append(operation)
-    for _, of_log in groupby(once, key=lambda operation: id(operation.whole)):
+    for _, of_log in groupby(operations, key=lambda operation: id(operation.whole)):
         cut = list(of_log)
         try:
             pairs += zip(cut, run_detector_on_each(cut, machine, detector, watched), strict=True)
@@ -90,6 +82,22 @@ def signals_of(
         reasons = [*(fault.message for fault in refused), *(item.reason for item in unread)]
         raise NoUsableRunError(detector.name, reasons[0] if reasons else "")
     return pairs, skipped
+
+
+def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
+    """The same fit; where the runs are too few, its error names what was left out before."""
+
+    def told(pairs: Sequence[Pair]) -> Fitted:
+        try:
+            return fit(pairs)
+        except SignatureError as fault:
+            if skipped and type(fault) is SignatureError:
+                before = f"left out before: {counted(len(skipped), 'run')}"
+                first = f"first {skipped[0].recording}: {skipped[0].reason}"
+                raise SignatureError(f"{fault.message}; {before}, {first}", fault.hint) from fault
+            raise
+
+    return told
 
 
 def fit_operations(

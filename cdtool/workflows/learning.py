@@ -18,7 +18,7 @@ from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.calibration import calibrate, in_fixed_order, kept
-from cdtool.workflows.fitting import fitting, for_machine, signals_of
+from cdtool.workflows.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.normal_runs import normal_motions
 from cdtool.workflows.runs import Progress, check_joints, load_runs
 from cdtool.workflows.threshold_settings import set_by_hand
@@ -67,7 +67,7 @@ def learn_signature(
     runs = load_runs([Path(log) for log in logs], machine_file, operations, onset=onset, jobs=jobs, progress=progress)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)
-    fitted = fit(pairs)
+    fitted = with_left_out(fit, [*runs.skipped, *skipped])(pairs)
     thresholds, origin = fitted.thresholds, FactorOrigin("hand" if set_by_hand(wanted) else "default")
     if budget:
         made = calibrate(budget, instance.name, in_fixed_order(kept(pairs, fitted.skipped)), fit, raised_by)

@@ -124,13 +124,16 @@ def load_runs(
 ) -> Runs:
     """The operations of many impact-free logs; a log that cannot be read is left out and named, the others go on.
 
-    So is an operation in which the load cell shows a contact by the `onset` rule. Values that no sensor gives are
-    masked: those outside of the plausible `ranges`, which are learned from all these logs where none are given.
+    So is a log that is given twice or holds the bytes of another one, and an operation in which the load cell shows
+    a contact by the `onset` rule. Values that no sensor gives are masked: those outside of the plausible `ranges`,
+    which are learned from all these logs where none are given.
     """
     rule = onset or OnsetRule()
+    paths, repeated = _each_once(paths)
     operations: list[Operation] = []
-    skipped: list[Skipped] = []
+    skipped = [Skipped(shown_path(path, base), "given more than once: counts once") for path in repeated]
     findings: list[Skipped] = []
+    by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
     def read(path: Path) -> LoggedRecording | CdtoolError:
@@ -157,6 +160,10 @@ def load_runs(
             skipped.append(unread(path, base, loaded))
             continue
         recording, parts = loaded
+        first = by_bytes.setdefault(recording.digest, recording.name) if recording.digest else recording.name
+        if first != recording.name:
+            skipped.append(Skipped(recording.name, f"holds the same bytes as {first}: counts once"))
+            continue
         contacts = contacts_shown(recording, rule)
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)
@@ -165,6 +172,16 @@ def load_runs(
         skipped.extend(lost(recording))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
+
+
+def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """Return the paths without those that name a file again, and these."""
+    once: dict[Path, Path] = {}
+    repeated: list[Path] = []
+    for path in paths:
+        if once.setdefault(path.resolve(), path) is not path:
+            repeated.append(path)
+    return list(once.values()), repeated
 
 
 def unread(path: Path, base: Path | None, fault: CdtoolError) -> Skipped:

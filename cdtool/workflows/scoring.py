@@ -22,6 +22,7 @@ from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.force_rows import force_rows
 from cdtool.workflows.impact_free import without_contacts
 from cdtool.workflows.judged import Judged, not_assessable
+from cdtool.workflows.left_out import LeftOut
 from cdtool.workflows.log_findings import log_warnings
 from cdtool.workflows.matched_log import MatchedLog, match_log
 from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
@@ -71,7 +72,9 @@ def detect_with(
 
     def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
         found: list[list[Detection]] = [[] for _ in operations]
+        left_out = LeftOut()
         for detector in detectors:
+            failed: list[Skipped] = []
             if detector.name in lacking:
                 unit, why = detector.unit(machine), lacking[detector.name]
                 made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
@@ -82,10 +85,12 @@ def detect_with(
                         operations, machine, detector, known, setup.activation, setup.watched, hold
                     )
                 except CdtoolError as fault:
-                    scored.skipped += [Skipped(item.name, str(fault)) for item in operations]
-                    continue
-            for of_operation, detection in zip(found, made, strict=True):
+                    failed = [Skipped(item.name, str(fault)) for item in operations]
+                    made = []
+            left_out.add(detector.name, failed)
+            for of_operation, detection in zip(found, made, strict=not failed):
                 of_operation.append(detection)
+        scored.skipped += left_out.said_once()
         return found
 
     return detect

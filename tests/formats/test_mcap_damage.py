@@ -64,7 +64,7 @@ def test_a_cut_file_gives_what_lies_whole_before_the_cut(written, compression):
             continue
         values = source.columns["/force data"].values
         assert np.array_equal(values, np.arange(len(values)))
-        assert f"only {len(values)} messages before it read" in str(source.findings[0])
+        assert f"only what lies before it was read ({len(values)} messages)" in str(source.findings[0])
         assert "damaged at byte" in str(source.findings[0])
 
 
@@ -75,7 +75,7 @@ def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
     path.write_bytes(whole[:cut])
     source = Mcap().columns(path)
     assert source.columns["/a x"].values.tolist() == list(range(30))
-    assert "only 30 messages" in str(source.findings[0])
+    assert "was read (30 messages)" in str(source.findings[0])
     assert "no checksum" in str(source.findings[1])
 
 

@@ -24,7 +24,7 @@ from cdtool.evaluation.builds.rows import (
     answer,
     ask,
 )
-from cdtool.evaluation.builds.words import gone_words, overall_words, pairing_words, row_words
+from cdtool.evaluation.builds.words import SAME_RESULTS, gone_words, overall_words, pairing_words, row_words
 from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
 from cdtool.exit_status import Fact
@@ -86,12 +86,16 @@ def compare_builds(
     pairings = pair_recordings(old, new)
     asked = [ask(name, group, builds, pairings[group], 1.0 - significance) for name, group in held]
     answered, count = answer(asked, significance, relevant_change)
-    rows = tuple(replace(row, words=row_words(row, count)) for row in answered)
+    same = old == new
+    rows = tuple(
+        replace(row, words=f"{row.outcome}: {SAME_RESULTS}" if same else row_words(row, count)) for row in answered
+    )
     verdict = _verdict(rows)
+    words = overall_words(verdict, rows, count, significance, relevant_change)
     only_old = tuple(_alone(old, new, builds))
     return BuildComparison(
         verdict=verdict,
-        words=overall_words(verdict, rows, count, significance, relevant_change) + gone_words(only_old),
+        words=f"{verdict}: {SAME_RESULTS}" if same else words + gone_words(only_old),
         significance=significance,
         relevant_change=relevant_change,
         inconclusive=sum(item.inconclusive for item in rows),

@@ -26,10 +26,12 @@ from cdtool.evaluation.statistics.rates import (
     poisson_difference_p,
     poisson_increase_at_most,
 )
+from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.statistics.spread import spread_of
 
 Figure = Literal["latency_ms", "force_at_alarm_n", "missed", "not_assessable", "false_alarms"]
 Pairs = Sequence[tuple[ContactResult, ContactResult]]
+Ranges = tuple[tuple[float, float], tuple[float, float]]
 Labels = Mapping[str, str]
 """What each recording of a build is resampled with."""
 
@@ -51,8 +53,8 @@ class Watched:
 class Asked:
     """One figure of both builds and the p of no change.
 
-    `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, as in a
-    benchmark), or counts in so many contacts, operations or hours.
+    `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, and of fewer than
+    ten latencies, as in a benchmark), or counts in so many contacts, operations or hours.
     `detectable(alpha)` is the least change that would have been shown at that p: with 80 % power where a mean is
     asked; else the count of the new build from which on the test shows it. Infinite: none could have been.
     """
@@ -72,6 +74,8 @@ class Asked:
     """The change that is not ruled out, at that p where it is a mean, else with 95 %; NaN: there is nothing to ask."""
     complete_p: float = math.nan
     """Exact one-sided probability of a change that is complete; NaN where it is not."""
+    ranges: Ranges | None = None
+    """Shortest and longest latency of the old and the new build where either has fewer than ten; else None."""
 
 
 def ask_mean(
@@ -106,9 +110,12 @@ def ask_mean(
     def left_open(alpha: float) -> float:
         return math.inf if reason else detectable(alpha) / abs(means[0].mean) if means[0].mean else math.inf
 
-    # A force at the alarm is a median wherever it stands; its change is the mean one of what is tested.
+    # A force at the alarm is a median wherever it stands, a latency of few contacts as in a benchmark; their change is
+    # the mean one of what is tested.
     old_value, new_value = means[0].mean, means[1].mean
-    if figure == "force_at_alarm_n":
+    few = figure == "latency_ms" and min(len(before[0]), len(after[0])) < FEWEST
+    ranges = (_ends(before[0]), _ends(after[0])) if few else None
+    if few or figure == "force_at_alarm_n":
         old_value, new_value = float(np.median(before[0])), float(np.median(after[0]))
     return Asked(
         figure,
@@ -122,7 +129,12 @@ def ask_mean(
         reason,
         same=paired and not any(differences),
         left_open=left_open,
+        ranges=ranges,
     )
+
+
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    return min(values), max(values)
 
 
 def ask_missed(old: Sequence[ContactResult], new: Sequence[ContactResult], paired: bool) -> Asked:

@@ -13,6 +13,7 @@ from cdtool.evaluation.builds.questions import (
     Asked,
     Figure,
     Labels,
+    Ranges,
     Watched,
     ask_blind_operations,
     ask_false_alarms,
@@ -37,7 +38,9 @@ RELEVANT_CHANGE = 0.1
 class Question:
     """One figure of one detector in one group in both builds, and whether a change is shown.
 
-    `old` and `new`: means over `old_of` and `new_of` contacts, or counts in so many contacts, operations or hours;
+    `old` and `new`: means over `old_of` and `new_of` contacts (medians of forces, and of latencies where `ranges` has
+    the shortest and the longest of either build: fewer than ten contacts), or counts in so many contacts, operations or
+    hours;
     `change` is new less old, of counts a share or a rate without an interval. `p` of no change and `corrected_p` (Holm)
     are NaN where there was nothing to ask; `reason` says why. `detectable`: the least change of a mean that would have
     been shown with 80 % power, or the new count from which on it would have been; infinite where none could.
@@ -60,6 +63,7 @@ class Question:
     left_open: float
     same: bool
     complete_change_p: float
+    ranges: Ranges | None = None
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,12 @@ class BuildRow:
     def inconclusive(self) -> bool:
         """Whether a relevant change of some figure could not have been shown."""
         return any(item.outcome == INCONCLUSIVE for item in self.questions)
+
+    @property
+    def few(self) -> bool:
+        """Whether fewer than ten latencies are compared: tables then show median and range, no mean."""
+        latency = self.question("latency_ms")
+        return latency is not None and latency.ranges is not None
 
     def question(self, figure: Figure) -> Question | None:
         """The question about a figure; None where the group has none of it."""
@@ -224,6 +234,7 @@ def _answered(asked: Asked, corrected: float, significance: float, count: int, t
         left_open=left_open,
         same=asked.same,
         complete_change_p=asked.complete_p,
+        ranges=asked.ranges,
     )
 
 

@@ -11,6 +11,8 @@ from cdtool.evaluation.builds.rows import INCONCLUSIVE, NOTHING_SHOWN, BuildRow,
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.plain_text import counted, shorten
 
+# The reason of any verdict on one file given twice, or on a copy of it.
+SAME_RESULTS = "both files hold the same results"
 # As many are named in the line of the verdict; all stand in `only_old`.
 _NAMED = 3
 

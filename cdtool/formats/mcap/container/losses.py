@@ -97,5 +97,7 @@ class Losses:
         where = f"damaged at byte {loss.at} ({' '.join(loss.reason.split())[:200]})"
         if final:
             behind = f"; {loss.described(origin)}" if loss.size else ""
-            return Finding(f"{where}: only {counted(count, 'message')} before it read{behind}", severity="loss")
+            return Finding(
+                f"{where}: only what lies before it was read ({counted(count, 'message')}){behind}", severity="loss"
+            )
         return Finding(f"{where}: {loss.described(origin)}", severity="loss")

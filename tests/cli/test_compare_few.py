@@ -1,0 +1,55 @@
+"""`cdtool compare` shows few contacts as `cdtool benchmark` does, and says so where it is given one file twice."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.command import cdtool
+
+
+@pytest.fixture(scope="module")
+def results(gate_folder, tmp_path_factory):
+    """Results of two contacts a group, and the same with every latency of the first half as long again."""
+    path = tmp_path_factory.mktemp("results") / "old.json"
+    done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "gm,pt", "-o", path)
+    assert done.status == 0, done.err
+    values = json.loads(path.read_text(encoding="utf-8"))
+    for row in values["contacts"]:
+        row["latency_ms"] = 1.5 * row["latency_ms"] + (7.0 if row["recording"].endswith("01.csv") else 0.0)
+    new = path.with_name("new.json")
+    new.write_text(json.dumps(values), encoding="utf-8")
+    return path, new, done.out
+
+
+def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(results, tmp_path):
+    old, new, shown = results
+    target = tmp_path / "compare.md"
+    done = cdtool("compare", old, new, "-o", target, "--json")
+    rows = json.loads(done.out)["rows"]
+    latencies: dict[tuple[str, str], list[float]] = {}
+    for row in json.loads(old.read_text(encoding="utf-8"))["contacts"]:
+        latencies.setdefault((row["detector"], row["group"]), []).append(row["latency_ms"])
+    for row in rows:
+        for item in (item for item in row["questions"] if item["figure"] == "latency_ms"):
+            values = latencies[row["detector"], row["group"]]
+            assert item["old"] == pytest.approx(sum(values) / 2)  # of two the median is the mean
+            assert item["ranges"][0] == [min(values), max(values)]
+    screen = cdtool("compare", old, new).out
+    reason = "Fewer than 10 contacts detected: median and range, no mean, std or P95."
+    assert all(reason in text for text in (screen, shown, target.read_text(encoding="utf-8")))
+    assert "range" in screen and " to " in screen
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_a_file_compared_with_itself_or_a_copy_is_called_so(results, tmp_path, copied):
+    old = results[0]
+    other = old
+    if copied:
+        other = tmp_path / "copy.json"
+        other.write_bytes(old.read_bytes())
+    done = cdtool("compare", old, other)
+    assert done.status == 0
+    assert done.out.splitlines()[-1].endswith(": both files hold the same results")
+    assert "too few" not in done.out and "would have been" not in done.out

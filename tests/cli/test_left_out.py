@@ -1,0 +1,71 @@
+"""What is left out is counted once, whatever number of detectors leaves it out, and for the reason that it is."""
+
+from __future__ import annotations
+
+import json
+
+from cdtool.evaluation.results import Skipped
+from cdtool.workflows.left_out import LeftOut
+from tests.cli.damaged_copies import damaged
+from tests.command import cdtool
+
+
+def test_a_benchmark_names_each_run_that_is_left_out_once(gate_folder, tmp_path):
+    free = gate_folder / "free"
+    (tmp_path / "twin.csv").write_bytes((free / "01.csv").read_bytes())
+    speeds = [line.split(",")[2] for line in (free / "02.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    cells = {("n_motor", row): f"{1.4 * float(speed):.3f}" for row, speed in enumerate(speeds)}
+    fast = damaged(free / "02.csv", tmp_path / "fast.csv", cells)
+    text = (
+        (gate_folder / "benchmark.toml")
+        .read_text(encoding="utf-8")
+        .replace("machine.toml", f"{gate_folder}/machine.toml")
+    )
+    for group in ("free", "holdout", "stiff", "soft"):
+        text = text.replace(f'["{group}/*.csv"]', f'["{gate_folder}/{group}/*.csv"]')
+    logs = f'["{free}/*.csv", "{tmp_path}/twin.csv", "{fast}"]'
+    text = text.replace(f'["{free}/*.csv"]', logs)
+    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
+    target = tmp_path / "results.json"
+    done = cdtool("benchmark", tmp_path / "benchmark.toml", "--detectors", "pi,gm,pt", "-o", target)
+    assert done.status == 3 and done.err.endswith("done, but 2 items were left out\n")
+    reasons = [(item["recording"], item["reason"]) for item in json.loads(target.read_text())["skipped"]]
+    assert [name for name, _ in reasons] == ["twin.csv", "fast.csv"]
+    assert "holds the same bytes as" in reasons[0][1] and "runs forward at" in reasons[1][1]
+
+
+def test_a_file_that_is_named_twice_is_not_said_to_hold_the_bytes_of_another(gate_folder, tmp_path):
+    free = sorted((gate_folder / "free").glob("*.csv"))
+    again = free[0].parent / ".." / "free" / free[0].name
+    machine = ("-m", gate_folder / "machine.toml")
+    signature = tmp_path / "pi.json"
+    done = cdtool("learn-signature", *free, free[0], again, *machine, "-d", "pi", "-o", signature)
+    assert done.status == 3 and "same bytes" not in done.err
+    assert f"left out: {free[0].as_posix()}: given more than once: counts once" in done.err
+    new = gate_folder / "holdout" / "01.csv"
+    done = cdtool("signature", "update", signature, new, new, *machine)
+    assert "1 run added" in done.out and "in the signature already" not in done.err
+    assert "given more than once: counts once" in done.err
+    done = cdtool("signature", "update", signature, new, *machine)
+    assert "this run is in the signature already" in done.err
+
+
+def test_too_few_runs_name_what_was_left_out_before(gate_folder, tmp_path):
+    source = (gate_folder / "free" / "01.csv").read_bytes()
+    copies = [tmp_path / f"copy_{number}.csv" for number in range(10)]
+    for copy in copies:
+        copy.write_bytes(source)
+    machine = ("-m", gate_folder / "machine.toml")
+    done = cdtool("learn-signature", *copies, *machine, "-d", "pi", "-o", tmp_path / "pi.json")
+    assert done.status == 2 and "1 impact-free run of one class" in done.err
+    assert "left out before: 9 runs, first" in done.err and "counts once" in done.err
+
+
+def test_a_reason_that_not_all_detectors_have_names_them():
+    left_out = LeftOut()
+    left_out.add("pure_inertia", [Skipped("a.csv", "no acceleration"), Skipped("b.csv", "another class")])
+    left_out.add("momentum", [Skipped("b.csv", "another class")])
+    assert left_out.said_once() == [
+        Skipped("a.csv", "pure_inertia: no acceleration"),
+        Skipped("b.csv", "another class"),
+    ]
