@@ -15,6 +15,7 @@ from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
 from cdtool.judgement import Judgement, judged
+from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -22,6 +23,8 @@ from cdtool.thresholds.base import FittedThreshold
 
 # From this share of its samples at another speed on, an operation without an alarm is one of another motion.
 _ANOTHER_MOTION = 0.5
+# Below this share of the slowest learned speed an axis is said to be at rest.
+_AT_REST = 0.01
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,24 @@ class Detection:
     def begins(self) -> tuple[float, ...]:
         """Where strokes of the log begin for thresholds and activation [s], the first one apart."""
         return tuple(item.applies for item in self.judgement.strokes[1:]) if self.judgement else ()
+
+    @property
+    def other_speed(self) -> str:
+        """What was measured where no learned class fitted, and what was learned, in words; empty where one always did.
+
+        The speed is the median of the leading joint over the samples at another speed.
+        """
+        joint, recording = self.operation.motion.joint, self.operation.recording
+        other = self.statistic.time[(self.statistic.status == Status.OTHER_SPEED).any(axis=1)]
+        if self.judgement is None or not len(other) or "speed" not in recording:
+            return ""
+        speeds = previous_value(recording["speed"], other)[:, joint]
+        speed = float(np.median(speeds[np.isfinite(speeds)])) if np.isfinite(speeds).any() else 0.0
+        unit = recording["speed"].unit
+        classes = [replace(item, unit=item.unit or unit) for item in self.judgement.classes]
+        moves = abs(speed) >= _AT_REST * min(item.nominal_speed for item in classes)
+        measured = MotionClass(int(np.sign(speed)) if moves else 0, abs(speed), joint, unit=unit)
+        return f"measured {measured.described}, learned {' and '.join(item.described for item in classes)}"
 
     @property
     def leading(self) -> int:
@@ -204,20 +225,21 @@ def _judge_log(
         rows = _rows(signal, item)
         part = statistic.part(rows)
         own = [tuple(alarm for alarm in of_log if _within(alarm, part)) for of_log in (alarms, crossings)]
-        verdict = replace(_verdict(part, own[0], own[1], judgement), rearmed=tuple(rearmed[alarm] for alarm in own[0]))
-        found.append(
-            Detection(
-                item,
-                detector,
-                part,
-                band.part(rows),
-                verdict,
-                signal.part(rows),
-                judgement.thresholds[0],
-                judgement,
-                rows,
-            )
+        verdict = replace(_verdict(part, own[0], own[1]), rearmed=tuple(rearmed[alarm] for alarm in own[0]))
+        detection = Detection(
+            item,
+            detector,
+            part,
+            band.part(rows),
+            verdict,
+            signal.part(rows),
+            judgement.thresholds[0],
+            judgement,
+            rows,
         )
+        if verdict.outcome == "not assessable" and (words := detection.other_speed):
+            detection = replace(detection, verdict=replace(verdict, reason=f"{verdict.reason}; {words}"))
+        found.append(detection)
     return found
 
 
@@ -225,18 +247,13 @@ def _within(alarm: Alarm, part: Signal) -> bool:
     return bool(len(part.time)) and part.time[0] <= alarm.time <= part.time[-1]
 
 
-def _verdict(
-    statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alarm, ...], judgement: Judgement
-) -> Verdict:
+def _verdict(statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alarm, ...]) -> Verdict:
     if alarms:
         return Verdict("alarm", alarms, crossings=crossings)
     other = float(np.mean(statistic.status == Status.OTHER_SPEED)) if statistic.status.size else 0.0
     if statistic.valid.any() and other < _ANOTHER_MOTION:
         return Verdict("no alarm", crossings=crossings)
-    reason = statistic.why_not()
-    if other:
-        reason += f"; learned {' and '.join(motion.described for motion in judgement.classes)}"
-    return Verdict("not assessable", reason=reason)
+    return Verdict("not assessable", reason=statistic.why_not())
 
 
 def _nothing_learned(operation: Operation, detector: str, signal: Signal) -> Detection:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
+from collections.abc import Sequence
 from decimal import Decimal
 
 # Control, format (direction marks), surrogate and private characters, line and paragraph separators.
@@ -55,6 +56,16 @@ def counted(count: float, thing: str, verb: str = "") -> str:
         return " ".join([digits(count), plural(thing), *verb.split()])
     first, *rest = verb.split() or [""]
     return " ".join([digits(count), thing, *([_SINGULAR.get(first, f"{first}s"), *rest] if first else [])])
+
+
+def first_of(names: Sequence[str], most: int = 3) -> str:
+    """Return the first names of a list, and how many more there are.
+
+    >>> first_of(["a", "b"]), first_of(["a", "b", "c", "d", "e"])
+    ('a, b', 'a, b, c and 2 more')
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def plural(thing: str) -> str:

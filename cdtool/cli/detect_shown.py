@@ -13,6 +13,7 @@ import typer
 from cdtool.cli.console import number, plain, say, table
 from cdtool.cli.contact_rows import contact_as_json
 from cdtool.cli.truth_shown import NEGATIVE
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.detection import Alarm
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
 
-# Operations of which is told what could not be judged, and how many stretches of each.
+# Operations whose sections that could not be judged are shown, and how many sections of each.
 _SHOWN, _STRETCHES = 6, 3
 
 
@@ -35,6 +36,8 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
     _show_notes(detections)
     for force in list(forces.values())[:_SHOWN]:
         _show_force(force)
+    if len(forces) > _SHOWN:
+        typer.echo(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
@@ -98,16 +101,20 @@ def _show_force(force: ForceSummary) -> None:
 
 def _show_notes(detections: list[Detection]) -> None:
     """What a detector wants to be known of its signal, of as many operations as for what could not be judged."""
-    for detection in detections[:_SHOWN]:
+    noted = [detection for detection in detections if detection.statistic.notes]
+    for detection in noted[:_SHOWN]:
         for note in detection.statistic.notes:
             say(f"{detection.operation.name}: {note}")
+    if len(noted) > _SHOWN:
+        typer.echo(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
 
 
 def _show_not_judged(detections: list[Detection]) -> None:
-    """What share of an operation could not be judged, and when, where and why in its longest stretches."""
+    """What share of an operation could not be judged, and when, where and why in its longest sections."""
     shown = [detection for detection in detections if detection.statistic.shares()]
     for detection in shown[:_SHOWN]:
-        longest = sorted(detection.not_judged(), key=lambda item: item.start - item.end)[:_STRETCHES]
+        not_judged = detection.not_judged()
+        longest = sorted(not_judged, key=lambda item: item.start - item.end)[:_STRETCHES]
         unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
@@ -115,10 +122,14 @@ def _show_not_judged(detections: list[Detection]) -> None:
                 f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})" if math.isfinite(item.way_end) else ""
             )
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
+        if more := len(not_judged) - len(longest):
+            parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
+        if detection.other_speed and detection.verdict.outcome != "not assessable":  # then it is among the reasons
+            parts.append(detection.other_speed)
         share = 1.0 - float(detection.statistic.valid.mean())
         say(f"not judged in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
     if len(shown) > _SHOWN:
-        typer.echo(f"not judged: and {len(shown) - _SHOWN} operations more (--json has all)")
+        typer.echo(f"not judged: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
 
 
 def _place(way: float) -> str:
@@ -161,6 +172,7 @@ def _as_json(
         ],
         "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
+        "other_speed": detection.other_speed or None,
         "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
         "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),

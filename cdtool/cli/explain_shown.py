@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Events that are printed and drawn; --json has all.
 SHOWN = 20
+# Its reason names the speeds already.
+_BLIND = "not assessable"
 
 
 def show_explained(explained: Explained) -> None:
@@ -29,6 +31,9 @@ def show_explained(explained: Explained) -> None:
         _show_event(item)
     if len(explained.events) > len(shown):
         typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
+    elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
+    for detection in elsewhere[:SHOWN]:
+        say(f"{detection.operation.name}, not judged at another speed: {detection.other_speed}")
     pairs = zip(explained.found.detections, explained.explanations, strict=True)
     quiet = [detection for detection, events in pairs if not events]
     for detection in quiet[:SHOWN]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cdtool.signature_file import SignatureFile
     from cdtool.workflows.upkeep import Checked, CheckedClass
 
-# Rows of a table, and stretches, that are shown; --json has all.
+# Rows of a table, and sections, that are shown; --json has all.
 _SHOWN = 12
 
 
@@ -117,7 +117,7 @@ def _show_coverage(found: Coverage) -> None:
     for gap in found.gaps[:_SHOWN]:
         typer.echo(f"  no limit: {plain(gap.joint)}, {plain(gap.described)}")
     if len(found.gaps) > _SHOWN:
-        typer.echo(f"  no limit: and {len(found.gaps) - _SHOWN} stretches more (--json has all)")
+        typer.echo(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
 
 
 def _show_drift(found: DriftAudit) -> None:

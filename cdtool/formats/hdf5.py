@@ -27,6 +27,7 @@ from cdtool.formats.own_clocks import asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
+from cdtool.plain_text import first_of
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
 
@@ -160,7 +161,7 @@ class _Tree:
         paths = [path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._made(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
-        text = f"{', '.join(paths[:3])} look like the clocks of their groups, but have no unit of time"
+        text = f"{first_of(paths)} look like the clocks of their groups, but have no unit of time"
         return [Finding(f"{text}: the attribute unit makes each the clock of its group")]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:

@@ -24,6 +24,7 @@ from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Column, Source
+from cdtool.plain_text import first_of
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
 
@@ -128,8 +129,7 @@ class _Tree:
         self._origin = min(known, default=Fraction(0))
         untold = [key for key, start in begins.items() if start is None] + [key for key in clocks if not self._epoch]
         if known and untold:
-            shown = ", ".join(untold[:3]) + (f" and {len(untold) - 3} more" if len(untold) > 3 else "")
-            text = f"others tell when they begin (wf_start_time), {shown} not: taken to begin with the first of them"
+            text = f"no start time (wf_start_time) in {first_of(untold)}: taken to begin with the first of them"
             self._findings.append(Finding(text))
         return float(self._origin)
 

@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, nearest
+from cdtool.plain_text import first_of
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,9 @@ def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) 
         if not meant and "/" not in name:
             meant = sorted(item for item in recordings if PurePosixPath(item).name == name)
         if len(meant) > 1:
-            listed = ", ".join(meant[:3]) + (" and more" if len(meant) > 3 else "")
-            raise ConfigurationError(f"{path}: '{name}' fits {listed}", "write the path below the benchmark file")
+            raise ConfigurationError(
+                f"{path}: '{name}' fits {first_of(meant)}", "write the path below the benchmark file"
+            )
         found[name] = meant[0] if meant else None
     return found
 
