@@ -11,6 +11,7 @@ from cdtool.errors import nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
 from cdtool.tables import Table
 from cdtool.units import RAW_UNITS, unit
+from cdtool.value_words import value_in_words
 
 _CLOCKS = ("log", "publish", "header")
 
@@ -247,7 +248,9 @@ def _valid_range(table: Table) -> tuple[float, float] | None:
         low, high = float(value[0]), float(value[1])
         if math.isfinite(low) and math.isfinite(high) and low < high:
             return low, high
-    raise table.fault("saturation", f"is {value!r}", "[lowest, highest] reading of the sensor, in the log's unit")
+    raise table.fault(
+        "saturation", f"is {value_in_words(value)}", "[lowest, highest] reading of the sensor, in the log's unit"
+    )
 
 
 def _possible_range(table: Table) -> tuple[float, float]:
@@ -263,5 +266,5 @@ def _column(table: Table, value: object, key: str) -> str | int:
         return value
     if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
-    problem = "is missing" if value is None else f"is {value!r}"
+    problem = "is missing" if value is None else f"is {value_in_words(value)}"
     raise table.fault(key, problem, "a column's name, or its number counted from 0")

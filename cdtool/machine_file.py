@@ -43,6 +43,8 @@ def read_machine_file(path: str | Path) -> MachineFile:
     file = Path(path)
     values = read_toml(file)
     root = Table(values, str(file))
+    if isinstance(values.get("machine"), str):
+        raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
     table = root.table("machine", required=True)
     machines = _registry("cdtool.machines", "MACHINES")
     kind = table.choice("type", machines.names(plugins=True))

@@ -104,7 +104,7 @@ class PlausibleRanges:
         }
         for name, item in channels.items():
             if not (np.isfinite([*item.centre, item.reach, item.rate]).all() and item.reach > 0.0 <= item.rate):
-                raise ValueError(f"plausible range of {name}: {item}")
+                raise ValueError(f"a plausible range of {name} with reach {item.reach:g} and rate {item.rate:g}")
         return cls(channels)
 
 

@@ -80,6 +80,17 @@ class SignatureFile:
         return str(self.rule.name)
 
     @property
+    def of_earlier_version(self) -> str:
+        """What a file of an earlier version has not, and how to migrate it, in a line; empty of one of this version.
+
+        Runs that are added to such a file do not make up for it.
+        """
+        if self.normal is not None:
+            return ""
+        parts = "the speed profiles, plausible ranges and normal motions of its runs"
+        return f"of an earlier version, without {parts}: learn it again with cdtool learn-signature to have them"
+
+    @property
     def learns_limits(self) -> bool:
         """Whether the runs decide the limits, and no hand."""
         return not getattr(self.rule, "limits", ())

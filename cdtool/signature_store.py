@@ -14,6 +14,7 @@ from cdtool.activation import Activation
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.dynamics import Gain
 from cdtool.errors import OutputError, SignatureError, UsageError
+from cdtool.file_kinds import kind_of
 from cdtool.files import locked, write_text
 from cdtool.foreign_files import Kind
 from cdtool.operations import HOW_TO_CUT
@@ -23,6 +24,7 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
+from cdtool.value_words import fault_in_words, value_in_words
 
 SCHEMA_VERSION = 4
 # Version 3 has no normal motions, plausible ranges and speed courses; all else is the same.
@@ -54,14 +56,12 @@ def read_signature(path: str | Path) -> SignatureFile:
     try:
         values = parse_json(content)
     except ContentError as fault:
-        raise SignatureError(
-            f"{file}: not a signature file: {fault}", "make one with cdtool learn-signature"
-        ) from fault
+        raise _no_signature(file, content, f": {fault}") from fault
     if not isinstance(values, dict) or values.get("kind") != _KIND:
-        raise SignatureError(f"{file}: not a signature file", "make one with cdtool learn-signature")
+        raise _no_signature(file, content)
     if values.get("schema_version") not in _READABLE:
         raise SignatureError(
-            f"{file}: schema_version is {values.get('schema_version')}, this cdtool knows "
+            f"{file}: schema_version is {value_in_words(values.get('schema_version'))}, this cdtool knows "
             f"{' and '.join(map(str, _READABLE))}",
             "learn it again with this version",
         )
@@ -70,7 +70,13 @@ def read_signature(path: str | Path) -> SignatureFile:
     except UsageError as fault:
         raise SignatureError(f"{file}: {fault.message}", fault.hint) from fault
     except Exception as fault:  # whatever wrong values provoke, plug-in thresholds included
-        raise SignatureError(f"{file}: damaged signature file: {fault!r}", "learn it again") from fault
+        raise SignatureError(f"{file}: damaged signature file: {fault_in_words(fault)}", "learn it again") from fault
+
+
+def _no_signature(file: Path, content: bytes, why: str = "") -> SignatureError:
+    kind = kind_of(content)
+    what = f"is {kind}, not a signature file" if kind and kind != "a signature file" else f"not a signature file{why}"
+    return SignatureError(f"{file}: {what}", "make one with cdtool learn-signature")
 
 
 def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
@@ -118,7 +124,9 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
 def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
     rule = rule_from_dict(values["threshold"])
     current, first = (tuple(fitted_from_dict(rule, item) for item in values[name]) for name in ("current", "first"))
-    joints = tuple(map(str, values["joints"]))
+    joints = tuple(values["joints"])
+    if not all(isinstance(name, str) for name in joints):
+        raise ValueError("joints: a list of names is needed")
     _check_fitted(current, first, joints)
     normal = values.get("normal_motion") if values["schema_version"] > 3 else None
     return SignatureFile(
@@ -149,9 +157,9 @@ def _check_fitted(current: Sequence[FittedThreshold], first: Sequence[FittedThre
             raise ValueError(f"safety factor {item.safety_factor}")
         motion = getattr(item, "motion", None)
         if motion is not None and not (motion.direction in (-1, 1) and 0.0 < motion.nominal_speed < math.inf):
-            raise ValueError(f"class of motion {motion}")
+            raise ValueError(f"a class of motion with direction {motion.direction:g}, speed {motion.nominal_speed:g}")
         if getattr(item, "joints", tuple(joints)) != tuple(joints):
-            raise ValueError(f"joints {joints} beside a signature of others")
+            raise ValueError(f"joints {', '.join(joints) or 'none'}, but limits of others")
 
 
 def _origin(values: Mapping[str, Any]) -> FactorOrigin:
@@ -162,7 +170,7 @@ def _origin(values: Mapping[str, Any]) -> FactorOrigin:
 def _activation(values: Mapping[str, Any]) -> Activation:
     debounce, latch = values["debounce"], values["latch"]
     if isinstance(debounce, bool) or not isinstance(debounce, int | None) or not isinstance(latch, bool):
-        raise ValueError(f"activation {dict(values)}")
+        raise ValueError("activation: debounce is a number of samples, latch is true or false")
     return Activation(debounce, float(values["rearm"]), float(values["hysteresis"]), latch)
 
 

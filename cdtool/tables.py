@@ -9,6 +9,8 @@ from typing import Any
 
 from cdtool.bounded_loading import MOST_TOML, ContentError, parse_toml, read_text
 from cdtool.errors import ConfigurationError, nearest
+from cdtool.file_kinds import kind_of
+from cdtool.value_words import value_in_words
 
 
 class Table:
@@ -69,14 +71,14 @@ class Table:
         """A whole number of at least `minimum`."""
         value = self.raw(name, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
-            raise self.fault(name, f"is {value!r}", f"a whole number of at least {minimum} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"a whole number of at least {minimum} is needed")
         return value
 
     def flag(self, name: str, default: bool) -> bool:
         """true or false."""
         value = self.raw(name, default)
         if not isinstance(value, bool):
-            raise self.fault(name, f"is {value!r}", "true or false, without quotes")
+            raise self.fault(name, f"is {value_in_words(value)}", "true or false, without quotes")
         return value
 
     def text(self, name: str, default: str | None = None) -> str:
@@ -87,7 +89,7 @@ class Table:
                 raise self.fault(name, "is missing", "a text is needed")
             return default
         if not isinstance(value, str):
-            raise self.fault(name, f"is {value!r}", "a text in quotes is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", "a text in quotes is needed")
         return value
 
     def choice(self, name: str, allowed: Sequence[str], default: str | None = None) -> str:
@@ -105,7 +107,9 @@ class Table:
         if isinstance(value, str):
             return (value,)
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
-            raise self.fault(name, "is missing" if value is None else f"is {value!r}", "a list of texts is needed")
+            raise self.fault(
+                name, "is missing" if value is None else f"is {value_in_words(value)}", "a list of texts is needed"
+            )
         return tuple(value)
 
     def table(self, name: str, required: bool = False) -> Table:
@@ -114,7 +118,7 @@ class Table:
         if value is None and not required:
             value = {}
         if not isinstance(value, dict):
-            problem = "is missing" if value is None else f"is {value!r}"
+            problem = "is missing" if value is None else f"is {value_in_words(value)}"
             raise self.fault(name, problem, f"a table [{self.prefix}{name}] is needed")
         return Table(value, self.where, f"{self.prefix}{name}.")
 
@@ -130,9 +134,9 @@ class Table:
 
     def _checked(self, name: str, value: Any, minimum: float, above: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.fault(name, f"is {value!r}", f"a number{_range_text(minimum, above)} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"a number{_range_text(minimum, above)} is needed")
         if value < minimum or value <= above:
-            raise self.fault(name, f"is {value}", f"a number{_range_text(minimum, above)} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"a number{_range_text(minimum, above)} is needed")
         return float(value)
 
 
@@ -142,8 +146,11 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return parse_toml(text)
     except ContentError as fault:
+        kind = kind_of(text.encode())
+        what = f"is {kind}, not TOML" if kind and not kind.endswith(("machine file", "benchmark file")) else ""
         raise ConfigurationError(
-            f"{path}: not valid TOML: {fault}", "texts in quotes, decimals with a point"
+            f"{path}: {what or f'not valid TOML: {fault}'}",
+            "give a machine file or benchmark file" if what else "texts in quotes, decimals with a point",
         ) from fault
 
 

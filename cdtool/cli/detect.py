@@ -180,7 +180,7 @@ def detect(
     learned = [Skipped(str(log), taught) for log, found in done if found.learned]
     absent = [Skipped(str(log), str(item)) for log, found in done for item in absent_truth(found.recording)]
     warnings = [item for _, found in done for item in found.warnings]
-    print_skipped(skipped, [*learned, *warnings], absent)
+    print_skipped(skipped, [*learned, *warnings], [*(note for _, found in done for note in found.notes), *absent])
     if as_json:
         print_json(as_rows(done, forces))
     else:

@@ -133,7 +133,7 @@ def explain(
         )
     )
     skipped = [*lost(explained.found.recording), *explained.found.not_scored]
-    print_skipped(skipped, explained.found.warnings)
+    print_skipped(skipped, explained.found.warnings, explained.found.notes)
     if as_json:
         print_json(explained_as_json(log, explained))
     else:

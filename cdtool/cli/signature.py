@@ -44,10 +44,12 @@ def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False
     Example: cdtool signature show gate.feekf.json --plot signature.png
     """
     from cdtool.signature_store import read_signature
+    from cdtool.workflows.normal_runs import notes_on
     from cdtool.workflows.upkeep import signatures_in
 
     drawn = figure_name(plot, force=force) if plot else None
     stored = read_signature(file)
+    print_skipped((), notes=notes_on(stored))
     pairs = signatures_in(stored) if drawn else ()
     if as_json:
         print_json(file_as_json(stored))
@@ -92,6 +94,7 @@ def check(
     Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
+    from cdtool.workflows.normal_runs import notes_on
     from cdtool.workflows.upkeep import check_signature
 
     if plot is not None and not plot.is_dir():
@@ -108,7 +111,7 @@ def check(
             progress=advance,
         )
     names = _plot_names(plot, checked, force=force)
-    print_skipped(checked.skipped, checked.findings)
+    print_skipped(checked.skipped, checked.findings, notes_on(checked.file))
     if as_json:
         print_json(checked_as_json(checked))
     else:
@@ -149,6 +152,7 @@ def update(
     """
     from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.thresholds.guarded_update import CAP, RESERVE
+    from cdtool.workflows.normal_runs import notes_on
     from cdtool.workflows.upkeep import update_with_runs
 
     with progress("reading runs") as advance:
@@ -164,7 +168,7 @@ def update(
             jobs=jobs,
             progress=advance,
         )
-    print_skipped(done.refused)
+    print_skipped(done.refused, done.findings, notes_on(done.file))
     if as_json:
         reasons = [{"recording": item.recording, "reason": item.reason} for item in done.refused]
         print_json({"file": str(file), "added": list(done.added), "refused": reasons})

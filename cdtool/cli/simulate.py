@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from cdtool.cli.console import plain, print_json, progress
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
 from cdtool.exit_status import statuses_words
+from cdtool.plain_text import counted
 
 simulate = typer.Typer(
     help="Write simulated recordings with known contacts.", no_args_is_help=True, rich_markup_mode="markdown"
@@ -58,7 +60,7 @@ def gate(
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     with progress("simulating") as advance:
         written = write_gate_recordings(output, counts, seed, file_format, advance, references=reference)
-    _report(output, written, seed, as_json)
+    _report(output, written, counts, seed, as_json)
 
 
 @simulate.command("arm", epilog=statuses_words("simulate arm"))
@@ -86,7 +88,7 @@ def arm(
         written = write_arm_recordings(
             output, counts, seed, 1 if trial == 1 else 2, file_format, advance, references=reference
         )
-    _report(output, written, seed, as_json)
+    _report(output, written, counts, seed, as_json)
 
 
 @simulate.command("season", epilog=statuses_words("simulate season"))
@@ -114,7 +116,7 @@ def season(
     wanted = Season(runs, friction_change, obstruction_growth, obstruction_at)
     with progress("simulating") as advance:
         written = write_gate_season(output, wanted, seed, file_format, advance)
-    _report(output, written, seed, as_json)
+    _report(output, written, {"free": runs}, seed, as_json)
 
 
 def _check_format(file_format: str) -> None:
@@ -122,8 +124,14 @@ def _check_format(file_format: str) -> None:
         raise UsageError(f"unknown format '{file_format}'", nearest(file_format, _FORMATS))
 
 
-def _report(output: Path, written: int, seed: int, as_json: bool) -> None:
+def _report(output: Path, written: int, counts: Mapping[str, int], seed: int, as_json: bool) -> None:
+    from cdtool.simulation.recording_folder import without_benchmark
+
     if as_json:
         print_json({"folder": str(output), "recordings": written, "seed": seed})
         return
-    typer.echo(f"{written} recordings, machine.toml and benchmark.toml written to {plain(output)}")
+    recordings, why_not = counted(written, "recording"), without_benchmark(counts)
+    files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
+    typer.echo(f"{recordings}, {files} and contacts.csv written to {plain(output)}")
+    if why_not:
+        typer.echo(f"no benchmark.toml: {why_not}")

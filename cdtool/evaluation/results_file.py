@@ -14,7 +14,9 @@ from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_byt
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
 from cdtool.evaluation.results_schema import WORDS
+from cdtool.file_kinds import kind_of
 from cdtool.strict_json import strict_json
+from cdtool.value_words import value_in_words
 
 Row = TypeVar("Row")
 # Rows of a detector, of a group or of both.
@@ -22,6 +24,7 @@ _TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "poin
 # The version before: "kept", "broken", "not assessable".
 _SPACED_WORDS = 2
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
+_NEXT_STEP = "write one with cdtool benchmark -o results.json"
 _PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
 
@@ -36,13 +39,15 @@ def read_results(path: Path) -> Results:
     try:
         values = parse_json(content)
     except ContentError as fault:
-        raise _no_results(path, str(fault)) from fault
+        raise _other_kind(path, content) or _no_results(path, str(fault)) from fault
+    if other := _other_kind(path, content):
+        raise other
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "no schema_version in it")
     if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
         known = f"this cdtool knows {_SPACED_WORDS} and {SCHEMA_VERSION}"
         raise RecordingError(
-            f"{path}: schema_version is {values['schema_version']}, {known}",
+            f"{path}: schema_version is {value_in_words(values['schema_version'])}, {known}",
             "run cdtool benchmark again with this version",
         )
     try:
@@ -141,5 +146,13 @@ def _required(kind: Any) -> tuple[str, ...]:
     return tuple(item.name for item in fields(kind) if item.default is MISSING and item.default_factory is MISSING)
 
 
+def _other_kind(path: Path, content: bytes) -> RecordingError | None:
+    """The error for a file that is known to be of another kind; a results file may begin as any JSON does."""
+    kind = kind_of(content)
+    if not kind or kind in ("a results file", "JSON"):
+        return None
+    return RecordingError(f"{path}: is {kind}, not a results file", _NEXT_STEP)
+
+
 def _no_results(path: Path, why: str) -> RecordingError:
-    return RecordingError(f"{path}: not a results file: {why}", "write one with cdtool benchmark -o results.json")
+    return RecordingError(f"{path}: not a results file: {why}", _NEXT_STEP)

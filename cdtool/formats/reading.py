@@ -11,6 +11,7 @@ from typing import Any
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
+from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
 from cdtool.formats.channel_assembly import as_logged
 from cdtool.formats.csv.text import read_sample
@@ -69,6 +70,7 @@ def choose_format(path: Path) -> Format:
     wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
     start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
     seen = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+    seen = kind_of(head) if seen == "JSON" else seen
     if wide and not seen and _is_damaged_text(path, wide):
         raise RecordingError(
             f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it anew from where it was made"
@@ -234,7 +236,7 @@ def _head(path: Path) -> bytes:
         if not path.is_file():
             raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
         with path.open("rb") as file:
-            head = file.read(64)
+            head = file.read(512)
     except OSError as fault:
         raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
     if not head:

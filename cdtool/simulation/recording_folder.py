@@ -1,4 +1,4 @@
-"""A folder of simulated recordings: one file a run, with machine.toml, benchmark.toml and contacts.csv."""
+"""A folder of simulated recordings: machine.toml, contacts.csv and, where the runs make one, benchmark.toml."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ EPOCH_NS = 1_700_000_000_000_000_000
 
 # With the format "mixed" this many of each group are MCAP files.
 _MIXED_MCAP = 2
+# From so many runs on something can be learned, and from so many on without being forced.
+_LEAST_RUNS, _ENOUGH_RUNS = 2, 10
 
 
 class Run(Protocol):
@@ -58,6 +60,15 @@ def without_references(machine_toml: str) -> str:
     return "".join(line for line in machine_toml.splitlines(keepends=True) if not line.startswith("reference_"))
 
 
+def without_benchmark(counts: Mapping[str, int]) -> str:
+    """Return why recordings of so many runs of each group make no benchmark; empty where they do."""
+    if counts.get("free", 0) < _LEAST_RUNS:
+        return f"a benchmark learns from {_LEAST_RUNS} runs or more: --free"
+    if not any(counts.get(group, 0) for group in GROUPS if group != "free"):
+        return "a benchmark needs logs to score: --holdout, --stiff or --soft"
+    return ""
+
+
 def write_folder(
     folder: Path,
     counts: Mapping[str, int],
@@ -66,6 +77,8 @@ def write_folder(
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write `counts` recordings of each group of GROUPS below `folder`, all or nothing; returns how many.
+
+    There is no benchmark.toml where these recordings make no benchmark (`without_benchmark`).
 
     `file_format`: csv, mcap, or mixed (the first two of each group as MCAP, the others as CSV). Raises UsageError
     where nothing is to be written or the folder is not empty.
@@ -94,7 +107,8 @@ def _write_all(
         if progress:
             progress(done, len(planned))
     (folder / "machine.toml").write_text(bench.machine_toml, encoding="utf-8")
-    (folder / "benchmark.toml").write_text(_benchmark_toml(planned, bench), encoding="utf-8")
+    if not without_benchmark({group: sum(item.group == group for item in planned) for group in GROUPS}):
+        (folder / "benchmark.toml").write_text(_benchmark_toml(planned, bench), encoding="utf-8")
     with (folder / "contacts.csv").open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerows([("recording", "true_contact_s", "kind"), *contacts])
@@ -130,4 +144,6 @@ def _benchmark_toml(planned: list[_Planned], bench: Bench[AnyRun]) -> str:
     for group in GROUPS:
         if any(item.group == group for item in planned):
             lines += ["", titles.get(group, f"[impacts.{group}]"), f"logs = [{logs(group)}]"]
+    if sum(item.group == "free" for item in planned) < _ENOUGH_RUNS:
+        lines += ["", "[signature]", f"force = true                    # fewer than {_ENOUGH_RUNS} runs to learn from"]
     return "\n".join([*lines, "", *bench.rules, ""])

@@ -16,6 +16,7 @@ from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.signature_curve import Curve, resample
+from cdtool.value_words import value_in_words
 
 RULES = ("pooled", "thesis")
 SIDES = ("one", "two")
@@ -198,5 +199,5 @@ def axes_of(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[
 def known(what: str, value: Any, allowed: Sequence[str]) -> str:
     """The value if it is one of those allowed; raises UsageError with the nearest."""
     if value not in allowed:
-        raise UsageError(f"unknown {what} '{value}'", nearest(str(value), allowed))
+        raise UsageError(f"unknown {what} {value_in_words(value)}", nearest(str(value), allowed))
     return str(value)

@@ -124,6 +124,9 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     """
     file = Path(path)
     root = Table(read_toml(file), str(file))
+    if isinstance(root.raw("machine"), dict):
+        text = f"{file}: is a machine file, not a benchmark file"
+        raise ConfigurationError(text, f'a benchmark file names it: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(base / root.text("machine"))
     wanted = root.texts("detectors", None if learning else ())

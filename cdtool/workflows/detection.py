@@ -24,7 +24,7 @@ from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.matched_log import match_log
-from cdtool.workflows.normal_runs import normals_of
+from cdtool.workflows.normal_runs import normals_of, notes_on
 from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
 from cdtool.workflows.scoring_rules import ScoringRules
@@ -40,7 +40,8 @@ class Detected:
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     `normals`: what impact-free runs look like, or why that is not known.
     `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
-    `not_scored` names contacts without an onset, `warnings` are about the log itself.
+    `not_scored` names contacts without an onset, `warnings` are about the log itself, `notes`
+    about the signature file.
     """
 
     recording: Recording
@@ -55,6 +56,7 @@ class Detected:
     not_scored: tuple[Skipped, ...] = ()
     warnings: tuple[Skipped, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
+    notes: tuple[Skipped, ...] = ()
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -98,7 +100,7 @@ def detect(
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
-    normals = NormalMotions(absent=Absence.BY_HAND)
+    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[Skipped]()
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
@@ -109,6 +111,7 @@ def detect(
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
         normals = normals_of(stored)
+        notes = notes_on(stored)
     else:
         if detector is None:
             raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
@@ -141,6 +144,7 @@ def detect(
         matched.not_scored,
         matched.warnings,
         normals,
+        tuple(notes),
     )
 
 
@@ -169,6 +173,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         matched.not_scored,
         matched.warnings,
         benchmark.normals,
+        benchmark.notes,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from statistics import median
 
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.results import Skipped
 from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
@@ -31,6 +32,11 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
 def normals_of(file: SignatureFile) -> NormalMotions:
     """Return the normal motions of a signature file, or why there are none."""
     return NormalMotions(file.normal or (), Absence.OLDER_FILE if file.normal is None else Absence.FEW_RUNS)
+
+
+def notes_on(file: SignatureFile) -> list[Skipped]:
+    """Return what is to be said of a signature file of an earlier version, under its name; else nothing."""
+    return [Skipped(file.source, file.of_earlier_version)] if file.of_earlier_version else []
 
 
 def with_operation(

@@ -10,11 +10,12 @@ from typing import Any
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.results import Skipped
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.calibration import learn_thresholds
-from cdtool.workflows.normal_runs import normal_motions, normals_of
+from cdtool.workflows.normal_runs import normal_motions, normals_of, notes_on
 from cdtool.workflows.runs import load_runs
 from cdtool.workflows.scoring import Detect, Scored, detect_with, score_log
 
@@ -24,7 +25,7 @@ class PreparedBenchmark:
     """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
 
     `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
-    `normals` what they look like.
+    `normals` what they look like. `notes` are about a signature file of an earlier version.
     """
 
     setup: BenchmarkFile
@@ -34,6 +35,7 @@ class PreparedBenchmark:
     run: Detect
     ranges: PlausibleRanges | None
     normals: NormalMotions
+    notes: tuple[Skipped, ...] = ()
 
     def score(self, log: Path) -> Scored:
         """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
@@ -81,7 +83,14 @@ def prepare_benchmark(
         learned = {run.sha256: "" for run in stored.runs}
         run = detect_with(setup, [instance], thresholds, {})
         return PreparedBenchmark(
-            setup, instance.name, stored.described, learned, run, stored.plausible, normals_of(stored)
+            setup,
+            instance.name,
+            stored.described,
+            learned,
+            run,
+            stored.plausible,
+            normals_of(stored),
+            tuple(notes_on(stored)),
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])

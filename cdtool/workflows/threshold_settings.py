@@ -12,6 +12,7 @@ from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
+from cdtool.value_words import value_in_words
 from cdtool.workflows.benchmark_sections import read_signature
 
 _DEFAULT = "signature"
@@ -101,5 +102,5 @@ def _numbers(table: Table, name: str, kind: type | tuple[type, ...], wanted: str
     values = table.raw(name)
     values = values if isinstance(values, list) else [values]
     if not values or any(isinstance(x, bool) or not isinstance(x, kind) for x in values):
-        raise table.fault(name, f"is {table.raw(name)!r}", wanted)
+        raise table.fault(name, f"is {value_in_words(table.raw(name))}", wanted)
     return tuple(values)

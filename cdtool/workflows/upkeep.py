@@ -64,11 +64,12 @@ class Checked:
 
 @dataclass(frozen=True)
 class Updated:
-    """A signature file after an update, the runs added and those refused with the reason."""
+    """A signature file after an update, the runs added, those refused with the reason, and warnings about the logs."""
 
     file: SignatureFile
     added: tuple[str, ...]
     refused: tuple[Skipped, ...]
+    findings: tuple[Skipped, ...] = ()
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:
@@ -220,7 +221,7 @@ def update_with_runs(
                 refused.append(Skipped(operation.name, str(fault)))
         return file
 
-    return Updated(update_signature(path, change), tuple(added), tuple(refused))
+    return Updated(update_signature(path, change), tuple(added), tuple(refused), runs.findings)
 
 
 def _cut(file: SignatureFile, operations: str | None) -> str:

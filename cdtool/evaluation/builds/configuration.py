@@ -72,10 +72,20 @@ def refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: S
         if key == "onset":
             before, after = (_without_label_file(rule) for rule in (before, after))
         for name, one, other in _leaves(key, before, after):
+            if key == "onset" and _in_samples(one) != _in_samples(other):
+                which = "old" if _in_samples(one) else "new"
+                raise ConfigurationError(
+                    f"{which} is of an earlier version, whose onsets are counted in samples, not in ms",
+                    f"run the benchmark of {which} again with this version: such figures cannot be compared",
+                )
             raise ConfigurationError(
                 f"{name} differs: {_shown(one)} in old, {_shown(other)} in new",
                 f"such figures cannot be compared: set {where} of the benchmark file alike and run one of them again",
             )
+
+
+def _in_samples(rule: Any) -> bool:
+    return isinstance(rule, str) and bool(re.search(r"\bfor \d+ samples?\b", rule))
 
 
 def _without_label_file(rule: Any) -> Any:

@@ -14,8 +14,7 @@ from cdtool.recording import REFERENCES
 
 _ABSENT = {
     Absence.BY_HAND: "with limits set by hand nothing was learned to compare with",
-    Absence.OLDER_FILE: "this signature file was written before channels were learned; learn it again with cdtool "
-    "learn-signature",
+    Absence.OLDER_FILE: "the signature file holds no normal motion, learn it again with cdtool learn-signature",
     Absence.FEW_RUNS: "too few impact-free runs of one class of motion have speed and position",
     Absence.NO_CLASS: "no class of motion that was learned runs as fast as this one",
     Absence.NO_CHANNELS: "without speed and position nobody knows where in its motion this run is",

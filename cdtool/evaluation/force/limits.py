@@ -12,6 +12,7 @@ from pathlib import Path
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.tables import Table, read_toml
+from cdtool.value_words import value_in_words
 
 _SHIPPED = Path(__file__).with_name("limits.toml")
 
@@ -86,7 +87,7 @@ def _profile(name: str, table: Table) -> ForceProfile:
 def _steps(table: Table) -> tuple[ForceStep, ...]:
     listed = table.raw("steps")
     if not isinstance(listed, list) or not listed or not all(isinstance(item, dict) for item in listed):
-        problem = "is missing" if listed is None else f"is {listed!r}"
+        problem = "is missing" if listed is None else f"is {value_in_words(listed)}"
         raise table.fault("steps", problem, "a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]")
     steps: list[ForceStep] = []
     for i, item in enumerate(listed):

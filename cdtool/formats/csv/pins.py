@@ -8,6 +8,7 @@ from cdtool.channels import TablePins
 from cdtool.formats.csv.stamps import check_pattern
 from cdtool.formats.csv.text import UNIT_BYTES
 from cdtool.tables import Table
+from cdtool.value_words import value_in_words
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "blanks": " "}
 _THOUSANDS = ("", ",", ".", "'", " ", "\u00a0", "\u202f")
@@ -20,9 +21,11 @@ def read_pins(table: Table) -> TablePins:
     decimal = _one_of(table, "decimal", {",": ",", ".": ".", "comma": ",", "point": "."})
     thousands = table.text("thousands") if "thousands" in table else None
     if thousands is not None and thousands not in _THOUSANDS:
-        raise table.fault("thousands", f"is {thousands!r}", '",", ".", "\'", a blank, or "" for none')
+        raise table.fault("thousands", f"is {value_in_words(thousands)}", '",", ".", "\'", a blank, or "" for none')
     if decimal and thousands == decimal:
-        raise table.fault("thousands", f"is {thousands!r}, as decimal is", "a number has one decimal mark")
+        raise table.fault(
+            "thousands", f"is {value_in_words(thousands)}, as decimal is", "a number has one decimal mark"
+        )
     pins = TablePins(
         separator=separator,
         decimal=decimal,
@@ -47,7 +50,7 @@ def _one_of(table: Table, name: str, meaning: dict[str, str]) -> str:
     given = table.text(name)
     if given not in meaning:
         words = ", ".join(repr(word) for word in meaning)
-        raise table.fault(name, f"is {given!r}", f"one of {words}")
+        raise table.fault(name, f"is {value_in_words(given)}", f"one of {words}")
     return meaning[given]
 
 
@@ -56,7 +59,7 @@ def _line(table: Table, name: str) -> int | bool | None:
     if value is None or value is False:
         return value
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise table.fault(name, f"is {value!r}", "the number of its line, counted from 1, or false")
+        raise table.fault(name, f"is {value_in_words(value)}", "the number of its line, counted from 1, or false")
     return value
 
 

@@ -1,0 +1,27 @@
+"""What a file is that was given where another kind is needed: files of cdtool are known by what they hold."""
+
+from __future__ import annotations
+
+import re
+
+_MARKS = (
+    (re.compile(rb'\s*\{\s*"kind":\s*"cdtool signature"'), "a signature file"),
+    (re.compile(rb'\s*\{\s*"provenance":\s*\{\s*"tool":\s*"cdtool"'), "a results file"),
+    (re.compile(rb'\s*\{\s*"verdict":\s*"'), "a comparison of two results"),
+    (re.compile(rb"\s*[{\[]"), "JSON"),
+    (re.compile(rb"(?:[^\n]*\n)*?\s*\[machine\]"), "a machine file"),
+    (re.compile(rb"(?:[^\n]*\n)*?\s*\[(?:learn|holdout|impacts\.[^\]\n]+)\]"), "a benchmark file"),
+    (re.compile(rb"\x89MCAP0"), "an MCAP recording"),
+    (re.compile(rb"<\?xml|<testsuites"), "XML"),
+    (re.compile(rb"<!DOCTYPE html|<html", re.IGNORECASE), "HTML"),
+    (re.compile(rb"\x1f\x8b"), "gzip-compressed"),
+    (re.compile(rb"\x89PNG"), "a PNG image"),
+    (re.compile(rb"(?:[^\n]*\n){1,3}?[-+\d.eE]+(?:[,;\t ]\s*[-+\d.eE]+)+\r?\n"), "a table of numbers"),
+)
+_LOOKED_AT = 1 << 13
+
+
+def kind_of(content: bytes) -> str:
+    """Return what the beginning of a file shows it to be, with its article; empty where nothing does."""
+    head = content[:_LOOKED_AT]
+    return next((words for mark, words in _MARKS if mark.match(head)), "")

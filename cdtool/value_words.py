@@ -1,0 +1,46 @@
+"""Values and faults that came out of a file, in words for a message: never as Python would write them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from cdtool.plain_text import counted, digits, shorten
+
+_LONGEST = 60
+_NO_NUMBER = re.compile(r"(?:could not convert string to float|invalid literal for int\(\) with base 10): (.*)")
+_WRONG_KIND = (TypeError, AttributeError, IndexError)
+
+
+def value_in_words(value: Any) -> str:
+    """Return a value as a message names it.
+
+    >>> [value_in_words(value) for value in (True, None, "a", 2.5, [1, 2], {"b": 1})]
+    ['true', 'empty', "'a'", '2.5', 'a list of 2 values', 'a table']
+    """
+    if value is None or isinstance(value, bool):
+        return "empty" if value is None else str(value).lower()
+    if isinstance(value, str):
+        return f"'{shorten(value, _LONGEST)}'"
+    if isinstance(value, int | float):
+        return digits(value) if abs(value) < 1e15 else f"{value:g}"
+    if isinstance(value, list | tuple):
+        plain = all(isinstance(item, int | float | str) for item in value) and len(value) <= 4
+        listed = ", ".join(map(value_in_words, value))
+        return f"[{shorten(listed, _LONGEST)}]" if plain else f"a list of {counted(len(value), 'value')}"
+    return "a table"
+
+
+def fault_in_words(fault: Exception) -> str:
+    """Return why values of a file do not fit, where reading them raised a fault of Python.
+
+    >>> fault_in_words(KeyError("unit")), fault_in_words(TypeError("'int' object is not iterable"))
+    ("'unit' is missing", 'a value is of the wrong kind')
+    """
+    if isinstance(fault, KeyError) and fault.args:
+        return f"'{fault.args[0]}' is missing"
+    if isinstance(fault, _WRONG_KIND) or not str(fault):
+        return "a value is of the wrong kind"
+    if match := _NO_NUMBER.fullmatch(str(fault)):
+        return f"{match[1]} is no number"
+    return str(fault)

@@ -1,0 +1,33 @@
+"""The benchmark.toml that `cdtool simulate` writes is one that `cdtool benchmark` runs; else there is none, and why."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.command import cdtool
+
+
+def _simulated(folder, free, holdout, stiff):
+    counts = ("--free", free, "--holdout", holdout, "--stiff", stiff, "--soft", 0)
+    done = cdtool("simulate", "gate", *counts, "--seed", 5, "-o", folder)
+    assert done.status == 0, done.err
+    return done.out
+
+
+@pytest.mark.parametrize("counts", [(2, 0, 1), (2, 1, 0), (10, 0, 1)])
+def test_what_is_written_can_be_run(tmp_path, counts):
+    assert "benchmark.toml" in _simulated(tmp_path / "gate", *counts).splitlines()[0]
+    done = cdtool("benchmark", tmp_path / "gate" / "benchmark.toml", "--detectors", "pt")
+    assert done.status == 0, done.err
+    forced = "force = true" in (tmp_path / "gate" / "benchmark.toml").read_text(encoding="utf-8")
+    assert forced == (counts[0] < 10)
+
+
+@pytest.mark.parametrize(
+    ("counts", "why"), [((0, 1, 1), "--free"), ((1, 0, 1), "--free"), ((2, 0, 0), "--holdout, --stiff or --soft")]
+)
+def test_what_cannot_be_run_is_not_written_and_the_reason_is_said(tmp_path, counts, why):
+    shown = _simulated(tmp_path / "gate", *counts).splitlines()
+    assert not (tmp_path / "gate" / "benchmark.toml").exists()
+    assert len(shown) == 2 and shown[1].startswith("no benchmark.toml: ") and shown[1].endswith(why)
+    assert "recordings" in shown[0] or counts == (0, 0, 1)
