@@ -61,6 +61,15 @@ def _pieces(time: FloatArray) -> npt.NDArray[np.int64]:
     return pieces
 
 
+def usual_steps(time: FloatArray) -> FloatArray:
+    """(n,): the median of the last 9 steps up to each sample [s]; infinite at the first."""
+    usual = np.full(len(time), np.inf)
+    if len(time) > 1:
+        steps = np.diff(time)
+        usual[1:] = recent_medians(steps, float(steps[0]))
+    return usual
+
+
 def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
     """(n, J): for each sample when its filter last started [s]; infinite before the first sample.
 

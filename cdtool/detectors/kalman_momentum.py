@@ -16,6 +16,7 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.filters import usual_steps
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -67,9 +68,11 @@ class KalmanMomentum:
             per_joint(value, len(machine.joints)) ** 2
             for value in (self.contact_drift, self.sigma_torque, self.sigma_speed)
         )
+        usual = usual_steps(drive.time)
         for j, inertia in enumerate(machine.nominal_inertia):
             _filter(
                 drive.time,
+                usual,
                 np.ascontiguousarray(net_force[:, j]),
                 np.ascontiguousarray(momentum[:, j]),
                 np.ascontiguousarray(drive.missing[:, j]),
@@ -105,11 +108,12 @@ def _process_noise(drift: float, torque: float, step: float) -> FloatArray:
 
 
 @kernel(
-    f"void({READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, float64, "
-    "float64[:], uint8[:])"
+    f"void({READ_ONLY}, float64[::1], float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, "
+    "float64, float64[:], uint8[:])"
 )
 def _filter(
     time: FloatArray,
+    usual: FloatArray,
     net_force: FloatArray,
     momentum: FloatArray,
     missing: BoolArray,
@@ -123,6 +127,10 @@ def _filter(
     status: StatusArray,
 ) -> None:
     """Predict p + (mean force - tau_c) T over each step, exactly; correct with p as measured, in Joseph form.
+
+    Over a step longer than the `usual` one (n,) the torque's noise adds up as over so many usual steps: white, not one
+    error held all the while. The gain then stays what it was, so that the estimate gives back the noise of the sample
+    before the gap, instead of keeping it as a contact for as long as it remembers.
 
     `waits`: where a sample is not whole. Behind it a straight line stands for the force where the torque was missing,
     or the pose of `coupled` joints.
@@ -145,7 +153,7 @@ def _filter(
             impulse += 0.5 * (net_force[k] + net_force[k - 1]) * step
             elapsed += step
             p += (0.5 * (net_force[k] + net_force[k - 1]) - contact) * step
-            pp += step * (step * cc - 2.0 * pc) + drift * step**3 / 3.0 + torque_noise * step * step
+            pp += step * (step * cc - 2.0 * pc) + drift * step**3 / 3.0 + torque_noise * step * min(step, usual[k])
             pc += -step * cc - 0.5 * drift * step * step
             cc += drift * step
         if waits[k]:

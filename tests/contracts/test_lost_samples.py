@@ -184,10 +184,7 @@ def test_a_sensor_that_loses_10_samples_every_200_ms_is_still_judged_and_what_is
     ],
 )
 @pytest.mark.parametrize("threshold", ["cusum", "signature"])
-def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tmp_path, request):
-    if (name, threshold) == ("kalman_momentum", "cusum"):
-        # Known to fail where speed samples are lost in succession: the sum exceeds 1.6 times the normal one.
-        request.applymarker(pytest.mark.xfail(reason="kalman_momentum with cusum of coupled joints: open"))
+def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tmp_path):
     if kind == "robot":
         pytest.importorskip("pinocchio")
     machine = arm_of(ARM) if kind == "arm" else six_joint_robot(tmp_path)
@@ -212,7 +209,8 @@ def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tm
     pairs = [(r, run_detector(Operation(r, operations_of(base)[0].motion), machine, detector)) for r in learned]
     fitted = [THRESHOLDS.load(threshold)(sides="two").fit(pairs)]
     normal = max(critical_factor(found(noisy(100 + seed), fitted), AT_ONCE) for seed in range(6))
-    for seed in range(3):
+    # Rows and speed samples lost while the joints turn, among others.
+    for seed in (10, 43, 49):
         whole = noisy(200 + seed)
         faults = random_faults(whole, 5, np.random.default_rng(seed), longest=10)
         before = critical_factor(found(whole, fitted), AT_ONCE)

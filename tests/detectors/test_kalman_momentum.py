@@ -100,3 +100,26 @@ def test_it_is_starting_up_for_three_time_constants_by_its_rule(detector):
     ready = int(np.flatnonzero(signal.status[:, 0] == Status.VALID)[0])
     assert (signal.status[:ready, 0] == Status.START_UP).all()
     assert ready * PERIOD == pytest.approx(3.0 / rule, abs=1.5 * PERIOD)
+
+
+@pytest.mark.parametrize("lost", [2, 4, 7])
+def test_lost_rows_leave_nothing_in_the_estimate_that_its_noise_does_not(lost):
+    # Much torque noise: the estimate holds a share of each sample's noise, which the next one takes back.
+    detector, count = CASES[1], 6000
+    rng = np.random.default_rng(lost)
+    force, speed = rng.normal(size=count), 1e-3 * rng.normal(size=count)
+    whole = estimated(detector, force, speed).values[:, 0]
+    time = np.arange(count) * PERIOD
+    offsets = []
+    for first in range(3000, 5000, 100):
+        keep = np.ones(count, dtype=bool)
+        keep[first : first + lost] = False
+        channels = {
+            "torque": Series(time[keep], force[keep], "N"),
+            "speed": Series(time[keep], speed[keep], "m/s"),
+        }
+        found = detector.signal(Recording("r", "r", ("axis",), channels), AXIS).values[:, 0]
+        # The mean over 20 samples behind the gap against the whole log's.
+        offsets.append(float(np.mean(found[first : first + 20] - whole[first + lost : first + lost + 20])))
+    usual = whole[3000:5000].reshape(-1, 20).mean(axis=1).std()
+    assert np.abs(offsets).max() < 3.0 * usual
