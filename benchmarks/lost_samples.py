@@ -1,18 +1,19 @@
 """Do lost samples raise false alarms, and what do they cost in latency? Every detector with every threshold.
 
-    python benchmarks/lost_samples.py                          # gate and arm, 300 runs to learn from, 300 to judge
+    python benchmarks/lost_samples.py --machines gate      # 300 runs to learn from, 300 to judge; 40 minutes a machine
     python benchmarks/lost_samples.py --learn 30 --judge 30 --machines gate --detectors friction_ekf
 
-Simulated impact-free runs teach each threshold and set its safety factor for one alarming operation in 100 (or one of
-those learned from, where they are fewer). Other impact-free runs are judged twice: as they are, and with 10 faults each
-(lost rows, repeated stamps, NaN or lost samples of one channel, 1 to 50 samples long). Counted are the runs that alarm
-only with their faults, and only without: an exact test of one side says whether faults add alarms, Holm's method keeps
-all the tests together at 5 %. Each cell is tried with the default debounce and with none.
+Simulated impact-free runs teach each threshold; its safety factor is that of one alarming operation in 100 (or one of
+those learned from, where they are fewer), set on each half of them by what the other half teaches. Other impact-free
+runs are judged twice: as they are, and with 10 faults each (lost rows, repeated stamps, NaN or lost samples of one
+channel, 1 to 50 samples long). Counted are the runs that alarm only with their faults, and only without: an exact test
+of one side says whether faults add alarms, Holm's method keeps all the tests of a call together at 5 %. Each cell is
+tried with the default debounce and with none.
 
-Contacts: a fault at the onset (before, across and after it) may cost the gap and 20 ms of latency. Contacts that take
-longer, or are missed only with the fault, are counted. Where all that shows a contact lies in the gap (the pulse of an
-accelerometer) no method can be that fast: the 20 ms then count from the alarm of the whole log's statistic, not looked
-at during the gap. The share of time that is judged in damaged runs is shown, too.
+Contacts: a fault anywhere before or in the contact, or at the onset (before, across and after it), may cost its own
+length and 20 ms of latency. Where the whole log itself would be later without the samples that the fault took (the
+pulse of an accelerometer), the evidence is lost: counted apart, see lost_evidence.py. The share of time that is judged
+in damaged runs is shown, too. Progress goes to stderr.
 Exit status 1 where a test fails, or where more than `--late` of all contacts take too long.
 """
 
@@ -20,7 +21,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -30,26 +32,26 @@ import gate_accuracy
 import numpy as np
 from accuracy import IMPACTS, written_setup
 from damaged_logs import Fault, damaged, random_faults, without
+from lost_evidence import Cost, cost_of
 from scipy.stats import binomtest
 from timing import environment, table
 
 from cdtool.activation import Activation
-from cdtool.detection import Alarm, Status
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.false_alarm_budget import Budget, set_factor
 from cdtool.evaluation.statistics.paired import holm
+from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import Recording
+from cdtool.recording import Contact, Recording
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.calibration import calibrate
-from cdtool.workflows.fitting import Pair, fitting
+from cdtool.workflows.fitting import Fit, Pair, fitting
 
 SEED, FAULTS, SIGNIFICANT = 1501, 10, 0.05
 MACHINES: Mapping[str, tuple[Any, Any]] = {
@@ -57,8 +59,6 @@ MACHINES: Mapping[str, tuple[Any, Any]] = {
     "T1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
     "T2": (partial(write_arm_recordings, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
 }
-# What a fault may cost beyond its own length [s].
-ALLOWED = 0.02
 
 
 @dataclass
@@ -69,11 +69,8 @@ class Cell:
     added: int = 0
     lost: int = 0
     both: int = 0
-    detected: int = 0
-    late: int = 0
-    missed: int = 0
-    worst: float = 0.0
-    assessed: list[tuple[float, ...]] = field(default_factory=list)
+    outcomes: dict[str, int] = field(default_factory=dict)
+    assessed: list[tuple[float, float]] = field(default_factory=list)
 
     @property
     def share(self) -> float:
@@ -87,6 +84,22 @@ class Cell:
         differ = self.added + self.lost
         return float(binomtest(self.added, differ, alternative="greater").pvalue) if differ else 1.0
 
+    @property
+    def detected(self) -> int:
+        """Contacts that the whole log detects, each with each of its faults."""
+        return sum(self.outcomes.values())
+
+    @property
+    def late(self) -> int:
+        """Those that cost more than they may, missed ones included."""
+        return self.outcomes.get("late", 0) + self.outcomes.get("missed", 0)
+
+    def __str__(self) -> str:
+        alarms = f"+{self.added} -{self.lost} ={self.both}, p {self.p:.2g}"
+        late = f"{self.late}/{self.detected} late, {self.outcomes.get('missed', 0)} of them missed, "
+        lost = f"{self.outcomes.get('evidence lost', 0)} with evidence lost, "
+        return f"{self.title}: {alarms}, {late + lost if self.detected else ''}{100.0 * self.share:.1f} % judged"
+
 
 @dataclass(frozen=True)
 class Bench:
@@ -96,7 +109,7 @@ class Bench:
     learned: Sequence[Operation]
     whole: Sequence[Operation]
     damaged: Sequence[Operation]
-    contacts: Sequence[tuple[Operation, float, Sequence[tuple[Fault, Operation]]]]
+    contacts: Sequence[tuple[Operation, Contact, Sequence[tuple[Fault, Operation]]]]
 
 
 def bench_of(name: str, options: argparse.Namespace) -> Bench:
@@ -120,18 +133,21 @@ def bench_of(name: str, options: argparse.Namespace) -> Bench:
     for group in IMPACTS:
         for raw in runs(group, options.seed, options.contacts):
             whole = operation(raw)
-            onset = find_contacts(whole.recording, setup.onset)[0].start
-            faults = [at_onset(raw, onset, rng) for _ in range(options.copies)]
+            contact = find_contacts(whole.recording, setup.onset)[0]
+            # Two of three faults at the onset, one anywhere until half a second after it.
+            places = [(0.0 if i % 3 == 2 else contact.start, contact.start) for i in range(options.copies)]
+            faults = [at_contact(raw, since, onset, rng) for since, onset in places]
             copies = [(fault, operation(damaged(raw, [fault]))) for fault in faults]
-            contacts.append((whole, onset, copies))
+            contacts.append((whole, contact, copies))
     return Bench(setup, learned, [operation(raw) for raw in judged], [operation(raw) for raw in spoilt], contacts)
 
 
-def at_onset(raw: Recording, onset: float, rng: np.random.Generator) -> Fault:
-    """A fault that ends just before the onset, holds it, or begins up to 20 ms after it."""
+def at_contact(raw: Recording, since: float, onset: float, rng: np.random.Generator) -> Fault:
+    """A fault that ends just before the onset, holds it, or begins up to 20 ms after it; or one anywhere since then."""
     fault = random_faults(raw, 1, rng)[0]
     length = fault.count * raw["speed"].period
-    return replace(fault, start=float(onset + rng.uniform(-length - 0.005, 0.02)))
+    first, last = (onset - length - 0.005, onset + 0.02) if since == onset else (since, onset + 0.5)
+    return replace(fault, start=float(rng.uniform(first, last)))
 
 
 def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[Cell]:
@@ -152,75 +168,80 @@ def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[C
             continue
         whole, spoilt = ([signal(item) for item in items] for items in (bench.whole, bench.damaged))
         contacts = [
-            (signal(item), onset, [(fault, signal(copy)) for fault, copy in copies])
-            for item, onset, copies in bench.contacts
+            (signal(item), contact, [(fault, signal(copy)) for fault, copy in copies])
+            for item, contact, copies in bench.contacts
         ]
         for threshold in options.thresholds:
             rule = with_context(THRESHOLDS.load(threshold)(), setup.signature.sides, setup.signature)
             fit = fitting(setup.signature if threshold == "signature" else rule)
-            for activation in (setup.activation, replace(setup.activation, debounce=1)):
-                title = f"{name} {detector.short_name} {threshold}{', debounce 1' if activation.debounce == 1 else ''}"
-                cell = Cell(title)
-                try:
-                    factor = calibrate(budget, detector_name, learned, fit, activation).factor
-                    fitted = [item.with_safety_factor(factor) for item in fit(learned).thresholds]
-                except CdtoolError as fault:
-                    print(f"{title}: left out: {fault.message}", flush=True)
-                    break
-                judged = partial(judged_pair, detector_name, fitted, activation)
-                count_alarms(cell, whole, spoilt, judged)
-                count_contacts(cell, contacts, judged, activation)
-                yield cell
+            activations = (setup.activation, replace(setup.activation, debounce=1))
+            title = f"{name} {detector.short_name} {threshold}"
+            began = time.monotonic()
+            try:
+                cells = judged_cells(title, detector_name, fit, budget, activations, (learned, whole, spoilt, contacts))
+            except CdtoolError as fault:
+                print(f"{title}: left out: {fault.message}", flush=True)
+                continue
+            print(f"{time.monotonic() - began:6.1f} s  {title}", file=sys.stderr, flush=True)
+            yield from cells
 
 
-def judged_pair(detector: str, fitted: Sequence[Any], activation: Activation, pair: Pair) -> Detection:
-    """An operation and its signal with the fitted threshold."""
-    operation, signal = pair
-    return judge(operation, detector, signal, fitted, activation)
+def judged_cells(
+    title: str,
+    detector: str,
+    fit: Fit,
+    budget: Budget,
+    activations: Sequence[Activation],
+    runs: tuple[Sequence[Pair], Sequence[Pair], Sequence[Pair], Sequence[Any]],
+) -> list[Cell]:
+    """One detector with one threshold: each log is judged once, whatever the debounce; limits follow by the factor."""
+    learned, whole, spoilt, contacts = runs
 
+    def judged(fitted: Sequence[Any], pair: Pair) -> Detection:
+        operation, signal = pair
+        return judge(operation, detector, signal, fitted, activations[0])
 
-Judged = Callable[[Pair], Detection]
-
-
-def count_alarms(cell: Cell, whole: Sequence[Pair], spoilt: Sequence[Pair], judged: Judged) -> None:
-    """Impact-free runs, pair by pair; and how many of their samples can be judged."""
+    held_out = []
+    for half in range(2):
+        fitted = fit(learned[1 - half :: 2]).thresholds
+        held_out += [judged(fitted, pair) for pair in learned[half::2]]
+    factors = [set_factor(budget, detector, held_out, activation).factor for activation in activations]
+    del held_out
+    fitted = fit(learned).thresholds
+    cells = [Cell(f"{title}{', debounce 1' if item.debounce == 1 else ''}") for item in activations]
+    tried = list(zip(cells, activations, factors, strict=True))
     for before, after in zip(whole, spoilt, strict=True):
-        found = judged(before), judged(after)
-        without_faults, with_faults = (bool(item.verdict.alarms) for item in found)
-        cell.both += with_faults and without_faults
-        cell.added += with_faults and not without_faults
-        cell.lost += without_faults and not with_faults
-        cell.assessed.append(tuple(item.assessed_seconds for item in found))
-
-
-def count_contacts(cell: Cell, contacts: Sequence[Any], judged: Judged, activation: Activation) -> None:
-    """Contacts that are detected in the whole log within 1 s: with each fault, how much later?
-
-    Where the whole log's own statistic, not looked at during the gap, alarms even later, the evidence lay in the gap:
-    then the 20 ms count from that alarm.
-    """
-    for whole, onset, copies in contacts:
-        found = judged(whole)
-        before = first_crossing(found.verdict.crossings, onset)
-        if before > onset + 1.0:
-            continue
+        found = judged(fitted, before), judged(fitted, after)
+        for cell, activation, factor in tried:
+            alarms = [critical_factor(item, activation) > factor for item in found]
+            cell.both += all(alarms)
+            cell.added += alarms[1] and not alarms[0]
+            cell.lost += alarms[0] and not alarms[1]
+            cell.assessed.append((found[0].assessed_seconds, found[1].assessed_seconds))
+    for pair, contact, copies in contacts:
+        one = judged(fitted, pair)
         for fault, copy in copies:
-            end = fault.start + fault.count * whole[0].recording["speed"].period
-            status = found.statistic.status.copy()
-            status[(found.statistic.time >= fault.start) & (found.statistic.time <= end)] = Status.GAP
-            seen, _ = activation.alarms(replace(found.statistic, status=status), found.band)[::-1]
-            reachable = max(before + end - fault.start, first_crossing(seen, onset))
-            cost = first_crossing(judged(copy).verdict.crossings, onset) - reachable
-            if np.isfinite(reachable):
-                cell.detected += 1
-                cell.missed += bool(np.isinf(cost))
-                cell.late += bool(cost > ALLOWED + 1e-9)
-                cell.worst = max(cell.worst, cost if np.isfinite(cost) else 0.0)
+            other, length = judged(fitted, copy), fault.count * pair[0].recording["speed"].period
+            for cell, activation, factor in tried:
+                cost = cost_of(one, other, contact, (fault.start, length), activation, factor)
+                count_contact(cell, cost, fault, contact, pair[0].name)
+    return cells
 
 
-def first_crossing(crossings: Sequence[Alarm], since: float) -> float:
-    """The first at or after `since` [s]; infinite without one."""
-    return min((alarm.time for alarm in crossings if alarm.time >= since), default=np.inf)
+def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact, name: str) -> None:
+    """Add a contact to the cell's outcomes; what is late, or may be, is told on stderr."""
+    if cost is None:
+        return
+    cell.outcomes[cost.outcome] = cell.outcomes.get(cost.outcome, 0) + 1
+    if cost.outcome != "in time":
+        times = (cost.whole, cost.damaged, cost.reachable, fault.start)
+        whole, damaged, reachable, start = (f"{1e3 * (item - contact.start):.0f}" for item in times)
+        print(
+            f"  {cost.outcome}: {cell.title}, {name}: {whole} -> {damaged} ms, reachable {reachable}; "
+            f"{fault.kind} {fault.channel} x{fault.count} at {start} ms",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def main(options: argparse.Namespace) -> int:
@@ -229,32 +250,39 @@ def main(options: argparse.Namespace) -> int:
     print(f"{environment()}\n", flush=True)
     cells = []
     for name in options.machines:
+        began = time.monotonic()
         bench = bench_of(name, options)
+        print(f"{time.monotonic() - began:6.1f} s  {name}: simulated", file=sys.stderr, flush=True)
         for cell in cells_of(name, bench, options):
             cells.append(cell)
-            late = f"{cell.late}/{cell.detected} late, {cell.missed} missed, " if cell.detected else ""
-            alarms = f"+{cell.added} -{cell.lost} ={cell.both}, p {cell.p:.2g}"
-            print(f"{cell.title}: {alarms}, {late}{100.0 * cell.share:.1f} % judged", flush=True)
+            print(cell, flush=True)
     if not cells:
         print("error: no cell could be tried")
         return 1
     adjusted = holm([cell.p for cell in cells])
     failing = [
-        (cell.title, f"{cell.added}", f"{cell.lost}", f"{p:.2g}") for cell, p in zip(cells, adjusted, strict=True)
+        (cell.title, f"{cell.added}", f"{cell.lost}", f"{p:.2g}")
+        for cell, p in zip(cells, adjusted, strict=True)
+        if p < SIGNIFICANT
     ]
-    failing = [row for row, p in zip(failing, adjusted, strict=True) if p < SIGNIFICANT]
     print()
     if failing:
         table(("more false alarms with faults", "added", "lost", "p (Holm)"), failing)
-    total = [sum(getattr(cell, name) for cell in cells) for name in ("added", "lost", "detected", "late", "missed")]
-    print(f"{len(cells)} cells: {total[0]} runs alarm only with faults, {total[1]} only without;")
+    added, lost, both, detected, late = (
+        sum(getattr(cell, name) for cell in cells) for name in ("added", "lost", "both", "detected", "late")
+    )
+    missed, unseen = (sum(cell.outcomes.get(name, 0) for cell in cells) for name in ("missed", "evidence lost"))
+    runs = len(cells) * options.judge
+    print(f"{len(cells)} cells, {runs} runs: {added + both} alarm with faults, {lost + both} without,")
+    print(f"{added} only with faults, {lost} only without; smallest p by Holm {min(adjusted):.3g};")
     print(f"{len(failing)} cells have more false alarms with faults (Holm, 5 % together)")
-    if total[2]:
-        print(f"{total[2]} contacts with a fault: {total[3]} later than the gap and 20 ms, {total[4]} of them missed;")
+    if detected:
+        print(f"{detected} contacts with a fault: {late} later than its length and 20 ms, {missed} of them missed;")
+        print(f"in {unseen} others the evidence lay in the fault")
         slow = sorted((c for c in cells if c.late), key=lambda c: -c.late / c.detected)[:5]
         if slow:
             print(f"most of them: {', '.join(f'{c.title} {c.late}/{c.detected}' for c in slow)}")
-    good = not failing and total[3] <= options.late * total[2]
+    good = not failing and late <= options.late * detected
     print("ok" if good else "FAIL")
     return 0 if good else 1
 
@@ -265,7 +293,7 @@ def _options(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--learn", type=int, default=300, help="impact-free runs to learn from")
     parser.add_argument("--judge", type=int, default=300, help="impact-free runs that are judged")
     parser.add_argument("--contacts", type=int, default=20, help="stiff contacts, and as many soft ones")
-    parser.add_argument("--copies", type=int, default=5, help="faults tried on each contact")
+    parser.add_argument("--copies", type=int, default=6, help="faults tried on each contact")
     parser.add_argument("--late", type=float, default=0.02, help="share of all contacts that may take longer")
     parser.add_argument("--machines", nargs="+", choices=list(MACHINES), default=["gate", "T1"])
     parser.add_argument("--detectors", nargs="+", choices=DETECTORS.names(), default=list(DETECTORS.names()))
