@@ -10,6 +10,7 @@ import numpy as np
 
 from cdtool.detection import Signal, StatusArray
 from cdtool.detectors.base import (
+    BRIDGED,
     drive_of,
     gain,
     per_joint,
@@ -23,6 +24,8 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The filter starts with the uncertainty of the contact torque that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 1.0
+# A step longer than this many usual ones is a gap.
+_USUAL = 1.5
 # A longer gap leaves nothing of the old state worth keeping [s].
 _LONGEST_GAP = 1.0
 
@@ -128,9 +131,9 @@ def _filter(
 ) -> None:
     """Predict p + (mean force - tau_c) T over each step, exactly; correct with p as measured, in Joseph form.
 
-    Over a step longer than the `usual` one (n,) the torque's noise adds up as over so many usual steps: white, not one
-    error held all the while. The gain then stays what it was, so that the estimate gives back the noise of the sample
-    before the gap, instead of keeping it as a contact for as long as it remembers.
+    A gap of at most 0.15 s is gone through in steps of the `usual` length (n,), with the momentum on a straight line
+    and the mean force: the estimate is then where it would have been, and goes on with the gain that it had. One large
+    step would answer otherwise, and the estimate wander behind the gap as it never does else.
 
     `waits`: where a sample is not whole. Behind it a straight line stands for the force where the torque was missing,
     or the pose of `coupled` joints.
@@ -138,8 +141,8 @@ def _filter(
     started = False
     bridged = False
     impulse = 0.0
-    elapsed = 0.0
     force_before = 0.0
+    momentum_before = 0.0
     p = 0.0
     contact = 0.0
     pp = pc = cc = 0.0
@@ -149,24 +152,12 @@ def _filter(
         if started and time[k] - last > _LONGEST_GAP:
             started = False
         if started:
-            step = time[k] - time[k - 1]
-            impulse += 0.5 * (net_force[k] + net_force[k - 1]) * step
-            elapsed += step
-            p += (0.5 * (net_force[k] + net_force[k - 1]) - contact) * step
-            pp += step * (step * cc - 2.0 * pc) + drift * step**3 / 3.0 + torque_noise * step * min(step, usual[k])
-            pc += -step * cc - 0.5 * drift * step * step
-            cc += drift * step
+            impulse += 0.5 * (net_force[k] + net_force[k - 1]) * (time[k] - time[k - 1])
         if waits[k]:
             bridged = bridged or coupled or not speed_missing[k]
             estimate[k] = contact
             status[k] = 3
             continue
-        if started and bridged:
-            p += 0.5 * (net_force[k] + force_before) * elapsed - impulse
-        bridged = False
-        impulse = 0.0
-        elapsed = 0.0
-        force_before = net_force[k]
         if not started:
             started = True
             p = momentum[k]
@@ -174,17 +165,31 @@ def _filter(
             pp, pc, cc = momentum_noise, 0.0, drift * _INITIAL_DRIFT_TIME
             settled = 0.0
         else:
-            innovation = pp + momentum_noise
-            k_p, k_c = pp / innovation, pc / innovation
-            surprise = momentum[k] - p
-            p += k_p * surprise
-            contact += k_c * surprise
-            cc += k_c * (k_c * innovation - 2.0 * pc)
-            pc = (1.0 - k_p) * (pc - k_c * pp) + momentum_noise * k_p * k_c
-            pp = (1.0 - k_p) * (1.0 - k_p) * pp + momentum_noise * k_p * k_p
             span = time[k] - last
+            if bridged:
+                impulse = 0.5 * (net_force[k] + force_before) * span
+            pieces = round(span / usual[k]) if _USUAL * usual[k] < span <= BRIDGED else 1
+            step = span / pieces
+            for piece in range(1, pieces + 1):
+                p += impulse / pieces - contact * step
+                pp += step * (step * cc - 2.0 * pc) + drift * step**3 / 3.0 + torque_noise * step * step
+                pc += -step * cc - 0.5 * drift * step * step
+                cc += drift * step
+                innovation = pp + momentum_noise
+                k_p, k_c = pp / innovation, pc / innovation
+                measured = momentum_before + (momentum[k] - momentum_before) * (piece / pieces)
+                surprise = measured - p
+                p += k_p * surprise
+                contact += k_c * surprise
+                cc += k_c * (k_c * innovation - 2.0 * pc)
+                pc = (1.0 - k_p) * (pc - k_c * pp) + momentum_noise * k_p * k_c
+                pp = (1.0 - k_p) * (1.0 - k_p) * pp + momentum_noise * k_p * k_p
             fast = math.sqrt(math.sqrt(drift / (momentum_noise * span)))
             settled += min(fast, math.sqrt(drift / (torque_noise * span))) * span
+        bridged = False
+        impulse = 0.0
+        force_before = net_force[k]
+        momentum_before = momentum[k]
         last = time[k]
         estimate[k] = contact
         if missing[k]:

@@ -24,8 +24,9 @@ class Glr:
 
     Z = sum of the last L innovations / sqrt(L), the largest in size over the `windows` L (samples); Z^2 / 2 is the
     log-likelihood ratio of a mean shift that began L samples ago. With one side watched, the largest on that side. In
-    standard deviations. A window holds over a gap of up to 20 samples and never reaches back over a longer one. Fails
-    where the normal mean has moved (payload, temperature), and against a shift slower than the longest window.
+    standard deviations. A window holds over a gap of up to 0.15 s or 20 samples, and never reaches over a longer
+    one. Fails where the normal mean has moved (payload, temperature), and against a shift slower than the longest
+    window.
     """
 
     safety_factor: float = 9.0

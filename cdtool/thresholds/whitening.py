@@ -22,8 +22,9 @@ from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
 from cdtool.thresholds.stretches import filtered, stretch_bounds, stretches
 
-# A forecast over more missing samples than this says nothing: the model starts anew.
-LONGEST_GAP = 20
+# What a statistic has gathered holds over so many missing samples, or so long [s]: a contact that has been building up
+# goes on behind a gap, and does not begin again.
+_HELD_SAMPLES, _HELD_SECONDS = 20, 0.15
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class Whitening:
         work = np.empty((2 * order, order))
 
         def whiten(values: FloatArray, step: FloatArray) -> FloatArray:
-            slots = np.where(np.isinf(step), 0.0, np.clip(np.rint(step / self.period), 1.0, LONGEST_GAP + 2.0))
+            slots = np.where(np.isinf(step), 0.0, np.clip(np.rint(step / self.period), 1.0, 2.0))
             result = np.empty(len(values))
             _whiten(values, slots.astype(np.int64), coefficients, self.spread[j], stationary, work, result)
             return result
@@ -95,8 +96,8 @@ class Whitening:
 
     @property
     def longest_gap(self) -> float:
-        """The step over 20 missing samples and a half: a longer one starts the model anew [s]."""
-        return (LONGEST_GAP + 1.5) * self.period
+        """The longest step over which the statistic of innovations goes on [s]: 20 missing samples, or 0.15 s."""
+        return max((_HELD_SAMPLES + 1.5) * self.period, _HELD_SECONDS)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""

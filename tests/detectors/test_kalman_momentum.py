@@ -123,3 +123,29 @@ def test_lost_rows_leave_nothing_in_the_estimate_that_its_noise_does_not(lost):
         offsets.append(float(np.mean(found[first : first + 20] - whole[first + lost : first + lost + 20])))
     usual = whole[3000:5000].reshape(-1, 20).mean(axis=1).std()
     assert np.abs(offsets).max() < 3.0 * usual
+
+
+@pytest.mark.parametrize("detector", [KalmanMomentum(sigma_speed=0.34), CASES[1]])
+@pytest.mark.parametrize("lost", ["rows", "speed", "torque"])
+@pytest.mark.parametrize("missing", [5, 20, 50])
+def test_behind_a_gap_it_is_where_it_would_have_been(detector, lost, missing):
+    # A force that nothing knows of rises by 30 N/s: a smooth course, of which a straight line loses little within the filter's memory.
+    count, first = 6000, 5000
+    time = np.arange(count) * PERIOD
+    force = np.full(count, 2.0)
+    speed = (2.0 * time - 15.0 * time**2) / MASS
+    whole = estimated(detector, force, speed).values[:, 0]
+    assert np.ptp(whole[first : first + 200]) > 3.0
+    hidden = slice(first, first + missing)
+    keep = np.ones(count, dtype=bool)
+    if lost == "rows":
+        keep[hidden] = False
+    else:
+        (speed if lost == "speed" else force)[hidden] = np.nan
+    channels = {
+        "torque": Series(time[keep], force[keep], "N"),
+        "speed": Series(time[keep], speed[keep], "m/s"),
+    }
+    found = detector.signal(Recording("r", "r", ("axis",), channels), AXIS).values[:, 0]
+    behind = found[-(count - first - missing) :] - whole[first + missing :]
+    assert np.abs(behind).max() < 0.05

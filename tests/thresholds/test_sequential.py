@@ -11,7 +11,7 @@ from cdtool.detection import Status
 from cdtool.errors import UsageError
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
-from tests.thresholds.strokes import N, noise_runs, signal
+from tests.thresholds.strokes import N, noise_runs, signal, stroke
 
 GAP = 0.0215
 
@@ -87,6 +87,25 @@ def test_a_short_gap_is_stepped_over_and_a_long_one_starts_anew(rule):
         assert np.isnan(statistic.values[2000 : 2000 + missing]).all() and statistic.valid[2000 + missing :].all()
         after = statistic.values[2000 + missing, 0]
         assert after == pytest.approx(whole[2000] if kept else whole[0])
+
+
+@pytest.mark.parametrize("rule", [Cusum(), Glr()])
+@pytest.mark.parametrize("missing", [25, 50, 100])
+def test_a_gap_costs_a_contact_that_builds_up_its_own_length_and_20_ms(rule, missing):
+    fitted, onset = rule.fit(noise_runs(12)), 3000
+    whole = signal(100.0 + noise(5) + np.where(np.arange(N) < onset, 0.0, 1.6))
+
+    def crossing(found):
+        statistic, band = fitted.evaluate(stroke(), found)
+        outside = statistic.valid & ((statistic.values > band.upper) | (statistic.values < band.lower))
+        return int(np.flatnonzero(outside[onset:, 0])[0])
+
+    usual = crossing(whole)
+    assert usual >= 30
+    for first in range(onset - missing, onset + usual, 5):
+        status = whole.status.copy()
+        status[first : first + missing] = Status.GAP
+        assert crossing(replace(whole, status=status)) <= usual + missing + 20, first - onset
 
 
 @pytest.mark.parametrize("rule", [Cusum, Glr])
