@@ -1,10 +1,15 @@
 """What a fault at a contact may cost: its own length and 20 ms, but for what of the contact lay within it.
 
-A method cannot see what was never logged. Whether that is why a contact was found late is asked of the whole log's own
-statistic: without the samples that the fault took, and with all others as they are, when does it alarm? Only samples
-within the fault's own length count as taken, and of those only the ones for which the damaged log has no judged sample,
-or one that rests on a held value: what a detector does not judge behind a fault, or makes of the samples there, excuses
-nothing.
+A method cannot see what was never logged. Two questions tell whether that is why a contact was found late; neither asks
+what a detector or threshold made of the fault, so that none can excuse itself.
+
+* The load cell: outside the fault, did the contact press as hard and as long (peak and impulse of the force) within the
+  time allowed as it had within the whole log when that alarmed?
+* The whole log's own statistic: without the samples that the fault took, and with all others as they are, when does it
+  alarm? Only samples within the fault's own length count as taken, and of those only the ones for which the damaged log
+  has no judged sample, or one that rests on a held value.
+
+Nor is a contact late that the whole log itself finds so late with limits 5 % wider: its alarm hung by a hair.
 """
 
 from __future__ import annotations
@@ -17,28 +22,34 @@ import numpy as np
 from cdtool.activation import Activation, crossings_of
 from cdtool.detection import Status
 from cdtool.pipeline import Detection
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import BoolArray, Contact, Recording
 
 # What a fault may cost beyond its own length [s].
 ALLOWED = 0.02
 # Times of samples are equal to within this [s].
 _SAME = 1e-9
 
-Outcome = Literal["in time", "late", "missed", "evidence lost"]
+# Limits wider by this share: what then is as late in the whole log was found in time by chance.
+_HAIR = 0.05
+
+Outcome = Literal["in time", "late", "missed", "evidence lost", "by a hair"]
 
 
 @dataclass(frozen=True)
 class Cost:
     """A detected contact with a fault of `length` [s]: first crossing of the whole and of the damaged log [s].
 
-    `reachable`: the first crossing of the whole log's statistic without the samples that the fault took. Infinite: none
-    within the contact's window.
+    `reachable`: the first crossing of the whole log's statistic without the samples that the fault took; `wider`: that
+    of the whole log with wider limits. Infinite: none. `pressed`: whether the contact showed enough of its force
+    outside the fault.
     """
 
     length: float
     whole: float
     damaged: float
     reachable: float
+    wider: float
+    pressed: bool
 
     @property
     def seconds(self) -> float:
@@ -46,17 +57,14 @@ class Cost:
         return self.damaged - self.whole - self.length
 
     @property
-    def excused(self) -> bool:
-        """Whether the whole log itself would have been as late without the samples that the fault took."""
-        return self.reachable > self.whole + self.length + ALLOWED + _SAME
-
-    @property
     def outcome(self) -> Outcome:
-        """In time: at most the fault's length and 20 ms later. Evidence lost: 20 ms behind what was reachable."""
+        """In time: at most the fault's length and 20 ms later."""
         if self.seconds <= ALLOWED + _SAME:
             return "in time"
-        if self.excused and (np.isinf(self.reachable) or self.damaged <= self.reachable + ALLOWED + _SAME):
+        if not self.pressed or self.damaged <= self.reachable + ALLOWED + _SAME:
             return "evidence lost"
+        if self.damaged <= self.wider + self.length + ALLOWED + _SAME:
+            return "by a hair"
         return "missed" if np.isinf(self.damaged) else "late"
 
 
@@ -89,7 +97,26 @@ def cost_of(
         before,
         first_crossing(damaged, activation, factor, late),
         first_crossing(whole, activation, factor, late, taken),
+        first_crossing(whole, activation, (1.0 + _HAIR) * factor, late),
+        pressed_outside(whole.operation.recording, contact, fault, before),
     )
+
+
+def pressed_outside(recording: Recording, contact: Contact, fault: tuple[float, float], alarm: float) -> bool:
+    """Whether the contact presses as hard and as long outside the fault, by the time allowed, as until the alarm.
+
+    By the load cell; True without one. `alarm` [s] is the whole log's; allowed are the fault's length and 20 ms more.
+    """
+    if "force" not in recording:
+        return True
+    start, length = fault
+    force = recording["force"].between(contact.start, alarm + length + ALLOWED)
+    size = np.abs(force.values[:, 0] - (contact.rest if np.isfinite(contact.rest) else 0.0))
+    until = force.time <= alarm + _SAME
+    outside = (force.time < start - _SAME) | (force.time >= start + length - _SAME)
+    peaks = [float(size[part].max(initial=0.0)) for part in (until, outside)]
+    impulses = [float(size[part].sum()) for part in (until, outside)]
+    return peaks[1] >= peaks[0] and impulses[1] >= impulses[0]
 
 
 def first_crossing(
@@ -97,7 +124,7 @@ def first_crossing(
     activation: Activation,
     factor: float,
     span: tuple[float, float],
-    taken: FloatArray | None = None,
+    taken: BoolArray | None = None,
 ) -> float:
     """When a detection first crosses its limits within `span` [s] at a safety factor; infinite where it does not.
 

@@ -129,7 +129,7 @@ def test_lost_rows_leave_nothing_in_the_estimate_that_its_noise_does_not(lost):
 @pytest.mark.parametrize("lost", ["rows", "speed", "torque"])
 @pytest.mark.parametrize("missing", [5, 20, 50])
 def test_behind_a_gap_it_is_where_it_would_have_been(detector, lost, missing):
-    # A force that nothing knows of rises by 30 N/s: a smooth course, of which a straight line loses little within the filter's memory.
+    # A force that nothing knows of rises by 30 N/s: a straight line loses little of it within the filter's memory.
     count, first = 6000, 5000
     time = np.arange(count) * PERIOD
     force = np.full(count, 2.0)
