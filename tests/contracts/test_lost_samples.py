@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from cdtool.activation import Activation
 from cdtool.clock.lost import lost_samples
-from cdtool.detection import Status
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
@@ -33,11 +33,13 @@ from tests.robots import six_joint_robot
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from damaged_logs import KINDS, Fault, damaged, random_faults
+from lost_evidence import cost_of
 
 CELLS = [(detector, threshold) for detector in DETECTORS.names() for threshold in THRESHOLDS.names()]
 AT_ONCE = Activation(debounce=1)
 LEARNED, OTHERS, JUDGED = 12, 12, 3
-# Faults may move the largest exceedance of a run by this share of what impact-free runs reach: before, it was 7 to 39.
+# No chance explains a larger share of what impact-free runs reach: 7 to 39 with filters that leap behind a gap. Whether
+# faults add alarms is counted, and tested in full by the benchmark.
 SHARE = 1.6
 CHANNELS = ("torque", "speed", "position", "acceleration")
 
@@ -91,15 +93,23 @@ def with_faults(recording: Recording, faults: Sequence[Fault], name: str) -> Rec
     return replace(damaged(recording, faults), name=f"{recording.name} {name}")
 
 
-@pytest.mark.parametrize(("detector", "threshold"), CELLS)
-def test_ten_faults_in_an_impact_free_run_are_no_contact(detector, threshold, learned):
-    factor = learned.threshold(detector, threshold).safety_factor
-    for seed in range(JUDGED):
-        whole = run("none", 200 + seed)
-        faults = random_faults(whole, 10, np.random.default_rng(seed))
-        before = critical_factor(learned.judged(detector, threshold, whole, AT_ONCE), AT_ONCE)
-        after = learned.judged(detector, threshold, with_faults(whole, faults, "faults"), AT_ONCE)
-        assert critical_factor(after, AT_ONCE) <= SHARE * max(before, factor)
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
+def test_ten_faults_in_an_impact_free_run_are_no_contact(threshold, learned):
+    added = lost = 0
+    for detector in DETECTORS.names():
+        factor = learned.threshold(detector, threshold).safety_factor
+        for seed in range(JUDGED):
+            whole = run("none", 200 + seed)
+            faults = random_faults(whole, 10, np.random.default_rng(seed))
+            before = critical_factor(learned.judged(detector, threshold, whole, AT_ONCE), AT_ONCE)
+            found = learned.judged(detector, threshold, with_faults(whole, faults, "faults"), AT_ONCE)
+            after = critical_factor(found, AT_ONCE)
+            assert after <= SHARE * max(before, factor), (detector, seed)
+            added += before <= factor < after
+            lost += after <= factor < before
+    # As many runs alarm only with faults as only without: one-sided, 5 % over all thresholds together.
+    if added + lost:
+        assert binomtest(added, added + lost, alternative="greater").pvalue > 0.05 / len(THRESHOLDS.names())
 
 
 @pytest.mark.parametrize("threshold", ["cusum", "signature"])
@@ -116,37 +126,30 @@ def test_one_fault_of_each_kind_is_no_contact_wherever_it_lies(detector, thresho
         assert critical_factor(after, AT_ONCE) <= SHARE * max(before, factor), fault
 
 
-def test_a_contact_in_a_gap_costs_the_gap_and_20_ms(learned):
-    late, detected, missed = [], 0, 0
-    for seed in range(2):
-        whole = run("stiff", 400 + seed)
-        onset = find_contacts(learned.machine.referred_to_load(whole), OnsetRule(above=20.0, back_to=8.0))[0].start
+def test_a_fault_at_a_contact_costs_its_own_length_and_20_ms(learned):
+    outcomes: dict[str, list[Any]] = {}
+    for seed, kind in enumerate(("stiff", "soft")):
+        whole = run(kind, 400 + seed)
+        contact = find_contacts(learned.machine.referred_to_load(whole), OnsetRule(above=20.0, back_to=8.0))[0]
         rng = np.random.default_rng(seed)
-        cases = []
-        for i in range(3):
-            fault = random_faults(whole, 1, rng)[0]
-            start = float(onset + rng.uniform(-1e-3 * fault.count, 0.01))
-            cases.append((replace(fault, start=start), i))
+        # One behind the gate's slowest alarms, the others about the onset and within the contact.
+        spans = ((-0.02, 0.01), (-0.1, 0.1), (0.0, 0.3), (1.1, 1.2))
+        faults = [
+            replace(random_faults(whole, 1, rng)[0], start=float(contact.start + rng.uniform(*span))) for span in spans
+        ]
+        copies = [with_faults(whole, [fault], f"at {i}") for i, fault in enumerate(faults)]
         for detector, threshold in CELLS:
+            factor = learned.threshold(detector, threshold).safety_factor
             found = learned.judged(detector, threshold, whole, AT_ONCE)
-            before = first_after(found, onset)
-            if before > onset + 1.0:
-                continue
-            for fault, i in cases:
-                end = fault.start + 1e-3 * fault.count
-                # What a gap takes of the evidence itself no method gives back.
-                status = found.statistic.status.copy()
-                status[(found.statistic.time >= fault.start) & (found.statistic.time <= end)] = Status.GAP
-                _, seen = AT_ONCE.alarms(replace(found.statistic, status=status), found.band)
-                reachable = max(before + end - fault.start, min((a.time for a in seen if a.time >= onset), default=9e9))
-                copy = with_faults(whole, [fault], f"at {i}")
-                cost = first_after(learned.judged(detector, threshold, copy, AT_ONCE), onset) - reachable
-                detected += 1
-                missed += bool(np.isinf(cost))
-                if cost > 0.02 + 1e-9:
-                    late.append((detector, threshold, fault, cost))
-    assert detected > 200
-    assert len(late) <= 0.02 * detected, late
+            for fault, copy in zip(faults, copies, strict=True):
+                other = learned.judged(detector, threshold, copy, AT_ONCE)
+                cost = cost_of(found, other, contact, (fault.start, 1e-3 * fault.count), AT_ONCE, factor)
+                if cost is not None:
+                    outcomes.setdefault(cost.outcome, []).append((detector, threshold, kind, fault, cost))
+                    assert cost.damaged == cost.whole or fault.start <= cost.whole + 1e-9, (detector, threshold, cost)
+    assert len(outcomes.pop("in time")) > 500
+    assert not outcomes.pop("late", []) and not outcomes.pop("missed", [])
+    assert sum(map(len, outcomes.values())) <= 20
 
 
 def first_after(found: Detection, onset: float) -> float:
