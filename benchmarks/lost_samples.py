@@ -21,10 +21,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from time import monotonic
 from typing import Any
 
 import arm_accuracy
@@ -34,9 +34,11 @@ from accuracy import IMPACTS, written_setup
 from damaged_logs import Fault, damaged, random_faults, without
 from lost_evidence import Cost, cost_of
 from scipy.stats import binomtest
+from thresholds import WHITENING, SharedWhitening
 from timing import environment, table
 
 from cdtool.activation import Activation
+from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.false_alarm_budget import Budget, set_factor
@@ -45,11 +47,13 @@ from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import Contact, Recording
+from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
+from cdtool.thresholds.whitening import Whitening
 from cdtool.workflows.benchmark_file import BenchmarkFile
 from cdtool.workflows.fitting import Fit, Pair, fitting
 
@@ -59,6 +63,48 @@ MACHINES: Mapping[str, tuple[Any, Any]] = {
     "T1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
     "T2": (partial(write_arm_recordings, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
 }
+
+
+@dataclass(frozen=True)
+class RememberedActivation(Activation):
+    """An activation that keeps the debounce of each clock."""
+
+    kept: dict[tuple[int, int], Any] = field(default_factory=dict, compare=False)
+
+    def needed(self, time: FloatArray) -> Any:
+        key = (time.ctypes.data, len(time))
+        if key not in self.kept:
+            self.kept[key] = super().needed(time)
+        return self.kept[key]
+
+
+@dataclass(frozen=True)
+class RememberedInnovations(Whitening):
+    """A whitening that keeps the innovations of each signal: three thresholds ask for the same, several times."""
+
+    kept: dict[tuple[int, bytes], Signal] = field(default_factory=dict, compare=False)
+
+    def innovations(self, recording: Recording, signal: Signal) -> Signal:
+        # The signals outlive their innovations, so that a place in memory is one signal's; its status may differ.
+        key = (signal.values.ctypes.data, signal.status.tobytes())
+        if key not in self.kept:
+            self.kept[key] = super().innovations(recording, signal)
+        return self.kept[key]
+
+
+@dataclass
+class Remembering(SharedWhitening):
+    """As SharedWhitening, and the innovations are kept too."""
+
+    def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
+        """What the rule learns of the runs, or what another has learned of them."""
+        fitted = super().fit(pairs)
+        runs = tuple(recording.name for recording, _ in pairs)
+        if not isinstance(fitted.whitening, RememberedInnovations):
+            parts = {item.name: getattr(fitted.whitening, item.name) for item in fields(Whitening)}
+            fitted = replace(fitted, whitening=RememberedInnovations(**parts))
+            self.learned[runs] = fitted
+        return fitted
 
 
 @dataclass
@@ -170,18 +216,21 @@ def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[C
             (signal(item), contact, [(fault, signal(copy)) for fault, copy in copies])
             for item, contact, copies in bench.contacts
         ]
+        usual = RememberedActivation(**{item.name: getattr(setup.activation, item.name) for item in fields(Activation)})
+        activations = (usual, replace(setup.activation, debounce=1))
+        shared: dict[tuple[str, ...], FittedSequential] = {}
         for threshold in options.thresholds:
             rule = with_context(THRESHOLDS.load(threshold)(), setup.signature.sides, setup.signature)
-            fit = fitting(setup.signature if threshold == "signature" else rule)
-            activations = (setup.activation, replace(setup.activation, debounce=1))
+            rule = setup.signature if threshold == "signature" else rule
+            fit = fitting(Remembering(rule, shared) if threshold in WHITENING else rule)
             title = f"{name} {detector.short_name} {threshold}"
-            began = time.monotonic()
+            began = monotonic()
             try:
                 cells = judged_cells(title, detector_name, fit, budget, activations, (learned, whole, spoilt, contacts))
             except CdtoolError as fault:
                 print(f"{title}: left out: {fault.message}", flush=True)
                 continue
-            print(f"{time.monotonic() - began:6.1f} s  {title}", file=sys.stderr, flush=True)
+            print(f"{monotonic() - began:6.1f} s  {title}", file=sys.stderr, flush=True)
             yield from cells
 
 
@@ -249,9 +298,9 @@ def main(options: argparse.Namespace) -> int:
     print(f"{environment()}\n", flush=True)
     cells = []
     for name in options.machines:
-        began = time.monotonic()
+        began = monotonic()
         bench = bench_of(name, options)
-        print(f"{time.monotonic() - began:6.1f} s  {name}: simulated", file=sys.stderr, flush=True)
+        print(f"{monotonic() - began:6.1f} s  {name}: simulated", file=sys.stderr, flush=True)
         for cell in cells_of(name, bench, options):
             cells.append(cell)
             print(cell, flush=True)
