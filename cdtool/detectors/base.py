@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
+from cdtool.clock.lost import lost_samples
 from cdtool.detection import Signal, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
@@ -132,7 +133,9 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
     position: FloatArray = np.broadcast_to(0.0, torque.shape)
     if machine.coupled:
         angles = previous_value(recording["position"], speed.time)
-        lost = ~np.isfinite(angles)
+        # A pose that is held for a sample that did not come would be one of another instant than the speed.
+        late = lost_samples(recording, ("position",), speed.time)
+        lost = ~np.isfinite(angles) if late is None else late | ~np.isfinite(angles)
         position = hold_last(angles, lost)
         motion_missing = for_every_joint(motion_missing | lost)
     return Drive(

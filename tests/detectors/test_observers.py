@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from math import pi
 from typing import Any
@@ -183,3 +184,25 @@ def test_a_robot_that_rests_within_its_dry_friction_leaves_no_residual(name, sha
     np.testing.assert_allclose(signal.values, 0.0, atol=1e-9)
     pushed = OBSERVERS[name].signal(standing(robot, pose, gravity + 6.0), robot)
     np.testing.assert_allclose(pushed.values[-1], 2.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", [Energy, Momentum, KalmanMomentum, InertialMomentum, Velocity, Direct])
+def test_lost_samples_of_the_pose_move_the_signal_of_coupled_joints_no_more_than_those_of_the_speed(name):
+    # Held while the speed goes on, the pose would be that of another instant: the energy would stand still, then jump.
+    machine = arm_of(ARM)
+    whole = moving(machine, seconds=3.0)
+    expected = name().signal(whole, machine)
+
+    def moved(channel: str) -> float:
+        largest = 0.0
+        for at in (0.75, 1.1, 1.4, 2.0):
+            series = whole[channel]
+            keep = (series.time < at) | (series.time >= at + 0.012)
+            cut = replace(series, time=series.time[keep], values=series.values[keep])
+            found = name().signal(replace(whole, channels={**whole.channels, channel: cut}), machine)
+            rows = np.searchsorted(expected.time, found.time)
+            off = np.abs(found.values - expected.values[rows])
+            largest = max(largest, float(off[found.valid & expected.valid[rows]].max()))
+        return largest
+
+    assert moved("position") <= 3.0 * moved("speed")
