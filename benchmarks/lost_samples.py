@@ -344,7 +344,7 @@ def _options(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--judge", type=int, default=300, help="impact-free runs that are judged")
     parser.add_argument("--contacts", type=int, default=20, help="stiff contacts, and as many soft ones")
     parser.add_argument("--copies", type=int, default=6, help="faults tried on each contact")
-    parser.add_argument("--late", type=float, default=0.001, help="share of all contacts that may take longer")
+    parser.add_argument("--late", type=float, default=0.002, help="share of all contacts that may take longer")
     parser.add_argument("--machines", nargs="+", choices=list(MACHINES), default=["gate", "T1"])
     parser.add_argument("--detectors", nargs="+", choices=DETECTORS.names(), default=list(DETECTORS.names()))
     parser.add_argument("--thresholds", nargs="+", choices=THRESHOLDS.names(), default=list(THRESHOLDS.names()))
