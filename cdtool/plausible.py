@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.leaps import Leap, behind_leaps
 from cdtool.plain_text import counted
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
 
@@ -31,7 +32,6 @@ _WRAP = 0.9 * 2**16
 _FASTER = 10.0
 # The share of samples and of runs that may be broken without moving a range.
 _SHARE, _RUNS = 0.99, 0.8
-_EDGE = 3
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,21 @@ class PlausibleRanges:
                 text = f"logged in {series.unit}, learned in {known.unit}: not checked for values that no sensor gives"
                 findings.append(Finding(text, name))
                 continue
-            wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), factors.get(name, ()))
-            if wrong.any():
-                values = series.values.copy()
-                values[wrong] = np.nan
+            of_channel = factors.get(name, ())
+            wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
+            values = np.where(wrong, np.nan, series.values)
+            for j in range(series.joint_count):
+                joint = f" of joint {recording.joints[j]}" if series.joint_count > 1 else ""
+                factor = of_channel[j] if of_channel else 0.0
+                behind, leaps = _leapt(series.time, values[:, j], known, known.centre[j], factor)
+                if wrong[:, j].any():
+                    findings.append(Finding(_far_words(series, j, wrong[:, j], known, joint), name, "loss"))
+                if behind.any():
+                    masked = int(np.count_nonzero(behind))
+                    findings.append(Finding(_leap_words(leaps, masked, series.unit, joint), name, "loss"))
+                values[behind, j] = np.nan
+            if wrong.any() or not np.array_equal(values, series.values, equal_nan=True):
                 channels[name] = Series(series.time, values, series.unit)
-                findings += _findings(name, series, wrong, known, recording.joints)
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def to_dict(self) -> dict[str, Any]:
@@ -147,54 +156,52 @@ def _quantile(values: FloatArray, share: float) -> float:
 
 
 def _implausible(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> BoolArray:
-    """True (n, J) where a value is no measurement."""
+    """True (n, J) where a value is far from all that was learned, or the end of an integer."""
     with np.errstate(invalid="ignore"):
         distance = np.abs(series.values - np.array(known.centre))
         wrong: BoolArray = distance > far * known.reach
         for j, factor in enumerate(factors):
             ends = np.isin(series.values[:, j], _ENDS * factor)
             wrong[:, j] |= ends & (distance[:, j] > _FAR_ENDS * known.reach)
-    for j in range(series.joint_count):
-        factor = factors[j] if factors else 0.0
-        wrong[:, j] |= _jumped(series.time, np.where(wrong[:, j], np.nan, series.values[:, j]), known, factor)
     return wrong
 
 
-def _jumped(time: FloatArray, values: FloatArray, known: ChannelRange, factor: float) -> BoolArray:
-    """True from a step that is none of the machine's until the value is back where it was before."""
-    wrong = np.zeros(len(values), dtype=bool)
+def _leapt(
+    time: FloatArray, values: FloatArray, known: ChannelRange, centre: float, factor: float
+) -> tuple[BoolArray, list[Leap]]:
+    """True (n,) for the values of a joint behind a leap, and its leaps: steps that are none of the machine's."""
     index = np.flatnonzero(np.isfinite(values))
-    rows, step = values[index], np.abs(np.diff(values[index]))
+    step = np.abs(np.diff(values[index]))
     if known.rate > 0.0:
-        near, is_jump = known.reach, step > np.maximum(known.reach, _FASTER * known.rate * np.diff(time[index]))
+        is_leap = step > np.maximum(known.reach, _FASTER * known.rate * np.diff(time[index]))
+        found, leaps = behind_leaps(time[index], values[index], is_leap, known.reach, (centre, known.reach))
     else:
         near = 0.5 * _WRAP * abs(factor)
-        is_jump = (step >= 2.0 * near) & (near > _FAR_ENDS * known.reach)
-    jumps = np.flatnonzero(is_jump)
-    end = 0
-    for at in jumps.tolist():
-        if at < end:
-            continue
-        if at < _EDGE and end == 0 and len(rows) > 2 * _EDGE:  # the log begins with what is wrong
-            wrong[index[: at + 1]] = True
-            end = at + 2
-            continue
-        back = np.flatnonzero(np.abs(rows[at + 1 :] - rows[at]) <= near)
-        end = at + 1 + (int(back[0]) if len(back) else len(rows) - at - 1)
-        wrong[index[at + 1 : end]] = True
-    return wrong
+        is_leap = (step >= 2.0 * near) & (near > _FAR_ENDS * known.reach)
+        found, leaps = behind_leaps(time[index], values[index], is_leap, near, None)
+    wrong = np.zeros(len(values), dtype=bool)
+    wrong[index[found]] = True
+    return wrong, leaps
 
 
-def _findings(name: str, series: Series, wrong: BoolArray, known: ChannelRange, joints: Sequence[str]) -> list[Finding]:
-    found = []
-    for j in np.flatnonzero(wrong.any(axis=0)).tolist():
-        rows = np.flatnonzero(wrong[:, j])
-        verb = "is" if len(rows) == 1 else "are"
-        joint = f" of joint {joints[j]}" if series.joint_count > 1 else ""
-        text = (
-            f"{counted(len(rows), 'value')}{joint} {verb} none that its sensor gives (first "
-            f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual are "
-            f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}), masked"
-        )
-        found.append(Finding(text, name, "loss"))
-    return found
+def _far_words(series: Series, j: int, wrong: BoolArray, known: ChannelRange, joint: str) -> str:
+    rows = np.flatnonzero(wrong)
+    verb = "is" if len(rows) == 1 else "are"
+    return (
+        f"{counted(len(rows), 'value')}{joint} {verb} none that its sensor gives (first "
+        f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual are "
+        f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}), masked"
+    )
+
+
+def _leap_words(leaps: Sequence[Leap], masked: int, unit: str, joint: str) -> str:
+    first = leaps[0]
+    text = (
+        f"{counted(masked, 'value')}{joint} behind {counted(len(leaps), 'leap')} that no motion makes masked (first "
+        f"from {first.before:.4g} to {first.after:.4g} {unit} at {first.time:.3f} s)"
+    )
+    zeros = [leap.new_zero for leap in leaps if np.isfinite(leap.new_zero)]
+    if zeros:
+        text += f"; read from a new zero from {zeros[0]:.3f} s on"
+        text += f", and at {counted(len(zeros) - 1, 'more time')}" if len(zeros) > 1 else ""
+    return text

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.progress import START_SHARE
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A rest this long [s] ends a stroke; a shorter one is a pause in it.
 SHORTEST_REST = 0.2
@@ -63,14 +63,15 @@ def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass
     level = np.ascontiguousarray(levels[np.arange(len(levels)), moves_most])
     start = np.empty(len(time), dtype=np.int64)
     applies = np.empty(len(time), dtype=np.int64)
-    count = _cut(time, level, moves_most.astype(np.int64), SHORTEST_REST, start, applies)
-    return [
-        begin,
-        *(
-            Stroke(float(time[first]) - _AVERAGED_SECONDS, float(time[last]), float(time[first]))
-            for first, last in zip(start[:count], applies[:count], strict=True)
-        ),
-    ]
+    turned = np.empty(len(time), dtype=np.bool_)
+    count = _cut(time, level, moves_most.astype(np.int64), SHORTEST_REST, start, applies, turned)
+    found = [begin]
+    for first, last, turns in zip(start[:count], applies[:count], turned[:count], strict=True):
+        # Where the motion turned round it had begun before its average shows it; behind a rest it had not, and what
+        # the average still held belongs to the stroke before.
+        since = float(time[first]) - (_AVERAGED_SECONDS if turns else 0.0)
+        found.append(Stroke(since, float(time[last]), float(time[first])))
+    return found
 
 
 def averaged_so_far(series: Series) -> FloatArray:
@@ -90,7 +91,7 @@ def averaged_so_far(series: Series) -> FloatArray:
     return mean
 
 
-@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64[::1], float64, int64[::1], int64[::1])")
+@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64[::1], float64, int64[::1], int64[::1], b1[::1])")
 def _cut(
     time: FloatArray,
     level: FloatArray,
@@ -98,6 +99,7 @@ def _cut(
     shortest: float,
     start: npt.NDArray[np.int64],
     applies: npt.NDArray[np.int64],
+    turned: BoolArray,
 ) -> int:
     """`level`: speed of the joint that moves most as a multiple of the one below which it rests."""
     count = 0
@@ -117,6 +119,7 @@ def _cut(
             if direction != 0 and time[k] - time[still_since] >= shortest:
                 start[count] = still_since
                 applies[count] = k
+                turned[count] = False
                 count += 1
                 direction = 0
             continue
@@ -131,6 +134,7 @@ def _cut(
             if backward >= _CONFIRM:
                 start[count] = turned_at
                 applies[count] = k
+                turned[count] = True
                 count += 1
                 direction = sign
                 backward = 0

@@ -9,6 +9,7 @@ from cdtool.detection import Signal, Status
 from cdtool.judgement import judged
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes
+from cdtool.motion.speed_course import stroke_progress
 from cdtool.motion.strokes import strokes_so_far
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
@@ -233,6 +234,25 @@ def test_turning_round_without_a_rest_completes_a_stroke():
     recording = log((0.3, 3.0), (-0.3, 4.0), (0.0, 1.0), seed=16, noise=0.002)
     found = judges(recording, turning, BACK, how="motion")
     assert found[at(recording, 4.6) : at(recording, 7.0), 1].all()
+
+
+def test_a_stroke_behind_a_sudden_stop_begins_with_its_own_motion():
+    stopped, again = log((0.3, 2.5), seed=11), log((0.3, 3.0), (0.0, 1.5), seed=12)
+    time = np.concatenate((stopped["speed"].time, stopped["speed"].time[-1] + PERIOD + again["speed"].time))
+    travel = float(stopped["position"].values[-1, 0])
+    channels = {
+        "speed": Series(time, np.concatenate((stopped["speed"].values, again["speed"].values)), "m/s"),
+        "position": Series(time, np.concatenate((stopped["position"].values, travel + again["position"].values)), "m"),
+    }
+    both, stop = Recording("both", "made up", ("axis",), channels), float(stopped["speed"].time[-1])
+    behind = time > stop + 0.3
+    assert judges(both, FAST, how="motion")[behind].all()
+    second = strokes_so_far(both, "motion", (FAST,))[1]
+    assert stop < second.start <= second.applies < stop + 0.4
+    part = both.section(second.start, np.inf)
+    where = stroke_progress(part, FAST.direction, FAST.nominal_speed, FAST.joint)
+    begins = float(part["speed"].time[np.flatnonzero(np.isfinite(where.elapsed))[0]])
+    assert begins == pytest.approx(stop + 0.5 + 0.1 * 0.3 / RAMP, abs=0.05)
 
 
 def test_where_no_speed_came_samples_are_missing_and_not_of_another_speed():
