@@ -23,6 +23,8 @@ IMPOSSIBLE = 1e9
 # impacts come to 13 of them in this project's logs; accelerometers feel shocks, and encoders may start elsewhere.
 FAR = {"acceleration": 1e4, "position": 1e4, "reference_position": 1e4}
 _FAR_ELSE = 1e3
+# ... and beyond so many times what runs come to at most.
+_BEYOND_EXTREME = 10.0
 # Where integers end, as a log has them before scaling: beyond so many reaches such a value fills a gap.
 _ENDS = np.array([-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1, 2.0**32 - 1])
 _FAR_ENDS = 20.0
@@ -30,6 +32,10 @@ _FAR_ENDS = 20.0
 _WRAP = 0.9 * 2**16
 # A position that steps further than its whole reach, and so many times as fast as it usually moves, has not moved so.
 _FASTER = 10.0
+# Of runs to learn from, a value beyond so many times what runs come to at most, for so few samples, is a spike. In a
+# log to be judged it may be a contact.
+_SPIKE, _SPIKE_SAMPLES = {"acceleration": 20.0}, 3
+_SPIKE_ELSE = 5.0
 # The share of samples and of runs that may be broken without moving a range.
 _SHARE, _RUNS = 0.99, 0.8
 
@@ -38,13 +44,15 @@ _SHARE, _RUNS = 0.99, 0.8
 class ChannelRange:
     """A channel's median for each joint, its reach about it (that of the joint that reaches furthest), and its rate.
 
-    `rate` [unit/s] is how fast it changes at most, 0 where that is not looked at.
+    `rate` [unit/s] is how fast it changes at most, 0 where that is not looked at. `extreme` is how far from the median
+    a run comes at most, 0 where that is not known: a log that rests most of the time reaches little and comes far.
     """
 
     unit: str
     centre: tuple[float, ...]
     reach: float
     rate: float = 0.0
+    extreme: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -67,10 +75,13 @@ class PlausibleRanges:
                 found[name] = learned
         return cls(found)
 
-    def masked(self, recording: Recording, factors: Mapping[str, Sequence[float]]) -> Recording:
+    def masked(
+        self, recording: Recording, factors: Mapping[str, Sequence[float]], *, to_learn: bool = False
+    ) -> Recording:
         """The recording with what is not plausible missing, and a loss for each joint that had such values.
 
-        `factors` lead from a channel's numbers in the log to SI, joint by joint.
+        `factors` lead from a channel's numbers in the log to SI, joint by joint. A run `to_learn` from has no contact:
+        its spikes are masked too.
         """
         channels, findings = dict(recording.channels), list(recording.findings)
         for name, known in self.channels.items():
@@ -83,6 +94,8 @@ class PlausibleRanges:
                 continue
             of_channel = factors.get(name, ())
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
+            if to_learn and not name.endswith("position"):
+                wrong |= _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
             values = np.where(wrong, np.nan, series.values)
             for j in range(series.joint_count):
                 joint = f" of joint {recording.joints[j]}" if series.joint_count > 1 else ""
@@ -107,12 +120,17 @@ class PlausibleRanges:
         """The inverse of `to_dict`; raises KeyError, TypeError or ValueError for anything else."""
         channels = {
             str(name): ChannelRange(
-                str(item["unit"]), tuple(map(float, item["centre"])), float(item["reach"]), float(item["rate"])
+                str(item["unit"]),
+                tuple(map(float, item["centre"])),
+                float(item["reach"]),
+                float(item["rate"]),
+                float(item.get("extreme", 0.0)),
             )
             for name, item in values.items()
         }
         for name, item in channels.items():
-            if not (np.isfinite([*item.centre, item.reach, item.rate]).all() and item.reach > 0.0 <= item.rate):
+            figures = [*item.centre, item.reach, item.rate, item.extreme]
+            if not (np.isfinite(figures).all() and item.reach > 0.0 <= min(item.rate, item.extreme)):
                 raise ValueError(f"a plausible range of {name} with reach {item.reach:g} and rate {item.rate:g}")
         return cls(channels)
 
@@ -131,7 +149,18 @@ def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
     centre = np.median(np.array(medians), axis=0)
     reach = _usual([max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series])
     rate = _usual([_rate(item) for item in series]) if moves else 0.0
-    return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate) if reach > 0.0 else None
+    extreme = _usual([_extreme(item.values - centre) for item in series])
+    return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate, extreme) if reach > 0.0 else None
+
+
+def _extreme(off: FloatArray) -> float:
+    """How far a run comes: the largest distance of its furthest joint, but for as many samples as a spike has."""
+    furthest = 0.0
+    for column in np.abs(off).T:
+        known = np.sort(column[np.isfinite(column)])
+        if len(known):
+            furthest = max(furthest, float(known[max(len(known) - 1 - _SPIKE_SAMPLES, 0)]))
+    return furthest
 
 
 def _rate(series: Series) -> float:
@@ -159,11 +188,25 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
     """True (n, J) where a value is far from all that was learned, or the end of an integer."""
     with np.errstate(invalid="ignore"):
         distance = np.abs(series.values - np.array(known.centre))
-        wrong: BoolArray = distance > far * known.reach
+        wrong: BoolArray = distance > max(far * known.reach, _BEYOND_EXTREME * known.extreme)
         for j, factor in enumerate(factors):
             ends = np.isin(series.values[:, j], _ENDS * factor)
             wrong[:, j] |= ends & (distance[:, j] > _FAR_ENDS * known.reach)
     return wrong
+
+
+def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:
+    """True (n, J) where values go beyond `far` times what runs come to, for few samples."""
+    spikes = np.zeros(values.shape, dtype=bool)
+    if known.extreme <= 0.0:
+        return spikes
+    with np.errstate(invalid="ignore"):
+        beyond = np.abs(values - np.array(known.centre)) > far * known.extreme
+    for j in np.flatnonzero(beyond.any(axis=0)).tolist():
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], beyond[:, j], [False])).astype(np.int8)))
+        for first, last in edges.reshape(-1, 2).tolist():
+            spikes[first:last, j] = last - first <= _SPIKE_SAMPLES
+    return spikes
 
 
 def _leapt(

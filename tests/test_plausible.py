@@ -119,6 +119,44 @@ def test_a_position_whose_counter_wraps_is_masked_until_it_is_back():
     assert np.array_equal(found, wrapped < 0.0)
 
 
+@pytest.mark.parametrize(("channel", "times"), [("torque", 8.0), ("torque", 300.0), ("speed", 8.0), ("speed", 40.0)])
+@pytest.mark.parametrize("samples", [1, 3])
+def test_a_spike_in_a_run_to_learn_from_is_masked_and_in_a_log_to_judge_it_is_not(runs, channel, times, samples):
+    free, _ = runs
+    highest = max(float(np.nanmax(np.abs(item.recording[channel].values))) for item in free)
+    spiked = with_values(free[3], channel, slice(300, 300 + samples), times * highest)
+    ranges = learned_of([*free[:3], spiked, *free[4:]])
+    made = ranges.masked(spiked.recording, spiked.factors, to_learn=True)
+    assert np.flatnonzero(np.isnan(made[channel].values[:, 0])).tolist() == list(range(300, 300 + samples))
+    assert made.findings[-1].severity == "loss" and made.findings[-1].channel == channel
+    if times < 10.0:
+        assert not masked(ranges, spiked)[channel].any()
+
+
+def test_no_sample_of_a_run_to_learn_from_is_a_spike_unless_it_was_put_there(runs):
+    free, ranges = runs
+    for log in free:
+        made = ranges.masked(log.recording, log.factors, to_learn=True)
+        assert made.findings == log.recording.findings
+
+
+def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
+    free = logged(FOLDERS[0], "free")[0]
+    rng = np.random.default_rng(2)
+
+    def log(seconds: float) -> LoggedRecording:
+        moving = np.concatenate((np.zeros(round(seconds * 100.0)), 3.0 * np.sin(np.linspace(0.0, np.pi, 150))))
+        values = moving + 1e-4 * rng.standard_normal(len(moving))
+        series = Series(0.01 * np.arange(len(values)), values[:, np.newaxis], "N m")
+        return LoggedRecording(replace(free.recording, channels={"torque": series}), {"torque": (1.0,)}, 100.0)
+
+    logs = [log(600.0) for _ in range(12)]
+    ranges = learned_of(logs)
+    for item in logs:
+        made = ranges.masked(item.recording, item.factors, to_learn=True)
+        assert np.isfinite(made["torque"].values).all()
+
+
 def strokes(*starts: float, stuck: slice | None = None) -> Series:
     """One stroke of 20 rad after another, each from its own start, with rests; stuck at 0 where asked."""
     shape = np.concatenate((np.zeros(50), np.linspace(0.0, 20.0, 400), np.full(50, 20.0)))

@@ -97,9 +97,9 @@ class LoggedRecording:
     factors: Mapping[str, tuple[float, ...]]
     speed_low_pass: float
 
-    def on_load_side(self, machine: Any, ranges: PlausibleRanges | None = None) -> Recording:
+    def on_load_side(self, machine: Any, ranges: PlausibleRanges | None = None, *, to_learn: bool = False) -> Recording:
         """The recording on the load side, made without the values that are outside of the plausible ranges."""
-        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors)
+        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
         recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
         return recording
 

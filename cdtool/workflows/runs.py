@@ -147,7 +147,7 @@ def load_runs(
         if isinstance(logged, CdtoolError):
             return logged
         try:
-            recording = logged.on_load_side(machine_file.machine, known)
+            recording = logged.on_load_side(machine_file.machine, known, to_learn=True)
             recording = replace(recording, name=shown_path(path, base))
             return recording, operations_of(recording, how)
         except CdtoolError as fault:
