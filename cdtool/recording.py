@@ -163,8 +163,9 @@ class Contact:
 
     `kind` is what a label file calls it. Of a load cell: `rest`, what it read at rest just before the onset [N],
     `drift` of that level [N/s], by how much it had shifted since the log began [N], and how finely the onset is known,
-    `resolution` [s]: clock, noise, drift and slope. A contact that is `in_progress` when the recording begins has no
-    onset: `start` is the first sample.
+    `resolution` [s]: clock, noise, drift and slope. `hole` [s]: for how long load-cell samples are missing where the
+    contact may have begun; 0: nowhere for longer than a force meter would allow. A contact that is `in_progress` when
+    the recording begins has no onset: `start` is the first sample.
     """
 
     start: float
@@ -178,6 +179,7 @@ class Contact:
     shift: float = 0.0
     resolution: float = math.nan
     in_progress: bool = False
+    hole: float = 0.0
 
 
 def _frozen(values: npt.ArrayLike) -> FloatArray:

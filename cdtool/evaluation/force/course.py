@@ -1,8 +1,7 @@
 """The force of a contact over the time since it began: what a force limit is held against.
 
 Conventions: time counts from the contact's onset [s]. The force is positive in the direction in which the contact
-presses, whatever the load cell's sign. A sample is missing where two samples are further apart than the cell's rhythm
-and than 5 ms; up to that the force is taken to go on steadily.
+presses, whatever the load cell's sign. Samples are missing where two are further apart than `missing_samples` allows.
 """
 
 from __future__ import annotations
@@ -12,14 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.truth.missing_samples import PERIODS, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 
-# A force meter for doors samples at 200 Hz at least (EN 12445): what lies closer together hides nothing from it.
-_CLOSE_ENOUGH = 5e-3
-# Samples further apart than this many of the cell's periods have one missing between them.
-_PERIODS = 1.5
 # This many equal readings in a row at the largest one: the cell stands at its stop.
 _STUCK = 5
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
@@ -33,13 +29,19 @@ class ForceCourse:
     """Contact force (n,) [N] at the times (n,) [s after the onset] of the samples that are present.
 
     `clipped` (n,): the load cell stood at its stop, the true force was larger. `end`: how long after the onset the
-    record goes on [s].
+    record goes on [s]. `period`: that of the cell [s]; NaN: by these samples. `before`: how long before the first
+    sample the one before it was taken [s], in which the force was at rest; NaN where that is not known. `hole`: samples
+    were missing for so long where the contact may have begun, up to `uncertainty` earlier [s].
     """
 
     time: FloatArray
     force: FloatArray
     clipped: BoolArray
     end: float
+    period: float = float("nan")
+    before: float = float("nan")
+    hole: float = 0.0
+    uncertainty: float = 0.0
 
     @property
     def saturated(self) -> bool:
@@ -54,7 +56,11 @@ class ForceCourse:
     @property
     def longest_step(self) -> float:
         """How far apart samples may be without one missing between them [s]."""
-        return _longest_step(self.time)
+        return longest_step(self._period)
+
+    @property
+    def _period(self) -> float:
+        return self.period if np.isfinite(self.period) else _period(self.time)
 
     @property
     def missing_share(self) -> float:
@@ -67,6 +73,33 @@ class ForceCourse:
         marks = np.concatenate(([0.0], self.time, [max(self.end, float(self.time[-1]))]))
         wide = np.flatnonzero(np.diff(marks) > self.longest_step)
         return marks[wide], marks[wide + 1]
+
+    def longest_hole(self, until: float = float("inf")) -> float:
+        """For how long samples are missing at most, at the onset and up to `until` [s after the onset]; 0: nowhere."""
+        begins, ends = self.holes()
+        inside = begins <= until
+        return max(self.hole, float(np.max(ends[inside] - begins[inside], initial=0.0)))
+
+    def could_reach(self, begin: float, end: float) -> tuple[float, float]:
+        """The largest force [N] in steps that are no holes, but longer than the rhythm, and that step [s].
+
+        `begin`, `end` [s after the onset]. Between forces a and b, d apart in time, it cannot be above (a + b) / 2 +
+        s d / 2 where it changes by no more than s a second: by the steepest change in as much time beside the step.
+        Both are 0 where there is no such step.
+        """
+        time, force = self.time, self.force
+        if np.isfinite(self.before):
+            time, force = np.concatenate(([time[0] - self.before], time)), np.concatenate(([0.0], force))
+        steps, changes = np.diff(time), np.diff(force)
+        odd = steps > PERIODS * self._period
+        found = (0.0, 0.0)
+        for k in np.flatnonzero(odd & (steps <= self.longest_step) & (time[1:] > begin) & (time[:-1] < end)):
+            reach = max(steps[k], 3.0 * self._period) + 0.5 * self._period
+            beside = ~odd & (time[1:] > time[k] - reach) & (time[:-1] < time[k + 1] + reach)
+            steepest = float(np.max(np.abs(changes[beside] / steps[beside]), initial=0.0)) if beside.any() else np.inf
+            most = 0.5 * float(force[k] + force[k + 1]) + 0.5 * steepest * float(steps[k])
+            found = max(found, (most, float(steps[k])))
+        return found
 
 
 def force_course(
@@ -87,6 +120,7 @@ def force_course(
     if mass_before_cell < 0.0 or not np.isfinite(mass_before_cell):
         raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "0 or more")
     time, reading = _present(recording["force"])
+    whole = time
     if not np.any((time >= contact.start) & (time < until)):
         raise RecordingError(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
@@ -105,7 +139,17 @@ def force_course(
     if not known.any():
         raise RecordingError(f"{recording.name}: no acceleration after the onset", "set mass_before_cell to 0")
     end = min(float(recording["force"].time[-1]), until) - contact.start
-    return ForceCourse(time[known] - contact.start, force[known], clipped[known], end)
+    earlier = whole[whole < contact.start]
+    return ForceCourse(
+        time[known] - contact.start,
+        force[known],
+        clipped[known],
+        end,
+        period=_period(whole),
+        before=float(time[0] - earlier[-1]) if len(earlier) and known[0] else float("nan"),
+        hole=contact.hole,
+        uncertainty=contact.uncertainty if contact.hole else 0.0,
+    )
 
 
 def force_at(course: ForceCourse, time: float) -> float:
@@ -121,9 +165,8 @@ def _present(series: Series) -> tuple[FloatArray, FloatArray]:
     return series.time[present], series.values[present, 0]
 
 
-def _longest_step(time: FloatArray) -> float:
-    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    return max(_PERIODS * period, _CLOSE_ENOUGH)
+def _period(time: FloatArray) -> float:
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
 
 
 def _clipped(force: FloatArray) -> BoolArray:
@@ -178,7 +221,7 @@ def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> Fl
     if len(time) < 2:
         return np.full(len(clock), np.nan)
     after = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
-    wide = time[after] - time[after - 1] > _longest_step(time)
+    wide = time[after] - time[after - 1] > longest_step(_period(time))
     missing = wide & (clock != time[after]) & (clock != time[after - 1])
     found: FloatArray = np.where(missing, np.nan, np.interp(clock, time, values, left=np.nan, right=np.nan))
     return found

@@ -1,7 +1,8 @@
 """Force against its limits: pass, fail or not assessable, for a test and for the mean of several tests at one point.
 
-Conventions: a step that is exceeded fails, whatever else is missing. It passes only where every sample of it was seen
-and none was at the load cell's stop; otherwise it is not assessable, with the reason. A verdict is evidence about
+Conventions: a step that is exceeded fails, whatever else is missing. It passes only where the force was seen all along
+and never at the load cell's stop, whenever the contact may have begun; otherwise it is not assessable, with the reason.
+A step counts from the first sample of a contact that began where samples are missing: later it cannot. A verdict is evidence about
 recordings, not a certificate.
 """
 
@@ -138,7 +139,7 @@ def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdic
         budget = _crossing(course, int(above[0]), step)
         reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after the onset"
         return StepVerdict(step, "fail", peak, peak_at, budget, reason)
-    reason = _unseen(course, step, ends)
+    reason = _unseen(course, step, ends) or _may_exceed(course, step, ends)
     if not reason and course.clipped[inside].any():
         reason = f"the load cell was at its stop, {peak:.4g} N, below the limit of {step.at_most_n:g} N"
     return StepVerdict(step, "not_assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
@@ -150,9 +151,23 @@ def _unseen(course: ForceCourse, step: ForceStep, ends: float) -> str:
         return f"the record ends {course.end:.3g} s after the onset, before {step.from_s:g} s"
     if math.isfinite(ends) and ends - course.end > course.longest_step:
         return f"the record ends {course.end:.3g} s after the onset, the limit holds until {ends:g} s"
+    if course.hole and step.from_s == 0.0:
+        return f"load-cell samples are missing for {1e3 * course.hole:.0f} ms where the contact begins"
     begins, stops = course.holes()
     missing = float(np.sum(np.maximum(np.minimum(stops, ends) - np.maximum(begins, step.from_s), 0.0)))
     return f"load-cell samples are missing for {1e3 * missing:.0f} ms" if missing > 0.0 else ""
+
+
+def _may_exceed(course: ForceCourse, step: ForceStep, ends: float) -> str:
+    """What may have exceeded the limit unseen: between two samples, or before it held if the contact began earlier."""
+    most, hole = course.could_reach(step.from_s, ends)
+    if most > step.at_most_n:
+        return f"load-cell samples are missing for {1e3 * hole:.0f} ms, in which the force may have reached {most:.4g} N"
+    earlier = (course.time >= step.from_s - course.uncertainty) & (course.time < step.from_s)
+    largest = float(np.max(course.force[earlier], initial=0.0))
+    if step.from_s > 0.0 and largest > step.at_most_n:
+        return f"the onset may lie up to {1e3 * course.uncertainty:.0f} ms earlier, and then {largest:.4g} N are too much"
+    return ""
 
 
 def _crossing(course: ForceCourse, first: int, step: ForceStep) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.evaluation.truth.missing_samples import longest_step, time_to_shoulder
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import INTERVAL, IntArray, RestLine, RunningRest
 from cdtool.recording import Contact, FloatArray, Series
@@ -45,15 +46,19 @@ def reading_step(force: FloatArray) -> float:
     return float(distances.min()) if len(distances) else 0.0
 
 
-def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
+def load_cell_contacts(
+    series: Series, rule: OnsetRule, steps: float = 0.0, log_begins: float = np.inf
+) -> list[Contact]:
     """The contacts that a load cell feels, in order of time; missing samples are skipped.
 
-    Where the level comes from the noise it is at least `steps` of the cell's steps.
+    Where the level comes from the noise it is at least `steps` of the cell's steps. `log_begins` [s]: when the first
+    sample of any channel was taken, where that is known.
     """
     present = np.isfinite(series.values[:, 0])
     if np.count_nonzero(present) < 3:
         return []
-    return _Search(series.time[present], series.values[present, 0], rule, steps).contacts()
+    since = min(log_begins, float(series.time[0]))
+    return _Search(series.time[present], series.values[present, 0], rule, steps, since).contacts()
 
 
 def _joined(contact: Contact, rebound: Contact) -> Contact:
@@ -74,8 +79,8 @@ class _Rise:
 class _Search:
     """One load cell's readings (n,) and what has been found in them so far."""
 
-    def __init__(self, time: FloatArray, force: FloatArray, rule: OnsetRule, steps: float) -> None:
-        self.time, self.force, self.rule = time, force, rule
+    def __init__(self, time: FloatArray, force: FloatArray, rule: OnsetRule, steps: float, since: float) -> None:
+        self.time, self.force, self.rule, self.since = time, force, rule, since
         self.period = float(np.median(np.diff(time)))
         self.rest = RunningRest(time, force)
         step = reading_step(force)
@@ -187,6 +192,8 @@ class _Search:
         drifted = line.error_at(start)
         finely = self._time_for(rise, self.noise) + self._time_for(rise, drifted)
         level = float(line.value(self.time[onset : onset + 1])[0])
+        hole, since_hole = self._hole(rise, over[: last - onset + 1])
+        interval = max(interval, since_hole)
         contact = Contact(
             start=start,
             end=float(self.time[last]),
@@ -197,8 +204,27 @@ class _Search:
             drift=line.drift,
             shift=level - at_start,
             resolution=interval + way + finely,
+            hole=hole,
         )
         return contact, last
+
+    def _hole(self, rise: _Rise, over: FloatArray) -> tuple[float, float]:
+        """How long samples are missing where the contact may have begun, and how long before its start that is [s].
+
+        Just before the onset, and from there until the force is above the upper level. Earlier holes, up to the rule's
+        separation, count where a touch as long as this one's rise fits in: this one may be its rebound.
+        """
+        first = int(np.searchsorted(self.time, self.time[rise.onset] - self.rule.separation))
+        marks = self.time[max(first - 1, 0) : rise.high + 1]
+        if first == 0:
+            marks = np.concatenate(([self.since], marks))
+        steps = np.diff(marks)
+        touch = time_to_shoulder(self.time[rise.onset : rise.onset + len(over)], rise.sign * over, self.period)
+        least = np.where(marks[1:] < self.time[rise.onset], touch, 0.0)
+        wide = np.flatnonzero((steps > longest_step(self.period)) & (steps >= least))
+        if not len(wide):
+            return 0.0, 0.0
+        return float(steps[wide].max()), max(float(self.time[rise.onset] - marks[wide[0]]), 0.0)
 
     def _time_for(self, rise: _Rise, force: float) -> float:
         """How long the force takes, as steeply as it rises at the onset, to rise by so many newtons [s]."""

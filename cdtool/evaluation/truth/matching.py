@@ -3,7 +3,8 @@
 Conventions: latency = time of the sample whose processing raised the alarm (debounce included) - onset. A contact's
 window is [onset - its uncertainty, onset + window]; it ends earlier where the next contact's window begins. A contact
 without an alarm in it is missed: its latency is censored at `watched`, never dropped. It is not assessable where the
-detector's signal was valid nowhere between onset and the window's end. A contact that is in progress when the recording
+detector's signal was valid nowhere between onset and the window's end, or where load-cell samples are missing for as
+long as the window before its first sample: nobody saw when it began. A contact that is in progress when the recording
 begins has no onset, and so no latency: it is neither detected nor missed, and what alarms until its release, and in the
 window after that, is no false alarm.
 """
@@ -92,6 +93,9 @@ def match(
             matches.append(Match(contact, "in_progress", reason=IN_PROGRESS))
             continue
         watched = max(min(closes, _end(statistic)) - contact.start, 0.0)
+        if contact.hole and contact.uncertainty >= window:
+            matches.append(Match(contact, "not_assessable", watched=watched, reason=unknown_onset(contact)))
+            continue
         candidates = crossings or verdict.crossings
         inside = (alarm for alarm in candidates if opens <= alarm.time <= closes and alarm not in taken)
         found = next(inside, None)
@@ -107,6 +111,11 @@ def match(
         matches.append(Match(contact, "detected", found, max(latency, 0.0), latency < 0.0, watched))
     alone = [alarm for alarm in verdict.alarms if alarm not in taken and not belongs(alarm.time, spans)]
     return Matching(tuple(matches), tuple(alone[i] for i in one_an_event([alarm.time for alarm in alone], rearm)))
+
+
+def unknown_onset(contact: Contact) -> str:
+    """Why nothing can be said of the latency of a contact that began where load-cell samples are missing."""
+    return f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where it begins: its onset is not known"
 
 
 def one_an_event(times: Sequence[float], rearm: float) -> list[int]:
