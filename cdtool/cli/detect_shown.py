@@ -70,6 +70,10 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
         why = "" if alarm in latency else _why_no_latency(found, alarm)
         if alarm in latency and latency[alarm].clipped:
             why = NEGATIVE
+        if alarm in latency and latency[alarm].contact.hole:
+            later = 1e3 * latency[alarm].contact.uncertainty
+            missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
+            why = f"{why}; {missing}" if why else missing
         rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, why))
     for item in matching.matches:
         if not item.alarm:

@@ -61,11 +61,14 @@ def force_checks(results: Results) -> list[ForceCheck]:
             for item in alone
         ]
         known = {(item.recording, item.contact) for item in rows}
-        contacts = {(item.recording, item.contact) for item in results.contacts if item.group == group}
+        contacts = {(item.recording, item.contact) for item in results.scored_contacts if item.group == group}
+        why = "no load-cell force"
         unseen = [f"{name}, contact {number}" for name, number in sorted(contacts - known)]
         if not contacts and not rows and not points:
-            unseen = ["every contact"]
-        found += [ForceCheck(group, profile, name, "not_assessable", "no load-cell force", None) for name in unseen]
+            unseen, why = ["every contact"], "no recording of the group could be scored"
+            if any(item.group == group for item in results.contacts):
+                why = "every contact was in progress when its recording began: its onset is not recorded"
+        found += [ForceCheck(group, profile, name, "not_assessable", why, None) for name in unseen]
     return found
 
 

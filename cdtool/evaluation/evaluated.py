@@ -9,7 +9,7 @@ from cdtool.evaluation.comparison import Comparison, compare_detectors
 from cdtool.evaluation.conclusion import conclude
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
-from cdtool.evaluation.summary import Summary, summarise
+from cdtool.evaluation.summary import Summary, at_worst, summarise
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     """
     summaries = tuple(summarise(results))
     if limits:
-        results = replace(results, limits=check_limits(limits, summaries))
+        lost = any(item.onset_holes or item.force_holes for item in summaries)
+        worst = summarise(at_worst(results)) if lost else ()
+        results = replace(results, limits=check_limits(limits, summaries, worst))
     results = replace(results, conclusion=conclude(results, summaries))
     return Evaluated(results, summaries, tuple(compare_detectors(results)))

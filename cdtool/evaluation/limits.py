@@ -47,12 +47,18 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
     return tuple(rules)
 
 
-def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tuple[LimitResult, ...]:
+def check_limits(
+    rules: Sequence[LimitRule], summaries: Sequence[Summary], at_worst: Sequence[Summary] = ()
+) -> tuple[LimitResult, ...]:
     """Hold every rule against the figures that it names; raises ConfigurationError where it names none.
+
+    `at_worst` are the same summaries with the figures that missing load-cell samples leave possible: a limit that is
+    met only without them is not assessable.
 
     With `*` a group without contacts is left out where the figure needs contacts.
     """
     found: list[LimitResult] = []
+    worst = {(item.detector, item.group): item for item in at_worst}
     for rule in rules:
         named = [
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
@@ -65,7 +71,7 @@ def check_limits(rules: Sequence[LimitRule], summaries: Sequence[Summary]) -> tu
                 f"[limits] {rule.key}: there is no such figure in these results",
                 "a figure of contacts needs a group with contacts, and a detector that was run",
             )
-        found += [_check(rule, item) for item in meant]
+        found += [_check(rule, item, worst.get((item.detector, item.group))) for item in meant]
     return tuple(found)
 
 
@@ -74,7 +80,7 @@ def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:
     return [item for item in limits if item.outcome != "met"]
 
 
-def _check(rule: LimitRule, summary: Summary) -> LimitResult:
+def _check(rule: LimitRule, summary: Summary, worst: Summary | None) -> LimitResult:
     value = FIGURES[rule.figure](summary)
     outcome, reason = "met", None
     if math.isnan(value):
@@ -82,6 +88,11 @@ def _check(rule: LimitRule, summary: Summary) -> LimitResult:
     elif not rule.least <= value <= rule.largest:
         outcome = "violated"
         reason = f"{_text(value)} is {'more' if value > rule.largest else 'less'} than {_text(_crossed(rule, value))}"
+    elif worst is not None and not rule.least <= (most := FIGURES[rule.figure](worst)) <= rule.largest:
+        outcome = "not_assessable"
+        holes = max(summary.onset_holes, summary.force_holes)
+        most_words = f"{most:.6g}" if math.isfinite(most) else "of any size"
+        reason = f"load-cell samples are missing in {holes} of {summary.contacts} contacts: it may be {most_words}"
     return LimitResult(
         limit=rule.key,
         detector=summary.detector,

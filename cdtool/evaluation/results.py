@@ -68,6 +68,16 @@ class ContactResult:
     limit: float | None = meant("limit at the alarm, in the unit of the statistic; null for triggers", default=None)
     rest_n: float | None = meant("what the load cell read at rest just before the onset", default=None)
     drift_n_per_s: float | None = meant("drift of that reading before the onset; 0: none beyond doubt", default=None)
+    onset_hole_ms: float | None = meant(
+        "load-cell samples are missing for so long where the contact may have begun: the latency may be longer by "
+        "onset_uncertainty_s; null: none are missing",
+        default=None,
+    )
+    force_hole_ms: float | None = meant(
+        "load-cell samples are missing for so long at the onset or while the contact presses: the peak may be larger; "
+        "null: none are missing",
+        default=None,
+    )
 
     @property
     def in_progress(self) -> bool:

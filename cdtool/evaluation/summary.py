@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,7 +29,8 @@ class Summary:
     `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
     alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
     `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
-    `contacts`: they had begun when the recording did.
+    `contacts`: they had begun when the recording did. `onset_holes` of the contacts may have begun where load-cell
+    samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may not have been seen.
     """
 
     detector: str
@@ -60,6 +61,9 @@ class Summary:
     force_failed: float
     clipped: int = 0
     in_progress: int = 0
+    onset_holes: int = 0
+    later_ms: float = 0.0
+    force_holes: int = 0
 
     @property
     def watched(self) -> bool:
@@ -172,6 +176,33 @@ def summarise(results: Results) -> list[Summary]:
     ]
 
 
+def later_ms(item: ContactResult) -> float:
+    """By how much the latency of a contact may be longer, since load-cell samples are missing where it began [ms]."""
+    if item.onset_hole_ms is None:
+        return 0.0
+    before = 1e3 * (item.onset_uncertainty_s or 0.0)
+    if not item.clipped or item.alarm_s is None:
+        return before
+    return max(1e3 * (item.alarm_s - item.onset_s) + before, 0.0)
+
+
+def at_worst(results: Results) -> Results:
+    """The results with the longest latencies and the largest forces that missing load-cell samples leave possible."""
+    return replace(results, contacts=tuple(_at_worst(item) for item in results.contacts))
+
+
+def _at_worst(item: ContactResult) -> ContactResult:
+    if item.force_hole_ms is None and item.onset_hole_ms is None:
+        return item
+    late, at_alarm = item.latency_ms, item.force_at_alarm_n
+    return replace(
+        item,
+        latency_ms=None if late is None else late + later_ms(item),
+        force_at_alarm_n=math.inf if late is not None and at_alarm is None else at_alarm,
+        peak_force_n=math.inf,
+    )
+
+
 def campaigns(results: Results) -> dict[str, str]:
     """What each recording is resampled with: its campaign where one is named, else itself."""
     return {item.recording: item.campaign or item.recording for item in results.recordings}
@@ -234,6 +265,9 @@ def _summary(
         force_failed=_failed(forces),
         clipped=sum(item.clipped for item in detected),
         in_progress=in_progress,
+        onset_holes=sum(item.onset_hole_ms is not None for item in contacts),
+        later_ms=max((later_ms(item) for item in contacts), default=0.0),
+        force_holes=sum(item.force_hole_ms is not None for item in contacts),
     )
 
 

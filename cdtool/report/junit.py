@@ -17,6 +17,7 @@ from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed,
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
 from cdtool.evaluation.results import ContactResult, LimitResult, Skipped
+from cdtool.evaluation.summary import later_ms
 from cdtool.plain_text import plain
 from cdtool.report.figure_text import number, spoken
 from cdtool.report.verdict_words import allowed, value_of
@@ -96,10 +97,14 @@ def _contact(item: ContactResult) -> str:
     if item.latency_ms is not None:
         words += f" after {number(item.latency_ms)} ms"
         words += " (before the onset, within its uncertainty)" if item.clipped else ""
+        if item.onset_hole_ms is not None:
+            words += f" or up to {number(later_ms(item))} ms later (load-cell samples missing at the onset)"
     if item.force_at_alarm_n is not None:
         words += f" at {number(item.force_at_alarm_n)} N"
     if item.peak_force_n is not None:
         words += f", peak {number(item.peak_force_n)} N"
+    if item.force_hole_ms is not None:
+        words += f" or more (load-cell samples missing for {number(item.force_hole_ms)} ms)"
     return f"{words} ({item.reason})" if item.reason else words
 
 

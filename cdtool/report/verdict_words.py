@@ -39,6 +39,10 @@ def counts_words(evaluated: Evaluated) -> str:
     became = ", ".join(f"{count} {what}" for what, count in counts)
     if negative := sum(item.clipped for item in summaries):
         became += f" ({negative} before the onset, counted as 0 ms)"
+    if unseen := len(
+        {(item.group, item.recording, item.contact) for item in results.contacts if item.onset_hole_ms is not None}
+    ):
+        became += f"; {counted(unseen, 'contact')} may have begun where load-cell samples are missing"
     if begun := len({(item.group, item.recording, item.contact) for item in results.contacts if item.in_progress}):
         became += f"; {counted(begun, 'contact')} in progress at the start, not scored"
     watched = any(item.watched and item.judged_operations for item in summaries)

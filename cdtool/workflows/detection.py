@@ -189,6 +189,8 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
     first = next((item.alarm for item in matches if item.alarm), None)
     if contact.in_progress:
         return "contact in progress at the start"
+    if first is None and contact.hole and contact.uncertainty >= found.window:
+        return f"contact first seen at {contact.start:.3f} s: load-cell samples are missing where it began"
     if first is None:
         return f"contact at {contact.start:.3f} s, more than {found.window:g} s after its onset"
     if first.joint != alarm.joint:

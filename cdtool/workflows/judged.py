@@ -80,6 +80,9 @@ def _contact_row(
 ) -> ContactResult:
     contact, alarm = found.contact, found.alarm
     peak = course.peak if course else contact.peak_force
+    # Before its first sample a contact that began where samples are missing had a force that nobody measured.
+    seen = course is not None and alarm is not None and not (contact.hole and found.clipped)
+    hole = course.longest_hole(contact.end - contact.start) if course else contact.hole
     return ContactResult(
         recording=recording.name,
         group=judged.group,
@@ -90,7 +93,7 @@ def _contact_row(
         alarm_s=alarm.time if alarm else None,
         latency_ms=1e3 * found.latency if alarm else None,
         outcome=found.outcome,
-        force_at_alarm_n=finite(abs(force_at(course, found.latency))) if course and alarm else None,
+        force_at_alarm_n=finite(abs(force_at(course, found.latency))) if course and seen else None,
         peak_force_n=finite(peak),
         clipped=found.clipped,
         reason=found.reason or None,
@@ -101,6 +104,8 @@ def _contact_row(
         resolution_ms=None if contact.in_progress else 1e3 * resolution,
         rest_n=finite(contact.rest),
         drift_n_per_s=contact.drift if np.isfinite(contact.rest) and not contact.in_progress else None,
+        onset_hole_ms=1e3 * contact.hole or None,
+        force_hole_ms=1e3 * hole or None,
         **_crossing(detection, alarm),
     )
 

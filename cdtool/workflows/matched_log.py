@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cdtool.detection import Alarm
@@ -15,6 +15,7 @@ from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.log_findings import IN_PROGRESS, log_warnings
+from cdtool.workflows.runs import DAMAGED
 from cdtool.workflows.scoring_rules import ScoringRules
 
 
@@ -23,7 +24,8 @@ class MatchedLog:
     """What became of a log's contacts and alarms.
 
     `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
-    number; `not_scored` names contacts that have no onset or lie in no operation, `warnings` are about the log itself.
+    number; `not_scored` names contacts that have no onset, lie in no operation or began where load-cell samples are
+    missing, `warnings` are about the log itself.
     """
 
     judged: tuple[Judged, ...]
@@ -72,8 +74,8 @@ def match_log(
         tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
-        tuple(_not_scored(recording, contacts, inside, cut_by)),
-        (*warned, *doubts),
+        (*_not_scored(recording, contacts, inside, cut_by), *_unseen_onsets(recording, contacts, rules.window)),
+        (*warned, *_unseen_forces(recording, contacts, courses), *doubts),
     )
 
 
@@ -109,6 +111,33 @@ def _not_scored(
         elif not any(contact in own for own in inside):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
             found.append(Skipped(recording.name, text))
+    return found
+
+
+def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: float) -> list[Skipped]:
+    """A line on each contact that began where load-cell samples are missing: a loss, for its latency is not known."""
+    found = []
+    for number, contact in enumerate(contacts, 1):
+        if contact.hole and not contact.in_progress:
+            later = 1e3 * contact.uncertainty
+            what = f"its latency may be up to {later:.0f} ms longer"
+            what = "its latency is not known" if contact.uncertainty >= window else what
+            text = f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
+            found.append(Skipped(recording.name, f"{DAMAGED}{text} {contact.start:.3f} s, may have begun: {what}"))
+    return found
+
+
+def _unseen_forces(
+    recording: Recording, contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]
+) -> list[Skipped]:
+    """A warning for each contact whose onset was seen, but not all of its force."""
+    found = []
+    for number, course in courses.items():
+        contact = contacts[number - 1]
+        hole = course.longest_hole(contact.end - contact.start)
+        if hole and not contact.hole:
+            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms while contact {number} presses"
+            found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
     return found
 
 

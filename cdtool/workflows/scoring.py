@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.errors import CdtoolError
+from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
@@ -25,7 +26,7 @@ from cdtool.workflows.judged import Judged, not_assessable
 from cdtool.workflows.left_out import LeftOut
 from cdtool.workflows.log_findings import log_warnings
 from cdtool.workflows.matched_log import MatchedLog, match_log
-from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
+from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
 from cdtool.workflows.true_contacts import any_contacts, true_contacts, unwanted_contacts
 
 
@@ -144,6 +145,7 @@ def score_log(
     if profile:
         scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
         scored.forces = force_rows(scored.recording, scored.verdicts, courses)
+        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, courses)
         numbered = enumerate(contacts, 1)
         unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
         if unseen:
@@ -154,6 +156,18 @@ def score_log(
     scored.false_alarms = list(matched.false_alarms)
     scored.detecting = perf_counter() - begin - scored.reading
     return scored
+
+
+def _force_not_seen(
+    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+) -> list[Skipped]:
+    """The contacts that a force profile could not judge because load-cell samples are missing: a loss of data."""
+    lost = [
+        f"contact {number} is not assessable by {profile}: {verdict.reason}"
+        for number, verdict in verdicts.items()
+        if verdict.outcome == "not_assessable" and courses[number].lacks_samples
+    ]
+    return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
 
 
 def _recording_result(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.benchmark_file import BenchmarkFile
@@ -58,7 +59,7 @@ def true_contacts(recording: Recording, setup: BenchmarkFile, path: Path) -> lis
     contacts = find_contacts(recording, setup.onset)
     if not contacts and (missing := _missing(recording)):
         raise RecordingError(
-            f"{path}: no contact found ({setup.onset.described}), and {missing}", "copy the log anew, or leave it out"
+            f"{path}: no contact found ({setup.onset.described}), and {missing}", "copy the log again, or leave it out"
         )
     if not contacts:
         raise RecordingError(
@@ -76,6 +77,11 @@ def _missing(recording: Recording) -> str:
     cell = recording["force"]
     present = cell.time[np.isfinite(cell.values[:, 0])]
     if len(present) and present[-1] > recording.end - _TAIL:
-        return ""
+        marks = np.concatenate(([recording.start], present))
+        steps = np.diff(marks)
+        k = int(np.argmax(steps))
+        if steps[k] <= longest_step(float(np.median(steps))):
+            return ""
+        return f"load-cell samples are missing from {marks[k]:.3f} to {marks[k + 1]:.3f} s"
     last = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
     return f"the load cell {last}, the log at {recording.end:.3f} s"

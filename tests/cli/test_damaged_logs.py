@@ -72,7 +72,7 @@ def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cu
     assert done.status == 3
     (line,) = [line for line in done.err.splitlines() if "cut.csv" in line]
     assert line.startswith("left out: cut.csv: no contact found") and "part of the log is lost" in line
-    assert "copy the log anew" in line and "holdout" not in line
+    assert "copy the log again" in line and "holdout" not in line
 
 
 def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:

@@ -80,6 +80,11 @@ class ForceCourse:
         inside = begins <= until
         return max(self.hole, float(np.max(ends[inside] - begins[inside], initial=0.0)))
 
+    @property
+    def lacks_samples(self) -> bool:
+        """Whether samples are missing anywhere, for longer than the cell's clock explains."""
+        return bool(self.longest_hole() or self.could_reach(-np.inf, np.inf)[1])
+
     def could_reach(self, begin: float, end: float) -> tuple[float, float]:
         """The largest force [N] in steps that are no holes, but longer than the rhythm, and that step [s].
 
