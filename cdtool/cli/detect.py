@@ -136,7 +136,7 @@ def detect(
     plot_names = _plot_names(plot, logs, force=force)
     done: list[tuple[Path, Detected]] = []
     forces: dict[str, ForceSummary] = {}
-    skipped: list[Skipped] = []
+    skipped: list[Skipped] = [*prepared.skipped] if prepared else []
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
     with folder, progress("detecting") as advance:
         for i, log in enumerate(logs, 1):

@@ -132,7 +132,8 @@ def explain(
             rules=rules,
         )
     )
-    skipped = [*lost(explained.found.recording), *explained.found.not_scored]
+    left_out = prepared.skipped if prepared else ()
+    skipped = [*left_out, *lost(explained.found.recording), *explained.found.not_scored]
     print_skipped(skipped, explained.found.warnings, explained.found.notes)
     if as_json:
         print_json(explained_as_json(log, explained))

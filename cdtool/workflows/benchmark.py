@@ -117,7 +117,7 @@ def benchmark(
         gathered.add(group, scored)
         seconds["reading"] += scored.reading
         seconds["detecting"] += scored.detecting
-    provenance = _provenance(setup, used, learned.thresholds, learn.operations)
+    provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
     provenance["units"] |= gathered.units
     results = gathered.results(provenance, learned.calibration)
     return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds, setup.inputs)

@@ -26,6 +26,7 @@ class LearnedThresholds:
     """Each detector's thresholds, runs left out, detectors that could judge nothing, and how factors were set.
 
     `lacking`: the detectors that could not be used on any run, with the reason; they have no threshold.
+    `unused`: the runs that every other detector left out.
     """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
@@ -33,6 +34,11 @@ class LearnedThresholds:
     blind: list[Skipped]
     calibration: list[CalibrationResult]
     lacking: dict[str, str]
+    unused: set[str]
+
+    def learned_from(self, operations: Sequence[Operation]) -> list[Operation]:
+        """Return the operations that some detector has learned from."""
+        return [operation for operation in operations if operation.name not in self.unused]
 
 
 def learn_thresholds(
@@ -43,9 +49,10 @@ def learn_thresholds(
     A detector that lacks a channel stops the others not. Raises SignatureError where nothing can be learned, UsageError
     where the runs are too few for the budget.
     """
-    learned = LearnedThresholds({}, [], [], [], {})
+    learned = LearnedThresholds({}, [], [], [], {}, set())
     fit = fitting(setup.rule)
     left_out = LeftOut()
+    unused: list[set[str]] = []
     for detector in detectors:
         try:
             pairs, unusable = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
@@ -60,6 +67,7 @@ def learn_thresholds(
             learned.lacking[detector.name] = fault.reason
             continue
         left_out.add(detector.name, [*unusable, *fitted.skipped])
+        unused.append({item.recording for item in [*unusable, *fitted.skipped]})
         thresholds = fitted.thresholds
         if setup.budget:
             made = calibrate(setup.budget, detector.name, kept(pairs, fitted.skipped), fit, setup.activation)
@@ -71,6 +79,7 @@ def learn_thresholds(
             )
         learned.thresholds[detector.name] = thresholds
     learned.skipped.extend(left_out.said_once())
+    learned.unused.update(set.intersection(*unused) if unused else ())
     if learned.lacking and len(learned.lacking) == len(detectors):
         raise _none_usable(learned.lacking, known=bool(operations))
     return learned

@@ -11,6 +11,7 @@ from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import Skipped
+from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
@@ -25,7 +26,8 @@ class PreparedBenchmark:
     """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
 
     `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
-    `normals` what they look like. `notes` are about a signature file of an earlier version.
+    `normals` what they look like; `skipped` names the runs that were left out in learning, and why. `notes` are about a
+    signature file of an earlier version.
     """
 
     setup: BenchmarkFile
@@ -36,6 +38,7 @@ class PreparedBenchmark:
     ranges: PlausibleRanges | None
     normals: NormalMotions
     notes: tuple[Skipped, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
 
     def score(self, log: Path) -> Scored:
         """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
@@ -96,12 +99,16 @@ def prepare_benchmark(
     instance = machine_file.detector(setup.detectors[0])
     runs = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=setup.path.parent)
     fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
-    count = len(runs.operations)
-    described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {count} operations"
-    hashes = {operation.recording.digest: operation.recording.name for operation in runs.operations}
+    used = fitted.learned_from(runs.operations)
+    many = counted(len(used), "impact-free run")
+    classes = len(fitted.thresholds[instance.name])
+    many += f" of {classes} classes of motion" if classes > 1 else ""
+    described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {many}"
+    hashes = {operation.recording.digest: operation.recording.name for operation in used}
     run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
-    normals = NormalMotions(normal_motions(runs.operations), Absence.FEW_RUNS)
-    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals)
+    normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
+    left_out = (*runs.skipped, *fitted.skipped)
+    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)
 
 
 def _chosen(setup: BenchmarkFile, detector: str | None) -> str:

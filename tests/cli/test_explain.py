@@ -123,7 +123,7 @@ def test_a_signature_file_of_before_says_how_to_learn_what_is_normal(explain, fe
     old = tmp_path / "old.json"
     old.write_text(json.dumps({**values, "schema_version": 3}))
     told = " ".join(explain("stiff/01.csv", "-s", old).out.split())
-    assert "Compared with this log's own past alone: this signature file was written before" in told
+    assert "Nothing to compare with: the signature file holds no normal motion" in told
     assert "learn it again with cdtool learn-signature" in told
     assert "usual range" not in told
 

@@ -31,7 +31,7 @@ def _told(cause: Cause, item: AlarmExplanation) -> str:
             f"lost samples: about {count} of {loss.channel} missing from {loss.start:.3f} to {loss.end:.3f} s, "
             f"{_before(item.alarm.time - loss.end)}, and nothing else explains it"
         )
-    shifts = "; ".join(_shift(shift) for shift in cause.shifts)
+    shifts = "; ".join(_shift(shift, item.absent is None) for shift in cause.shifts)
     if cause.kind is CauseKind.CONTACT:
         return f"a contact: {shifts}; both stayed off"
     if cause.kind is CauseKind.FRICTION:
@@ -41,9 +41,11 @@ def _told(cause: Cause, item: AlarmExplanation) -> str:
     return "not clear"
 
 
-def _shift(shift: Shift) -> str:
+def _shift(shift: Shift, learned: bool) -> str:
+    """Only what was learned is called normal."""
     unit = f" {shift.unit}" if shift.unit not in ("", "1") else ""
-    return f"{shift.channel} of {shift.joint} {shift.value:.4g}{unit} where {shift.normal:.4g} is normal"
+    before = f"where {shift.normal:.4g} is normal" if learned else f"after {shift.normal:.4g} before it"
+    return f"{shift.channel} of {shift.joint} {shift.value:.4g}{unit} {before}"
 
 
 def _transient(found: Transient, item: AlarmExplanation) -> str:

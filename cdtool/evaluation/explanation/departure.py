@@ -25,6 +25,9 @@ _BEYOND, _LEAST_OUT = 1.5, 5.0
 # It began to leave it where it last was within this share of that.
 _BACK_TO = 0.4
 _SUCCESSION = 3
+# A departure that takes longer than this [s] to be certain may be a slow wandering first: where its course bends is
+# tried at so many samples, with this much of it before [s].
+_SLOW, _BENDS, _BEFORE_BEND = 0.03, 60, 0.1
 # A run's own constant distance from the mean counts up to this many spreads; more is a departure.
 _OFFSET = 2.5
 # How many spreads off its own past a channel may go without having left it.
@@ -93,7 +96,7 @@ class Track:
             return self._told(math.nan, _side(raw[first]), "outside since before", part.start + first)
         k, upward, of_level = at
         sign = 1.0 if upward else -1.0
-        start = part.start + _began(sign * shares[of_level][: k + 1])
+        start = part.start + _began(self.time[part][: k + 1], sign * shares[of_level][: k + 1])
         known = np.where(np.isfinite(samples), sign * samples, -np.inf)
         farthest = part.start + k + int(np.argmax(known[k:]))
         return self._told(float(self.time[start]), "up" if upward else "down", "", farthest)
@@ -227,10 +230,36 @@ def _first(outside: BoolArray) -> int | None:
     return int(np.argmax(run)) if run.any() else None
 
 
-def _began(shares: FloatArray) -> int:
-    """Where a departure upward that is certain at the last sample began: followed back to `_BACK_TO` of its limit."""
+def _began(time: FloatArray, shares: FloatArray) -> int:
+    """Where a departure upward that is certain at the last sample began: followed back to `_BACK_TO` of its limit.
+
+    A channel that had wandered that far before it departed began where its course bends.
+    """
+    last = len(shares) - 1
     within = np.flatnonzero(~(shares > _BACK_TO))
-    return min(int(within[-1]) + 1, len(shares) - 1) if len(within) else 0
+    first = min(int(within[-1]) + 1, last) if len(within) else 0
+    if time[last] - time[first] <= _SLOW:
+        return first
+    return max(first, _bend(time, shares, first))
+
+
+def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
+    """From which sample on, `first` or later, the shares leave a straight line for a steeper one upward.
+
+    By least squares over the samples from `_BEFORE_BEND` before `first` to the last.
+    """
+    begin = int(np.searchsorted(time, time[first] - _BEFORE_BEND))
+    known = begin + np.flatnonzero(np.isfinite(shares[begin:]))
+    t, y = time[known] - time[begin], shares[known]
+    best, found = math.inf, first
+    for at in np.unique(np.linspace(first, len(shares) - _SUCCESSION, _BENDS).astype(int)):
+        after = np.maximum(t - (time[at] - time[begin]), 0.0)
+        design = np.column_stack((np.ones(len(t)), t, after))
+        fitted, *_ = np.linalg.lstsq(design, y, rcond=None)
+        error = float(np.sum((y - design @ fitted) ** 2))
+        if fitted[2] > 0.0 and error < best:
+            best, found = error, int(at)
+    return found
 
 
 def _side(value: float) -> str:

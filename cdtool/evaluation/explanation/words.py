@@ -13,11 +13,26 @@ from cdtool.evaluation.explanation.normal_choice import Absence
 from cdtool.recording import REFERENCES
 
 _ABSENT = {
-    Absence.BY_HAND: "with limits set by hand nothing was learned to compare with",
-    Absence.OLDER_FILE: "the signature file holds no normal motion, learn it again with cdtool learn-signature",
-    Absence.FEW_RUNS: "too few impact-free runs of one class of motion have speed and position",
-    Absence.NO_CLASS: "no class of motion that was learned runs as fast as this one",
-    Absence.NO_CHANNELS: "without speed and position nobody knows where in its motion this run is",
+    Absence.BY_HAND: (
+        "with limits set by hand nothing was learned",
+        "learn a signature with cdtool learn-signature and give it with --signature",
+    ),
+    Absence.OLDER_FILE: (
+        "the signature file holds no normal motion",
+        "learn it again with cdtool learn-signature",
+    ),
+    Absence.FEW_RUNS: (
+        "too few impact-free runs of one class of motion have speed and position",
+        "learn from three or more that have both",
+    ),
+    Absence.NO_CLASS: (
+        "no class of motion that was learned runs as fast as this one",
+        "learn from impact-free runs at this speed",
+    ),
+    Absence.NO_CHANNELS: (
+        "without speed and position nobody knows where in its motion this run is",
+        "map both in [channels] of the machine file and learn again",
+    ),
 }
 _REASONS = (
     ("outside since before", "Outside their normal band since before"),
@@ -125,7 +140,8 @@ def _compared(item: Explanation) -> str:
     """What the channels were compared with, or why with the log's own past alone and what to do about it."""
     if item.absent is None:
         return f"Compared with {item.runs} impact-free runs at the same place of the motion."
-    return f"Compared with this log's own past alone: {_ABSENT[item.absent]}."
+    why, next_step = _ABSENT[item.absent]
+    return f"Nothing to compare with: {why}; {next_step}. Until then what follows is against this log's own past alone."
 
 
 def _commands(sooner: Sequence[Movement], item: Explanation) -> list[str]:
@@ -158,11 +174,11 @@ def _unmoved(shown: Sequence[Movement], item: Explanation) -> list[str]:
 
 
 def _numbers(found: Movement) -> str:
-    """The value against normal mean and spread, where they are known."""
+    """The value farthest off, against normal mean and spread there, where they are known."""
     if not math.isfinite(found.mean):
         return ""
     normal = f"{_figure(found.mean)} +- {_figure(found.spread)}{_unit(found.unit)}"
-    return f" ({_figure(found.value)} against {normal})"
+    return f" (farthest {_figure(found.value)} against {normal})"
 
 
 def _in_order(moved: Sequence[Movement], item: Explanation) -> str:

@@ -13,6 +13,7 @@ import pytest
 import cdtool
 from cdtool.activation import Activation
 from cdtool.evaluation.explanation.cause import CauseKind
+from cdtool.evaluation.explanation.departure import _began
 from cdtool.evaluation.explanation.explanation import AlarmExplanation, explain_alarm
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.words import words
@@ -190,8 +191,29 @@ def test_without_impact_free_runs_it_says_what_it_compares_with_and_why(absent, 
     item = explained("gate", log("gate", "stiff/03.csv"), NormalMotions((), absent), 300.0)
     assert item.absent is absent and item.runs == 0
     text = " ".join(words(item))
-    assert "Compared with this log's own past alone" in text and told in text
-    assert "usual range" not in text
+    assert "Nothing to compare with: " in text and "this log's own past alone" in text and told in text
+    # Nothing was learned, so nothing is called normal, and the next step is named.
+    assert "usual range" not in text and "normal" not in text
+    assert item.cause.kind is CauseKind.CONTACT and "Likely cause: a contact: speed of gate" in text
+    assert "learn" in text.partition("Nothing to compare with")[2]
+
+
+def test_a_speed_that_wanders_within_its_band_departs_where_it_bends(gate):
+    # The speed is up to half of its limit off for 60 ms before this contact, and falls from 35 ms after it on.
+    item = explained("gate", log("gate", "stiff/04.csv"), gate, 300.0)
+    speed = next(each for each in item.moved if each.channel == "speed")
+    assert 0.03 <= speed.time - 5.939 <= 0.05
+    assert "(farthest -0.1992 against" in " ".join(words(item))
+
+
+@pytest.mark.parametrize("wandering", [0.3, 0.45, 0.5, 0.6])
+def test_a_departure_after_a_slow_wandering_begins_where_its_course_bends(wandering):
+    time = np.arange(0.0, 1.0, 1e-3)
+    noise = 0.02 * np.random.default_rng(1).normal(size=len(time))
+    shares = noise + np.clip(wandering * (time - 0.2) / 0.4, 0.0, wandering) + np.maximum(time - 0.8, 0.0) * 20.0
+    last = int(np.argmax(shares > 1.0)) + 2
+    began = _began(time[: last + 1], shares[: last + 1])
+    assert time[began] == pytest.approx(0.8, abs=0.012)
 
 
 def test_a_stroke_of_another_speed_is_compared_with_no_class_that_was_learned(gate):

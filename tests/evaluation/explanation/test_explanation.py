@@ -283,7 +283,8 @@ def test_the_words_name_joint_limit_debounce_and_what_moved_first():
         "hip: above its upper limit, 1.5 against 1 N m. It left the band for good 20 ms after the onset, 8 ms before "
         "the alarm, which needs 9 samples outside in succession.",
         "Likely cause: not clear.",
-        "Compared with this log's own past alone: with limits set by hand nothing was learned to compare with.",
+        "Nothing to compare with: with limits set by hand nothing was learned; learn a signature with cdtool "
+        "learn-signature and give it with --signature. Until then what follows is against this log's own past alone.",
         "Moved first: acceleration down 5 ms after the onset, torque up 20 ms.",
         "The first that momentum reads: torque, 20 ms after the onset.",
     ]
