@@ -1,4 +1,4 @@
-"""What the screen says of contacts whose onset is not recorded, and of latencies below zero or too short by what the load cell did not see."""
+"""What the screen says of contacts whose onset was not seen or not recorded, and of latencies below zero."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def show_truth(evaluated: Evaluated) -> None:
             say(f"{group}: {counted(begun, 'contact')} in progress at the start: neither detected nor missed")
         unseen = max(items, key=lambda item: item.onset_holes, default=None)
         if unseen and unseen.onset_holes:
-            say(
-                f"{group}: load-cell samples are missing where {unseen.onset_holes} of {unseen.contacts} contacts may "
-                f"have begun: latencies up to {unseen.later_ms:.0f} ms longer are possible"
-            )
+            later = max(item.later_ms for item in items)
+            what = f": latencies up to {later:.0f} ms longer are possible" if later else ""
+            of = counted(unseen.contacts, "contact")
+            say(f"{group}: load-cell samples are missing where {unseen.onset_holes} of {of} may have begun{what}")
         negative = [item for item in items if item.clipped]
         if negative:
             each = ", ".join(f"{item.detector} {item.clipped} of {item.detected}" for item in negative)

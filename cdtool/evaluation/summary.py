@@ -266,7 +266,7 @@ def _summary(
         clipped=sum(item.clipped for item in detected),
         in_progress=in_progress,
         onset_holes=sum(item.onset_hole_ms is not None for item in contacts),
-        later_ms=max((later_ms(item) for item in contacts), default=0.0),
+        later_ms=max((later_ms(item) for item in detected), default=0.0),
         force_holes=sum(item.force_hole_ms is not None for item in contacts),
     )
 

@@ -14,6 +14,7 @@ from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import ContactResult, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
+from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.motion.applicable import HOLD
 from cdtool.pipeline import Detection, detect_operations
@@ -209,4 +210,8 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
     if channel != "event" and (not len(present) or alarm.time > present[-1]):
         ends = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
         return f"{'load cell' if channel == 'force' else channel} {ends}"
+    if channel == "force" and len(present) > 1:
+        k = int(np.searchsorted(present, alarm.time))
+        if k > 0 and present[k] - present[k - 1] > longest_step(present):
+            return f"not known: load-cell samples are missing from {present[k - 1]:.3f} to {present[k]:.3f} s"
     return "no contact"

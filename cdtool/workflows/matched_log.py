@@ -122,7 +122,9 @@ def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: fl
             later = 1e3 * contact.uncertainty
             what = f"its latency may be up to {later:.0f} ms longer"
             what = "its latency is not known" if contact.uncertainty >= window else what
-            text = f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
+            text = (
+                f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
+            )
             found.append(Skipped(recording.name, f"{DAMAGED}{text} {contact.start:.3f} s, may have begun: {what}"))
     return found
 

@@ -80,7 +80,7 @@ def _missing(recording: Recording) -> str:
         marks = np.concatenate(([recording.start], present))
         steps = np.diff(marks)
         k = int(np.argmax(steps))
-        if steps[k] <= longest_step(float(np.median(steps))):
+        if steps[k] <= longest_step(present):
             return ""
         return f"load-cell samples are missing from {marks[k]:.3f} to {marks[k + 1]:.3f} s"
     last = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"

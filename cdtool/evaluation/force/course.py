@@ -29,7 +29,8 @@ class ForceCourse:
     """Contact force (n,) [N] at the times (n,) [s after the onset] of the samples that are present.
 
     `clipped` (n,): the load cell stood at its stop, the true force was larger. `end`: how long after the onset the
-    record goes on [s]. `period`: that of the cell [s]; NaN: by these samples. `before`: how long before the first
+    record goes on [s]. `clock` (m,): the times of the cell's samples in the whole record [s], if
+    they are not these. `before`: how long before the first
     sample the one before it was taken [s], in which the force was at rest; NaN where that is not known. `hole`: samples
     were missing for so long where the contact may have begun, up to `uncertainty` earlier [s].
     """
@@ -38,7 +39,7 @@ class ForceCourse:
     force: FloatArray
     clipped: BoolArray
     end: float
-    period: float = float("nan")
+    clock: FloatArray | None = None
     before: float = float("nan")
     hole: float = 0.0
     uncertainty: float = 0.0
@@ -56,11 +57,11 @@ class ForceCourse:
     @property
     def longest_step(self) -> float:
         """How far apart samples may be without one missing between them [s]."""
-        return longest_step(self._period)
+        return longest_step(self._clock)
 
     @property
-    def _period(self) -> float:
-        return self.period if np.isfinite(self.period) else _period(self.time)
+    def _clock(self) -> FloatArray:
+        return self.time if self.clock is None else self.clock
 
     @property
     def missing_share(self) -> float:
@@ -92,14 +93,14 @@ class ForceCourse:
         s d / 2 where it changes by no more than s a second: by the steepest change in as much time beside the step.
         Both are 0 where there is no such step.
         """
-        time, force = self.time, self.force
+        time, force, period, longest = self.time, self.force, _period(self._clock), self.longest_step
         if np.isfinite(self.before):
             time, force = np.concatenate(([time[0] - self.before], time)), np.concatenate(([0.0], force))
         steps, changes = np.diff(time), np.diff(force)
-        odd = steps > PERIODS * self._period
+        odd = steps > PERIODS * period
         found = (0.0, 0.0)
-        for k in np.flatnonzero(odd & (steps <= self.longest_step) & (time[1:] > begin) & (time[:-1] < end)):
-            reach = max(steps[k], 3.0 * self._period) + 0.5 * self._period
+        for k in np.flatnonzero(odd & (steps <= longest) & (time[1:] > begin) & (time[:-1] < end)):
+            reach = max(steps[k], 3.0 * period) + 0.5 * period
             beside = ~odd & (time[1:] > time[k] - reach) & (time[:-1] < time[k + 1] + reach)
             steepest = float(np.max(np.abs(changes[beside] / steps[beside]), initial=0.0)) if beside.any() else np.inf
             most = 0.5 * float(force[k] + force[k + 1]) + 0.5 * steepest * float(steps[k])
@@ -150,7 +151,7 @@ def force_course(
         force[known],
         clipped[known],
         end,
-        period=_period(whole),
+        clock=whole,
         before=float(time[0] - earlier[-1]) if len(earlier) and known[0] else float("nan"),
         hole=contact.hole,
         uncertainty=contact.uncertainty if contact.hole else 0.0,
@@ -226,7 +227,7 @@ def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> Fl
     if len(time) < 2:
         return np.full(len(clock), np.nan)
     after = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
-    wide = time[after] - time[after - 1] > longest_step(_period(time))
+    wide = time[after] - time[after - 1] > longest_step(time)
     missing = wide & (clock != time[after]) & (clock != time[after - 1])
     found: FloatArray = np.where(missing, np.nan, np.interp(clock, time, values, left=np.nan, right=np.nan))
     return found

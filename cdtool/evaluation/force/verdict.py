@@ -152,7 +152,7 @@ def _unseen(course: ForceCourse, step: ForceStep, ends: float) -> str:
     if math.isfinite(ends) and ends - course.end > course.longest_step:
         return f"the record ends {course.end:.3g} s after the onset, the limit holds until {ends:g} s"
     if course.hole and step.from_s == 0.0:
-        return f"load-cell samples are missing for {1e3 * course.hole:.0f} ms where the contact begins"
+        return f"load-cell samples are missing for {1e3 * course.hole:.0f} ms where the contact may have begun"
     begins, stops = course.holes()
     missing = float(np.sum(np.maximum(np.minimum(stops, ends) - np.maximum(begins, step.from_s), 0.0)))
     return f"load-cell samples are missing for {1e3 * missing:.0f} ms" if missing > 0.0 else ""
@@ -162,11 +162,15 @@ def _may_exceed(course: ForceCourse, step: ForceStep, ends: float) -> str:
     """What may have exceeded the limit unseen: between two samples, or before it held if the contact began earlier."""
     most, hole = course.could_reach(step.from_s, ends)
     if most > step.at_most_n:
-        return f"load-cell samples are missing for {1e3 * hole:.0f} ms, in which the force may have reached {most:.4g} N"
+        return (
+            f"load-cell samples are missing for {1e3 * hole:.0f} ms, in which the force may have reached {most:.4g} N"
+        )
     earlier = (course.time >= step.from_s - course.uncertainty) & (course.time < step.from_s)
     largest = float(np.max(course.force[earlier], initial=0.0))
     if step.from_s > 0.0 and largest > step.at_most_n:
-        return f"the onset may lie up to {1e3 * course.uncertainty:.0f} ms earlier, and then {largest:.4g} N are too much"
+        return (
+            f"the onset may lie up to {1e3 * course.uncertainty:.0f} ms earlier, and then {largest:.4g} N are too much"
+        )
     return ""
 
 

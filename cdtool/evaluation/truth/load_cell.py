@@ -82,6 +82,7 @@ class _Search:
     def __init__(self, time: FloatArray, force: FloatArray, rule: OnsetRule, steps: float, since: float) -> None:
         self.time, self.force, self.rule, self.since = time, force, rule, since
         self.period = float(np.median(np.diff(time)))
+        self.longest_step = longest_step(time)
         self.rest = RunningRest(time, force)
         step = reading_step(force)
         self.noise = max(self.rest.noise, _ROUNDING * step)
@@ -221,7 +222,7 @@ class _Search:
         steps = np.diff(marks)
         touch = time_to_shoulder(self.time[rise.onset : rise.onset + len(over)], rise.sign * over, self.period)
         least = np.where(marks[1:] < self.time[rise.onset], touch, 0.0)
-        wide = np.flatnonzero((steps > longest_step(self.period)) & (steps >= least))
+        wide = np.flatnonzero((steps > self.longest_step) & (steps >= least))
         if not len(wide):
             return 0.0, 0.0
         return float(steps[wide].max()), max(float(self.time[rise.onset] - marks[wide[0]]), 0.0)

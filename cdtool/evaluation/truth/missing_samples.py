@@ -1,9 +1,9 @@
 """Which samples of a load cell are missing: what is a hole in the force, and what only its clock's rhythm.
 
-Conventions: times in s. A step between two samples is a hole where it is longer than 5 ms and than 2.5 of the cell's
-periods. 5 ms is the interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12445): what lies
-closer together hides nothing from it. 2.5 periods are those of a clock whose stamps are off by most of a period, or of
-one sample lost.
+Conventions: times in s. A step between two samples is a hole where it is longer than 5 ms and than the clock makes it
+with one sample lost: 2.5 periods, of a clock with jitter one period and 1.1 times the step that one in 20 exceeds. 5 ms
+is the interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12445): what lies closer together
+hides nothing from it.
 """
 
 from __future__ import annotations
@@ -15,12 +15,16 @@ from cdtool.recording import FloatArray
 CLOSE_ENOUGH = 5e-3
 # A step longer than so many periods is no jitter of a regular clock: the force in it is not simply what is beside it.
 PERIODS = 1.5
-_AT_MOST = 2.5
+_ONE_LOST, _USUAL, _MORE = 2.5, 0.95, 1.1
 
 
-def longest_step(period: float) -> float:
-    """How far apart samples of a load cell may be without a hole between them [s]; `period` is the cell's [s]."""
-    return max(_AT_MOST * period, CLOSE_ENOUGH) if np.isfinite(period) else CLOSE_ENOUGH
+def longest_step(time: FloatArray) -> float:
+    """How far apart samples of a load cell at these times (n,) [s] may be without a hole between them [s]."""
+    if len(time) < 2:
+        return CLOSE_ENOUGH
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * float(np.quantile(steps, _USUAL)))
 
 
 def time_to_shoulder(time: FloatArray, force: FloatArray, period: float) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cdtool.evaluation.results import ContactResult, RecordingResult, Results, Skipped
+from cdtool.evaluation.summary import later_ms
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
 from cdtool.report.figure_text import NOTHING, number, percent
@@ -166,11 +167,17 @@ def _seen_cell(seen: _Seen, recording: RecordingResult, blind: bool) -> Cell:
 
 def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
     if len(contacts) <= _CONTACTS_TOLD:
-        told = [number(item.latency_ms) if item.latency_ms is not None else _missing(item) for item in contacts]
+        told = [_latency(item) if item.latency_ms is not None else _missing(item) for item in contacts]
         return [", ".join(told)] if told else []
     late = [item.latency_ms for item in contacts if item.latency_ms is not None]
     slowest = f", slowest {number(max(late))}" if late else ""
     return [f"{len(late)} of {len(contacts)} detected{slowest}"]
+
+
+def _latency(item: ContactResult) -> str:
+    """A latency, or its range where the load cell did not see when the contact began."""
+    shortest, later = item.latency_ms or 0.0, later_ms(item)
+    return f"{number(shortest)} to {number(shortest + later)}" if later else number(shortest)
 
 
 def _missing(item: ContactResult) -> str:

@@ -29,7 +29,7 @@ def bump(time: FloatArray, peak: float = PEAK, begins: float = ONSET) -> FloatAr
 
 def recording(force: FloatArray, begin: float, end: float, own_clock: bool) -> Recording:
     """One log whose load cell has no samples from `begin` to `end` [s]: NaN, or none on a clock of its own."""
-    lost = (TIME >= begin) & (TIME < end)
+    lost = (begin <= TIME) & (end > TIME)
     cell = Series(TIME[~lost], force[~lost], "N") if own_clock else Series(TIME, np.where(lost, np.nan, force), "N")
     return Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
 
