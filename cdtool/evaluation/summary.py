@@ -30,7 +30,7 @@ class Summary:
     alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
     `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
     `contacts`: they had begun when the recording did. `onset_holes` of the contacts may have begun where load-cell
-    samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may not have been seen.
+    samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may be unseen.
     """
 
     detector: str

@@ -2,8 +2,8 @@
 
 Conventions: a step that is exceeded fails, whatever else is missing. It passes only where the force was seen all along
 and never at the load cell's stop, whenever the contact may have begun; otherwise it is not assessable, with the reason.
-A step counts from the first sample of a contact that began where samples are missing: later it cannot. A verdict is evidence about
-recordings, not a certificate.
+A step counts from the first sample of a contact that began where samples are missing: later it cannot. A verdict is
+evidence about recordings, not a certificate.
 """
 
 from __future__ import annotations
