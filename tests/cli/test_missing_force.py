@@ -84,6 +84,8 @@ def test_a_hole_over_the_onset_gives_no_pass_and_no_latency_without_a_mark(tmp_p
         assert "1 contact may have begun where load-cell samples are missing" in text
     shown = cdtool("detect", tmp_path / "stiff" / "a.csv", "-b", file)
     assert shown.status == 3 and "load-cell samples missing at the onset" in " ".join(shown.out.split())
+    headline = " ".join(cdtool("explain", tmp_path / "stiff" / "a.csv", "-b", file).out.split())
+    assert f"ms earlier, since {row.onset_hole_ms:.0f} ms of it are missing)" in headline
     for command in ("detect", "explain"):
         told = cdtool(command, tmp_path / "stiff" / "a.csv", "-b", file, "--json")
         values = json.loads(told.out)

@@ -10,7 +10,7 @@ from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanat
 from cdtool.evaluation.explanation.margin import Approach
 from cdtool.evaluation.explanation.movement import COMMANDS, Movement
 from cdtool.evaluation.explanation.normal_choice import Absence
-from cdtool.recording import REFERENCES
+from cdtool.recording import REFERENCES, Contact
 
 _ABSENT = {
     Absence.BY_HAND: (
@@ -58,8 +58,15 @@ def _headline(item: AlarmExplanation) -> str:
         return f"{known} at {at}: {why}"
     late = item.alarm.time - item.contact.start
     what = "alarm" if item.role == "detection" else "further alarm"
-    onset = f"onset at {item.contact.start:.3f} s, {item.contact.found_by}"
+    onset = f"onset at {item.contact.start:.3f} s, {item.contact.found_by}{_unseen(item.contact)}"
     return f"{what} at {at}, {_counted(late, 'the contact')} ({onset})"
+
+
+def _unseen(contact: Contact) -> str:
+    """That the onset may lie earlier, where load-cell samples are missing."""
+    if not contact.hole:
+        return ""
+    return f", or up to {1e3 * contact.uncertainty:.0f} ms earlier, since {1e3 * contact.hole:.0f} ms of it are missing"
 
 
 def _crossing(item: AlarmExplanation) -> list[str]:
@@ -75,7 +82,7 @@ def _crossing(item: AlarmExplanation) -> list[str]:
 
 
 def _miss(item: MissExplanation) -> str:
-    at = f"contact at {item.contact.start:.3f} s ({item.contact.found_by})"
+    at = f"contact at {item.contact.start:.3f} s ({item.contact.found_by}{_unseen(item.contact)})"
     if item.outcome == "not_assessable":
         return f"{at} not assessable: {item.reason}"
     return f"{at} missed: no alarm in the {1e3 * item.watched:.0f} ms that were watched"
