@@ -21,6 +21,8 @@ _STUCK = 5
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
 # recording's top speed the axis stands still.
 _BEFORE = 0.1
+# A cell that ends so much earlier than its log [s] while it still presses has not seen the rest of the contact.
+_TAIL = 0.1
 _STANDSTILL = 0.05
 
 
@@ -144,7 +146,7 @@ def force_course(
     known = np.isfinite(force)
     if not known.any():
         raise RecordingError(f"{recording.name}: no acceleration after the onset", "set mass_before_cell to 0")
-    end = min(float(recording["force"].time[-1]), until) - contact.start
+    end = min(_end(recording, contact, whole), until) - contact.start
     earlier = whole[whole < contact.start]
     return ForceCourse(
         time[known] - contact.start,
@@ -169,6 +171,13 @@ def force_at(course: ForceCourse, time: float) -> float:
 def _present(series: Series) -> tuple[FloatArray, FloatArray]:
     present = np.isfinite(series.values[:, 0])
     return series.time[present], series.values[present, 0]
+
+
+def _end(recording: Recording, contact: Contact, whole: FloatArray) -> float:
+    """Until when there should be samples [s]: the cell's last one, or the log's, where the cell ends in the contact."""
+    last = float(recording["force"].time[-1])
+    pressing = contact.end >= float(whole[-1]) - longest_step(whole)
+    return recording.end if pressing and recording.end - last > _TAIL else last
 
 
 def _period(time: FloatArray) -> float:

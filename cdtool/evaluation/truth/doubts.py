@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.plain_text import digits
 from cdtool.recording import Contact, Finding, FloatArray, Recording, Series
@@ -31,12 +32,28 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
         return []
     found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]
     found += [item for item in [_not_back(recording["force"], contacts, rule)] if item]
+    found += [item for item in [_begins_late(recording, contacts, rule)] if item]
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
         name = f" of {joint}" if len(recording.joints) > 1 else ""
         text = f"follows the torque{name} without lag (r = {r:.3f}): not an independent truth, if it is made from it"
         found.append(Finding(text, "force"))
     return found
+
+
+def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
+    """A warning where the load cell's record begins later than the log, shortly before its first contact."""
+    force = recording["force"]
+    if not contacts or contacts[0].found_by != "load cell" or contacts[0].in_progress or contacts[0].hole:
+        return None
+    begins, onset = float(force.time[0]), contacts[0].start
+    if begins - recording.start <= longest_step(force.time) or onset - begins > rule.separation:
+        return None
+    return Finding(
+        f"begins at {begins:.3f} s, {1e3 * (onset - begins):.0f} ms before the contact at {onset:.3f} s: if that is the "
+        "rebound of an earlier one, its latency is longer",
+        "force",
+    )
 
 
 def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.evaluation.truth.missing_samples import longest_step, time_to_shoulder
+from cdtool.evaluation.truth.missing_samples import batch_length, longest_step, time_to_shoulder
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import INTERVAL, IntArray, RestLine, RunningRest
 from cdtool.recording import Contact, FloatArray, Series
@@ -46,18 +46,15 @@ def reading_step(force: FloatArray) -> float:
     return float(distances.min()) if len(distances) else 0.0
 
 
-def load_cell_contacts(
-    series: Series, rule: OnsetRule, steps: float = 0.0, log_begins: float = np.inf
-) -> list[Contact]:
+def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
     """The contacts that a load cell feels, in order of time; missing samples are skipped.
 
-    Where the level comes from the noise it is at least `steps` of the cell's steps. `log_begins` [s]: when the first
-    sample of any channel was taken, where that is known.
+    Where the level comes from the noise it is at least `steps` of the cell's steps.
     """
     present = np.isfinite(series.values[:, 0])
     if np.count_nonzero(present) < 3:
         return []
-    since = min(log_begins, float(series.time[0]))
+    since = float(series.time[0])
     return _Search(series.time[present], series.values[present, 0], rule, steps, since).contacts()
 
 
@@ -82,7 +79,7 @@ class _Search:
     def __init__(self, time: FloatArray, force: FloatArray, rule: OnsetRule, steps: float, since: float) -> None:
         self.time, self.force, self.rule, self.since = time, force, rule, since
         self.period = float(np.median(np.diff(time)))
-        self.longest_step = longest_step(time)
+        self.longest_step, self.batch = longest_step(time), batch_length(time)
         self.rest = RunningRest(time, force)
         step = reading_step(force)
         self.noise = max(self.rest.noise, _ROUNDING * step)
@@ -194,7 +191,7 @@ class _Search:
         finely = self._time_for(rise, self.noise) + self._time_for(rise, drifted)
         level = float(line.value(self.time[onset : onset + 1])[0])
         hole, since_hole = self._hole(rise, over[: last - onset + 1])
-        interval = max(interval, since_hole)
+        interval = max(interval, since_hole, self.batch)
         contact = Contact(
             start=start,
             end=float(self.time[last]),

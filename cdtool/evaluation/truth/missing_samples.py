@@ -16,6 +16,7 @@ CLOSE_ENOUGH = 5e-3
 # A step longer than so many periods is no jitter of a regular clock: the force in it is not simply what is beside it.
 PERIODS = 1.5
 _ONE_LOST, _USUAL, _MORE = 2.5, 0.95, 1.1
+_BATCH = 5.0
 
 
 def longest_step(time: FloatArray) -> float:
@@ -25,6 +26,18 @@ def longest_step(time: FloatArray) -> float:
     steps = np.diff(time)
     period = float(np.median(steps))
     return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * float(np.quantile(steps, _USUAL)))
+
+
+def batch_length(time: FloatArray) -> float:
+    """How far a stamp may be behind its sample, where samples come in batches that are stamped together [s]; else 0.
+
+    In batches the step that one in 20 exceeds is many times the usual one.
+    """
+    if len(time) < 2:
+        return 0.0
+    steps = np.diff(time)
+    long = float(np.quantile(steps, _USUAL))
+    return long if long > _BATCH * float(np.median(steps)) else 0.0
 
 
 def time_to_shoulder(time: FloatArray, force: FloatArray, period: float) -> float:

@@ -21,7 +21,7 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     A load cell's level from the noise is at least `steps` of the steps in which it reads.
     """
     if "force" in recording:
-        return load_cell_contacts(recording["force"], rule, steps, recording.start)
+        return load_cell_contacts(recording["force"], rule, steps)
     if "label" in recording:
         return _from_label(recording)
     if "event" in recording:

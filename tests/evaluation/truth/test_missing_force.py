@@ -9,6 +9,7 @@ from cdtool.detection import Alarm, Signal, Status, Verdict
 from cdtool.evaluation.force.course import force_course
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.matching import match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
@@ -129,11 +130,34 @@ def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
     assert "onset" in verdict.steps[1].reason
 
 
-def test_a_cell_that_begins_shortly_before_the_contact_does_not_know_the_onset():
+def test_a_cell_that_begins_shortly_before_the_contact_is_warned_of_and_one_that_was_masked_there_is_a_hole():
     lost = TIME < ONSET + 0.3
     force = bump(TIME) + np.where(TIME > ONSET + 0.3, bump(TIME, 400.0, ONSET + 0.6), 0.0)
     cell = Series(TIME[~lost], force[~lost], "N")
     one = Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
     (contact,) = find_contacts(one, RULE)
+    assert contact.hole == 0.0
+    (warning,) = truth_findings(one, [contact], RULE)
+    assert "begins at 5.300 s, " in warning.message and "rebound of an earlier one" in warning.message
+    masked = Recording("a", "a.csv", ("x",), {"force": Series(TIME, np.where(lost, np.nan, force), "N")})
+    (contact,) = find_contacts(masked, RULE)
     assert contact.hole > 1.0
     assert matched([contact], contact.start + 0.02)[0].outcome == "not_assessable"
+
+
+def test_samples_that_are_stamped_in_batches_have_onsets_no_finer_than_a_batch():
+    number = np.arange(len(TIME))
+    batched = (number // 10 + 1) * 1e-2 - (9 - number % 10) * 2e-6
+    one = Recording("a", "a.csv", ("x",), {"force": Series(batched, bump(TIME), "N")})
+    (contact,) = find_contacts(one, RULE)
+    assert contact.start - contact.uncertainty <= ONSET + 1e-3 and contact.resolution >= 9e-3
+
+
+def test_a_cell_that_ends_in_the_contact_while_the_log_goes_on_gives_no_pass():
+    for end, outcome in ((ONSET + 0.05, "not_assessable"), (ONSET + 0.25, "pass")):
+        kept = TIME < end
+        cell = Series(TIME[kept], bump(TIME)[kept], "N")
+        one = Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
+        (contact,) = find_contacts(one, RULE)
+        single = ForceProfile("s", "s", "own", True, (ForceStep(0.0, 9000.0, "all"),))
+        assert judge(force_course(one, contact), single).outcome == outcome
