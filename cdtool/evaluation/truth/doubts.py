@@ -50,8 +50,8 @@ def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     if begins - recording.start <= longest_step(force.time) or onset - begins > rule.separation:
         return None
     return Finding(
-        f"begins at {begins:.3f} s, {1e3 * (onset - begins):.0f} ms before the contact at {onset:.3f} s: if that is the "
-        "rebound of an earlier one, its latency is longer",
+        f"begins at {begins:.3f} s, {1e3 * (onset - begins):.0f} ms before the contact at {onset:.3f} s: if that is "
+        "the rebound of an earlier one, its latency is longer",
         "force",
     )
 
