@@ -58,6 +58,16 @@ def counted(count: float, thing: str, verb: str = "") -> str:
     return " ".join([digits(count), thing, *([_SINGULAR.get(first, f"{first}s"), *rest] if first else [])])
 
 
+def ordinal(number: int) -> str:
+    """Return "2nd", "3rd", "11th" or "21st".
+
+    >>> [ordinal(number) for number in (1, 2, 3, 4, 11, 12, 22)]
+    ['1st', '2nd', '3rd', '4th', '11th', '12th', '22nd']
+    """
+    ending = "th" if 10 <= number % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"
+
+
 def first_of(names: Sequence[str], most: int = 3) -> str:
     """Return the first names of a list, and how many more there are.
 

@@ -17,7 +17,7 @@ Outcome = float | str
 """A latency [ms], or what else became of the contact."""
 
 RULES = {
-    "onset": "load cell above 20 N for 3 samples, followed back to 8 N",
+    "onset": "load cell above 20 N for 3 ms, followed back to 8 N",
     "label_file": None,
     "synchronisation_s": 0.0,
     "window_s": {"stiff": 1.0, "soft": 1.0},

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cdtool.cli.column_blocks import GAP, ColumnWidth, blocks, column_width
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140
 _NARROWEST, _WIDEST = 60, 100
+_PIPE = 160
 
 
 def print_error(fault: CdtoolError) -> None:
@@ -116,23 +118,49 @@ def columns_to_fill() -> int:
 
 
 def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], title: str = "") -> None:
-    """Print a table: columns as (heading, "left" or "right"); cells are plain text; an empty column is left out."""
+    """Print a table: columns as (heading, "left" or "right"); cells are plain text; an empty column is left out.
+
+    The left columns at the beginning name a row. What does not fit the terminal follows below, named again.
+    """
     from rich.console import Console
     from rich.table import Table as RichTable
     from rich.text import Text
 
     kept = [i for i in range(len(columns)) if not rows or any(str(row[i]) for row in rows)]
-    made: Table = RichTable(
-        box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, 2, 0, 0)
+    shown = [columns[i] for i in kept]
+    cells = [[plain(row[i]) for i in kept] for row in rows]
+    first = next((i for i, (_, side) in enumerate(shown) if side == "right"), len(shown))
+    widths = [
+        column_width(heading, side, [row[i] for row in cells], i < first) for i, (heading, side) in enumerate(shown)
+    ]
+    # A pipe or a log file has no width: nothing is folded or moved there.
+    is_terminal = sys.stdout.isatty()
+    width = (
+        max(shutil.get_terminal_size().columns, _NARROWEST)
+        if is_terminal
+        else max(_PIPE, sum(item.needed + GAP for item in widths))
     )
-    for i in kept:
-        heading, side = columns[i]
-        made.add_column(heading, justify="right" if side == "right" else "left", overflow="fold")
-    for row in rows:
-        made.add_row(*(Text(plain(row[i])) for i in kept))
-    # A pipe or a log file has no width: long names must not be folded there.
-    width = None if sys.stdout.isatty() else 160
-    Console(width=width, highlight=False).print(made)
+    for number, block in enumerate(blocks(widths, width)):
+        made: Table = RichTable(
+            box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, GAP, 0, 0)
+        )
+        fits = sum(widths[i].needed + GAP for i in block) <= width
+        for i in block:
+            heading, side = shown[i]
+            is_right = side == "right"
+            made.add_column(
+                heading, justify="right" if is_right else "left", overflow="fold", no_wrap=fits and _stays(widths[i])
+            )
+        for row in cells:
+            made.add_row(*(Text(row[i]) for i in block))
+        if number:
+            typer.echo()
+        Console(width=width, highlight=False).print(made)
+
+
+def _stays(column: ColumnWidth) -> bool:
+    """Whether a column is never wrapped: what it needs is its whole width."""
+    return column.needed == column.natural
 
 
 def number(value: float | None, digits: int = 3) -> str:

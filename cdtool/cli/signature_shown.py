@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.cli.console import number, plain, table
-from cdtool.plain_text import counted
+from cdtool.cli.console import number, plain, say, table
+from cdtool.plain_text import counted, ordinal
 
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
     from cdtool.evaluation.upkeep.coverage import Coverage
-    from cdtool.evaluation.upkeep.summary import SignatureSummary
+    from cdtool.evaluation.upkeep.summary import JointSummary, SignatureSummary
     from cdtool.signature_file import SignatureFile
     from cdtool.workflows.upkeep import Checked, CheckedClass
 
@@ -29,9 +29,9 @@ def show_file(stored: SignatureFile) -> None:
 
     gains = ", ".join(f"{name} {value}" for name, value in stored.gains.items()) or "none"
     typer.echo(f"machine: {plain(stored.machine)}")
-    typer.echo(f"detector: {plain(stored.detector)}, gains: {plain(gains)}; unit {plain(stored.unit)}")
+    say(f"detector: {stored.detector}, gains: {gains}; unit {stored.unit}")
     settings = "".join(f"; {name} {value}" for name, value in stored.settings.items())
-    typer.echo(f"threshold: {plain(stored.described)}{plain(settings)}")
+    say(f"threshold: {stored.described}{settings}")
     typer.echo(f"activation: {_activation(stored)}")
     typer.echo(f"joints: {plain(', '.join(stored.joints))}")
     typer.echo(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
@@ -41,7 +41,7 @@ def show_file(stored: SignatureFile) -> None:
             continue
         item = summarise_signature(current, first)
         for joint in item.joints:
-            moved = f"{joint.moved:.2f} at {joint.moved_at:.2f} of {joint.moved_along}" if joint.moved > 0.0 else "not"
+            moved = f"{joint.moved:.2f} {_moved_at(item, joint)}" if joint.moved > 0.0 else "not"
             stroke = f"{item.travel[0]:.2f} to {item.travel[1]:.2f}"
             grown = f"{item.runs}" if item.runs == item.first_runs else f"{item.runs} (first {item.first_runs})"
             rows.append(
@@ -51,6 +51,11 @@ def show_file(stored: SignatureFile) -> None:
         columns = [("class", "left"), ("joint", "left"), ("effective\nruns", "right"), ("sides", "left")]
         columns += [("limits from\nto, travel", "right"), (f"spread\n{stored.unit}", "right")]
         table([*columns, ("limits moved since\nfirst learned, spreads", "right")], rows)
+
+
+def _moved_at(item: SignatureSummary, joint: JointSummary) -> str:
+    unit = item.motion.unit.removesuffix("/s") if joint.moved_along == "travel" else "s"
+    return f"at {joint.moved_at:.2f}{f' {unit}' if unit else ''} of {joint.moved_along}"
 
 
 def _activation(stored: SignatureFile) -> str:
@@ -101,30 +106,33 @@ def show_class(item: CheckedClass) -> None:
         _show_coverage(item.coverage)
     if item.drift:
         _show_drift(item.drift)
-    for joint in summarise_signature(item.signature, item.first).joints:
+    found = summarise_signature(item.signature, item.first)
+    for joint in found.joints:
         if joint.moved > 0.0:
-            moved = f"{joint.moved:.2f} spreads at {joint.moved_at:.2f} of {joint.moved_along}"
+            moved = f"{joint.moved:.2f} spreads, {_moved_at(found, joint)}"
             typer.echo(f"since first learned: the limit of {plain(joint.joint)} moved by up to {moved}")
-    typer.echo(f"advice: {item.advice}")
+    say(f"advice: {item.advice}")
 
 
 def _show_coverage(found: Coverage) -> None:
     factors = [run.critical_factor for run in found.runs if math.isfinite(run.critical_factor)]
-    nearest = f", the nearest at {100.0 * max(factors) / found.safety_factor:.0f} % of its limit" if factors else ""
-    judged = f"{counted(len(found.runs), 'run')}, each judged by the others: {found.alarms} with an alarm{nearest}"
+    share = 100.0 * max(factors) / found.safety_factor if factors else 0.0
+    nearest = f"; the nearest run reaches {share:.0f} % of its limit" if factors else ""
+    runs = f"{counted(len(found.runs), 'run')}, each judged by a signature of the others"
+    judged = f"{runs}: {counted(found.alarms, 'alarm')}{nearest}"
     typer.echo(f"coverage: {judged}")
-    typer.echo(f"  {plain(found.verdict)}")
+    say(found.verdict, indent="  ")
     for gap in found.gaps[:_SHOWN]:
-        typer.echo(f"  no limit: {plain(gap.joint)}, {plain(gap.described)}")
+        say(f"no limit for {gap.joint} {gap.described}", indent="  ")
     if len(found.gaps) > _SHOWN:
         typer.echo(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
 
 
 def _show_drift(found: DriftAudit) -> None:
     for joint in found.joints:
-        typer.echo(f"season: {counted(len(joint.runs), 'run')}, {plain(joint.joint)}")
+        typer.echo(f"season of {counted(len(joint.runs), 'run')}, {plain(joint.joint)}:")
         for verdict in joint.verdicts:
-            typer.echo(f"  {plain(verdict)}")
+            say(verdict, indent="  ")
         step = max(1, math.ceil(len(joint.runs) / _SHOWN))
         rows = [
             (
@@ -137,10 +145,15 @@ def _show_drift(found: DriftAudit) -> None:
             )
             for run in joint.runs[::-step][::-1]
         ]
-        columns = [("run", "left"), ("overall\nspreads", "right"), ("largest\nplace", "right"), ("at", "right")]
-        table([*columns, ("of its\nlimit %", "right"), ("", "left")], rows)
+        columns = [
+            ("run", "left"),
+            ("overall\nspreads", "right"),
+            ("largest\nlocal", "right"),
+            (f"at\n{found.unit}", "right"),
+        ]
+        table([*columns, ("of limit\n%", "right"), ("", "left")], rows)
         if step > 1:
-            typer.echo(f"every {step}th run is shown (--json has all)")
+            typer.echo(f"every {ordinal(step)} run is shown (--json has all)")
     for name, reason in found.not_assessable:
         typer.echo(f"  not assessable: {plain(name)}: {plain(reason)}")
 

@@ -133,5 +133,5 @@ def _report(output: Path, written: int, counts: Mapping[str, int], seed: int, as
     recordings, why_not = counted(written, "recording"), without_benchmark(counts)
     files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
     typer.echo(f"{recordings}, {files} and contacts.csv written to {plain(output)}")
-    if why_not:
+    if why_not and set(counts) > {"free"}:  # a season holds nothing to score
         typer.echo(f"no benchmark.toml: {why_not}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, Literal, Protocol, TypeVar
@@ -144,6 +144,12 @@ def _benchmark_toml(planned: list[_Planned], bench: Bench[AnyRun]) -> str:
     for group in GROUPS:
         if any(item.group == group for item in planned):
             lines += ["", titles.get(group, f"[impacts.{group}]"), f"logs = [{logs(group)}]"]
-    if sum(item.group == "free" for item in planned) < _ENOUGH_RUNS:
-        lines += ["", "[signature]", f"force = true                    # fewer than {_ENOUGH_RUNS} runs to learn from"]
-    return "\n".join([*lines, "", *bench.rules, ""])
+    few = sum(item.group == "free" for item in planned) < _ENOUGH_RUNS
+    return "\n".join([*lines, "", *(_forced(bench.rules) if few else bench.rules), ""])
+
+
+def _forced(rules: Sequence[str]) -> list[str]:
+    """Rules by which a signature is learned from few runs."""
+    force = f"force = true                    # fewer than {_ENOUGH_RUNS} runs to learn from"
+    at = next((i for i, line in enumerate(rules, 1) if line.startswith("[signature]")), 0)
+    return [*rules[:at], force, *rules[at:]] if at else [*rules, "", "[signature]", force]

@@ -39,7 +39,7 @@ def written(tmp_path: Path) -> Written:
 @pytest.mark.parametrize(
     ("new", "status", "last"),
     [
-        (OLD, 0, "no change shown (of 4 questions at a level of 0.05 for all together)"),
+        (OLD, 0, "no change shown: both files hold the same results"),
         (SLOWER, 1, "worse: 2 worse of 4 questions at a level of 0.05 for all together"),
         (FASTER, 0, "better: 2 better of 4 questions at a level of 0.05 for all together"),
         (MIXED, 1, "mixed: 2 worse and 2 better of 4 questions at a level of 0.05 for all together"),

@@ -63,7 +63,7 @@ def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
 def test_runs_that_were_learned_from_are_judged_by_the_others(signature, gate_folder):
     done = check(signature, gate_folder, *logs_of(gate_folder))
     assert done.status == 0, done.err
-    assert "11 runs, each judged by the others: 0 with an alarm" in done.out and "advice: " in done.out
+    assert "11 runs, each judged by a signature of the others: 0 alarms" in done.out and "advice: " in done.out
     values = json.loads(check(signature, gate_folder, *logs_of(gate_folder), "--json").out)
     coverage = values["classes"][0]["coverage"]
     assert len(coverage["runs"]) == 11 and 0.0 < coverage["chance"] < 0.2
@@ -85,7 +85,7 @@ def test_a_quiet_season_shows_no_drift_and_another_says_what_and_where(signature
     assert quiet.status == 0 and "no drift shown" in quiet.out, quiet.out + quiet.err
     picture = tmp_path / "drift.png"
     friction = check(signature, gate_folder, *logs_of(seasons / "friction"), "--plot", picture)
-    assert "no drift shown" not in friction.out and "spreads a run" in friction.out and picture.exists()
+    assert "no drift shown" not in friction.out and "spreads per run" in friction.out and picture.exists()
     stone = check(signature, gate_folder, *logs_of(seasons / "stone"))
     assert "no drift shown" not in stone.out and "inspect" in stone.out, stone.out
 

@@ -7,14 +7,14 @@ import pytest
 from tests.command import cdtool
 
 
-def _simulated(folder, free, holdout, stiff):
+def _simulated(folder, free, holdout, stiff, machine="gate"):
     counts = ("--free", free, "--holdout", holdout, "--stiff", stiff, "--soft", 0)
-    done = cdtool("simulate", "gate", *counts, "--seed", 5, "-o", folder)
+    done = cdtool("simulate", machine, *counts, "--seed", 5, "-o", folder)
     assert done.status == 0, done.err
     return done.out
 
 
-@pytest.mark.parametrize("counts", [(2, 0, 1), (2, 1, 0), (10, 0, 1)])
+@pytest.mark.parametrize("counts", [(2, 0, 1), (2, 1, 0), (10, 0, 1), (2, 0, 1, "arm")])
 def test_what_is_written_can_be_run(tmp_path, counts):
     assert "benchmark.toml" in _simulated(tmp_path / "gate", *counts).splitlines()[0]
     done = cdtool("benchmark", tmp_path / "gate" / "benchmark.toml", "--detectors", "pt")

@@ -92,12 +92,12 @@ def test_the_machine_file_describes_the_simulated_arm(folder: Path) -> None:
 
 @pytest.mark.parametrize(("trial", "watched"), [(1, "arm"), (2, "forearm")])
 def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: Trial, watched: str) -> None:
-    write_arm_recordings(tmp_path / "logs", {"free": 1, "soft": 1}, seed=6, trial=trial)
+    write_arm_recordings(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
     values = tomllib.loads((tmp_path / "logs" / "benchmark.toml").read_text())
     assert values["joints"] == [watched]
     assert values["learn"]["logs"] == ["free/*.csv"]
     assert list(values["impacts"]) == ["soft"]
-    assert values["signature"] == {"position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
+    assert values["signature"] == {"force": True, "position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
     assert values["activation"] == {"debounce": 7}
     assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
 
@@ -133,7 +133,7 @@ def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> N
     counts = ("--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0)
     assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
     names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
-    assert len(names) == 4
+    assert len(names) == 3
     for name in names:
         assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "line" / name).read_bytes()
 

@@ -47,7 +47,8 @@ def test_the_sample_logs_are_what_their_command_gives(folder: str, tmp_path: Pat
     whole = ("benchmark.toml",) if FOLDERS[folder] == GROUPS else ()
     for name in ("machine.toml", *whole):
         assert (made / name).read_text(encoding="utf-8") == (kept / name).read_text(encoding="utf-8")
-    lines = (made / "benchmark.toml").read_text(encoding="utf-8").splitlines()
+    # Without the runs to learn from there is none.
+    lines = (made / "benchmark.toml").read_text(encoding="utf-8").splitlines() if "free" in FOLDERS[folder] else []
     assert set(lines) <= set((kept / "benchmark.toml").read_text(encoding="utf-8").splitlines())
     new, old = contacts_of(made), contacts_of(kept)
     assert list(new) == [name for name in old if name.split("/")[0] in FOLDERS[folder]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cdtool.evaluation.statistics.trends import LEAST_RUNS
 from cdtool.evaluation.upkeep.audit import DriftAudit
 from cdtool.evaluation.upkeep.coverage import Coverage
 from cdtool.evaluation.upkeep.words import place_of
@@ -10,9 +11,10 @@ from cdtool.evaluation.upkeep.words import place_of
 def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
     """What to do, in a line, the most urgent first.
 
-    A place that grows comes before everything: learned anew, an obstruction would be normal. Then drift of the whole
-    stroke; too few runs are told where neither is, since what is learned anew is checked anew. Alarms without a drift
-    are left to `cdtool explain`.
+    Resistance that grows at a place comes before everything: relearned, an obstruction would be normal. Then drift of
+    the whole stroke; too few runs are reported where neither is shown, since a relearned signature is checked again.
+    Alarms without a drift are left to `cdtool explain`. A season that is too short to show a drift is no reason to
+    keep a signature.
     """
     if coverage is None and drift is None:
         return "nothing could be judged"
@@ -20,11 +22,13 @@ def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
     if drift is not None:
         steps += _inspect(drift)
         if any(item.overall and (item.overall.outward or not item.two_sided) for item in drift.joints):
-            steps.append("learn anew from the latest runs" if not steps else "then learn anew")
+            steps.append("relearn from the latest runs" if not steps else "then relearn")
         elif drift.alarms and not steps:
-            steps.append("look at the alarms with cdtool explain: they are no drift")
+            steps.append("look at the alarms with cdtool explain: no drift is shown")
     if coverage is not None and not coverage.enough and (drift is None or not drift.drifts):
         steps.append(_more(coverage))
+    if not steps and coverage is None and drift is not None and not any(item.course.trend for item in drift.joints):
+        return f"none from so few runs: give at least {LEAST_RUNS} new ones, or those that it was learned from"
     return "; ".join(steps) if steps else "keep the signature"
 
 

@@ -72,18 +72,17 @@ class Coverage:
         """The answer in a line."""
         if math.isnan(self.chance):
             return (
-                f"{counted(len(self.runs), 'run')} could be judged: too few to predict from, {LEAST_VALUES} are needed"
+                f"{counted(len(self.runs), 'run')} could be judged: too few to predict from; {LEAST_VALUES} are needed"
             )
-        expected = f"the next impact-free operation alarms with a chance of {_chance(self.chance)}"
+        allowed = f"at most {_chance(self.target)} is allowed"
+        expected = f"the chance of a false alarm in the next operation is {_chance(self.chance)}; {allowed}"
         if self.enough:
-            return f"enough: {expected}, {_chance(self.target)} is allowed"
+            return f"enough runs: {expected}"
         raised = f"raise the safety factor to {_raised(self.factor_needed)}"
         if self.more_runs is None:
-            more = "more runs like these would not do"
-            return f"{more}: {expected}, {_chance(self.target)} is allowed; {raised}, or add runs and check again"
-        return (
-            f"needs {counted(self.more_runs, 'more run')}, or {raised}: {expected}, {_chance(self.target)} is allowed"
-        )
+            more = "more runs like these would not suffice"
+            return f"{more}: {expected}; {raised}, or add runs and check again"
+        return f"needs {counted(self.more_runs, 'more run')}, or {raised}: {expected}"
 
 
 def check_coverage(

@@ -16,7 +16,7 @@ from cdtool.thresholds.signature_curve import COVERAGE
 
 @dataclass(frozen=True)
 class NoLimit:
-    """A part of the stroke without a limit for a joint, from `start` to `end` in m or rad of travel, or s.
+    """A part of the stroke without a limit for a joint, from `start` to `end` in m or rad (`unit`) of travel, or s.
 
     `share`: no place in it was reached with a valid signal by more of the runs; 80 % are needed.
     """
@@ -26,13 +26,16 @@ class NoLimit:
     start: float
     end: float
     share: float
+    unit: str = ""
 
     @property
     def described(self) -> str:
         """Where and why."""
-        where = f"{self.start:.3f} to {self.end:.3f}"
-        place = f"{where} of the travel" if self.axis == "travel" else f"{where} s after the motion began"
-        return f"{place}: valid in at most {100.0 * self.share:.0f} % of the runs, {100.0 * COVERAGE:.0f} % are needed"
+        at = self.start == self.end
+        where = f"at {self.start:.3f}" if at else f"from {self.start:.3f} to {self.end:.3f}"
+        unit = f" {self.unit}" if self.unit else ""
+        place = f"{where}{unit} of travel" if self.axis == "travel" else f"{where} s after the motion began"
+        return f"{place}: valid in at most {100.0 * self.share:.0f} % of the runs; {100.0 * COVERAGE:.0f} % are needed"
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,8 @@ def _gaps(signature: FittedSignature, axis: Axis, joint: int, span: tuple[float,
     lacking = (count < curve.enough) & (grid >= span[0]) & (grid <= span[1])
     edges = np.flatnonzero(np.diff(np.concatenate(([False], lacking, [False]))))
     most = max(float(curve.count.max(initial=0.0)), 1.0)
+    unit = signature.motion.unit.removesuffix("/s") if axis == "travel" else "s"
     return [
-        NoLimit(signature.joints[joint], axis, float(grid[a]), float(grid[b - 1]), float(count[a:b].max()) / most)
+        NoLimit(signature.joints[joint], axis, float(grid[a]), float(grid[b - 1]), float(count[a:b].max()) / most, unit)
         for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     ]

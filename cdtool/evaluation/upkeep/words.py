@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import JointDrift, Shown
 
 NOTHING_SHOWN = "no drift shown"
-_INSPECT = "inspect the machine there BEFORE learning anew"
+_INSPECT = "inspect the machine there before relearning"
 # A slope that uses the margin up in more runs than this is as good as none.
 _MANY = 100_000
 
@@ -23,10 +23,10 @@ def verdicts(item: JointDrift) -> tuple[str, ...]:
     lines = [_alarms(item)] if any(run.alarm for run in item.runs) else []
     if item.course.trend is None:
         many = counted(item.course.n, "run")
-        return (*lines, f"{many}: too few to show a drift, at least {LEAST_RUNS} are needed")
+        return (*lines, f"{many}: too few to show a drift; at least {LEAST_RUNS} are needed")
     lines += [_local(shown, item) if shown.place is not None else _overall(shown, item) for shown in item.shown]
     if not item.shown:
-        lines.append(f"{NOTHING_SHOWN}: {_slope(item.course.trend.slope)}")
+        lines.append(f"{NOTHING_SHOWN} at a level of 1 %: {_slope(item.course.trend.slope)}")
     return tuple(lines)
 
 
@@ -37,23 +37,21 @@ def place_of(place: float, axis: str, unit: str) -> str:
 
 def _alarms(item: JointDrift) -> str:
     alarmed = [(i, run.name) for i, run in enumerate(item.runs, 1) if run.alarm]
-    verb = "alarms" if len(alarmed) == 1 else "alarm"
-    return (
-        f"{len(alarmed)} of {counted(len(item.runs), 'run')} {verb}, the first is run {alarmed[0][0]} ({alarmed[0][1]})"
-    )
+    number, name = alarmed[0]
+    return f"an alarm in {len(alarmed)} of {counted(len(item.runs), 'run')}, first in run {number} ({name})"
 
 
 def _overall(shown: Shown, item: JointDrift) -> str:
     if shown.course.kind == "step":
-        return f"{_step(shown, item)}: if something was changed then, learn anew from the runs since"
+        return f"{_step(shown, item)}: if something was changed then, relearn from the runs since"
     trend = shown.course.trend
     if trend is None:
         return NOTHING_SHOWN
     if shown.outward:
-        return f"drifts {_slope(trend.slope)}: {_left(shown.runs_left)}: learn anew"
+        return f"drifts by {_slope(trend.slope)}; {_left(shown.runs_left)}: relearn"
     if item.two_sided:
-        return f"drifts back to the middle of the band, {_slope(trend.slope)}"
-    return f"drifts away from the limit, {_slope(trend.slope)}: contacts are noticed later: learn anew"
+        return f"drifts back towards the middle of the band by {_slope(trend.slope)}"
+    return f"drifts away from the limit by {_slope(trend.slope)}; contacts are detected later: relearn"
 
 
 def _local(shown: Shown, item: JointDrift) -> str:
@@ -64,8 +62,8 @@ def _local(shown: Shown, item: JointDrift) -> str:
     if trend is None:
         return NOTHING_SHOWN
     if shown.outward:
-        return f"grows {place}, {_slope(trend.slope)}: {_left(shown.runs_left)}: {_INSPECT}"
-    return f"changes {place}, {_slope(trend.slope)}: {_INSPECT}"
+        return f"grows {place} by {_slope(trend.slope)}; {_left(shown.runs_left)}: {_INSPECT}"
+    return f"changes {place} by {_slope(trend.slope)}: {_INSPECT}"
 
 
 def _step(shown: Shown, item: JointDrift) -> str:
@@ -80,15 +78,16 @@ def _slope(slope: Interval) -> str:
     largest = max(abs(slope.value), abs(slope.low), abs(slope.high), 1e-9)
     decimals = max(1 - math.floor(math.log10(largest)), 0)
     value, low, high = (f"{x:z.{decimals}f}" for x in (slope.value, slope.low, slope.high))
-    return f"{float(value):+.{decimals}f} spreads a run ({low} to {high})"
+    return f"{float(value):+.{decimals}f} spreads per run (95 %: {low} to {high})"
 
 
 def _left(runs: Interval) -> str:
     if runs.value < 1.0:
         return "the margin is used up"
     if not runs.value < _MANY:
-        return f"used up in more than {_MANY} runs"
-    return f"used up in about {counted(_rounded(runs.value), 'run')} ({_count(runs.low)} to {_count(runs.high)})"
+        return f"the margin is used up in more than {_MANY} runs"
+    about = counted(_rounded(runs.value), "run")
+    return f"the margin is used up in about {about} ({_count(runs.low)} to {_count(runs.high)})"
 
 
 def _count(runs: float) -> str:

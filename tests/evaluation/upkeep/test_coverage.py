@@ -79,7 +79,10 @@ def test_the_verdict_says_how_many_runs_or_which_factor():
     assert "a chance of 1 in 100, 1 in 1000 is allowed" in coverage().verdict
     assert coverage(runs_needed=15).verdict.startswith("needs 1 more run, ")
     hopeless = coverage(runs_needed=None, chance=0.4)
-    assert hopeless.verdict.startswith("more runs like these would not do: ") and "a chance of 40 %" in hopeless.verdict
+    assert (
+        hopeless.verdict.startswith("more runs like these would not suffice: ")
+        and "operation is 40 %" in hopeless.verdict
+    )
     assert coverage(chance=1e-9).verdict.endswith("1 in 1000 is allowed")
     assert "less than 1 in a million" in coverage(chance=1e-9).verdict
     assert "14 runs could be judged: too few" in coverage(chance=math.nan).verdict
@@ -95,7 +98,7 @@ def test_a_part_without_a_limit_is_told_with_its_place_and_the_share_of_runs():
     # The first sample behind it stands for the last two grid points before it.
     assert gap.start == pytest.approx(travel[2400] - travel[402], abs=0.003)
     assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
-    assert "valid in at most 64 % of the runs, 80 % are needed" in gap.described
+    assert "valid in at most 64 % of the runs; 80 % are needed" in gap.described
     assert not others
 
 

@@ -37,7 +37,7 @@ def test_a_steady_season_shows_nothing():
     (joint,) = found.joints
     assert not found.drifts and not found.alarms and joint.runs_left == math.inf
     (line,) = joint.verdicts
-    assert line.startswith("no drift shown: ") and " spreads a run (" in line
+    assert line.startswith("no drift shown at a level of 1 %: ") and " spreads per run (" in line
     assert advice(None, found) == "keep the signature"
 
 
@@ -58,7 +58,7 @@ def test_a_drift_of_the_whole_stroke_is_told_with_its_slope_and_the_runs_left():
     left = joint.overall.runs_left
     assert left.low < left.value < left.high
     (line,) = joint.verdicts
-    assert line.startswith("drifts +0.0") and "used up in about" in line and line.endswith(": learn anew")
+    assert line.startswith("drifts by +0.0") and "used up in about" in line and line.endswith(": relearn")
 
 
 def test_the_runs_left_come_true():
@@ -92,7 +92,7 @@ def test_both_at_once_are_told_both_the_place_first():
     assert joint.local.place == pytest.approx(0.25, abs=0.021)
     texts = [line.split(" ")[0] for line in joint.verdicts if "alarm" not in line]
     assert texts == ["grows", "drifts"]
-    assert advice(None, found).endswith("before anything is learned; then learn anew")
+    assert advice(None, found).endswith("before anything is learned; then relearn")
 
 
 def test_a_shape_that_grows_with_the_whole_is_no_place_of_its_own():
@@ -190,7 +190,7 @@ def test_few_runs_show_nothing_and_a_run_that_cannot_be_judged_is_named():
     assert found.names == tuple(f"run{i}" for i in range(9) if i != 4)
     ((name, reason),) = found.not_assessable
     assert name == "run4" and "not applicable" in reason
-    assert "8 runs: too few to show a drift, at least 10 are needed" in found.joints[0].verdicts
+    assert "8 runs: too few to show a drift; at least 10 are needed" in found.joints[0].verdicts
     with pytest.raises(SignatureError, match=r"no run to hold against the signature.*not applicable"):
         audit_drift(FITTED, [late[4]], ACTIVATION)
 
@@ -199,5 +199,5 @@ def test_too_few_runs_are_advised_unless_it_is_learned_anew_anyway():
     wanting = check_coverage(season(12, together=2.5), Signature(sides="one", safety_factor=3.0), ACTIVATION)
     assert not wanting.enough
     assert "safety factor" in advice(wanting, None)
-    assert advice(wanting, audited(lambda number, _: 0.05 * number)) == "learn anew from the latest runs"
+    assert advice(wanting, audited(lambda number, _: 0.05 * number)) == "relearn from the latest runs"
     assert advice(check_coverage(FREE, Signature(sides="one"), ACTIVATION), None) == "keep the signature"
