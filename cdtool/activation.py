@@ -34,7 +34,7 @@ class ActivationSettings(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Activation:
-    """`debounce` samples in succession outside the band raise an alarm; `rearm` seconds inside arm it again.
+    """`debounce` consecutive samples outside the band raise an alarm; `rearm` seconds inside arm it again.
 
     A missing sample is skipped: it neither counts nor breaks the succession, so that a flaky sensor cannot hide a
     contact. A sample where the method does not apply breaks it. The alarm's time is that of the last sample counted.

@@ -75,7 +75,7 @@ def read_bytes(
     except FileNotFoundError:
         raise error(f"{path}: no such file", missing or hint) from None
     except ValueError as fault:  # a NUL, which no file's name can hold
-        raise error(f"{str(path)!r}: is no name of a file", hint) from fault
+        raise error(f"{str(path)!r}: is not a file name", hint) from fault
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
     state = os.fstat(handle)

@@ -33,7 +33,7 @@ class Kind:
                 tail = file.read(_LOOKED_AT)
         except OSError as fault:
             raise UsageError(
-                f"{plain(path)}: is there and cannot be read: {fault.strerror}", "choose another name"
+                f"{plain(path)}: already exists and cannot be read: {fault.strerror}", "choose another name"
             ) from fault
         return not head or self.mark in head or self.mark in tail or self.mark in _unpacked(head)
 
@@ -53,9 +53,7 @@ def refuse_other_kind(target: Path, kind: Kind, *, force: bool | None = None) ->
     if force or not target.is_file() or kind.is_kind_of(target):
         return
     way_out = "remove it first" if force is None else "overwrite it with --force"
-    raise UsageError(
-        f"{plain(target)}: is there already and holds no {kind.words}", f"choose another name, or {way_out}"
-    )
+    raise UsageError(f"{plain(target)}: already exists and holds no {kind.words}", f"choose another name, or {way_out}")
 
 
 def refuse_foreign_figure(target: Path, *, force: bool) -> None:

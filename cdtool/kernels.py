@@ -1,7 +1,7 @@
 """Compiled loops: numba, cached on disk, without the interpreter lock, compiled at the first call.
 
 A module with kernels can be imported without numba being loaded. Where no cache folder can be written (a read-only
-installation and a read-only home), the kernel is compiled anew in each process, and a warning says so once.
+installation and a read-only home), the kernel is recompiled in each process, and a warning says so once.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def _files(item: Kernel) -> set[str]:
 def _stamp(item: Kernel) -> str:
     import hashlib
 
-    # numba compiles a cached function anew when its own file has changed; the files of what it calls go into its name.
+    # numba recompiles a cached function when its own file has changed; the files of what it calls go into its name.
     others = sorted(_files(item) - {item.function.__code__.co_filename})
     if not others:
         return ""

@@ -1,7 +1,7 @@
 """Values that no sensor of a machine gives: fill values, wraps of integers, spikes. Masked, counted, and a loss.
 
 `IMPOSSIBLE` holds for every channel. What else is plausible is learned from impact-free runs and kept with what was
-learned of them; a log is held against that, sample by sample, and never against its own later samples. Ranges are of
+learned of them; a log is compared with that, sample by sample, and never against its own later samples. Ranges are of
 channels as they are logged, in SI, before anything is derived from them.
 """
 
@@ -89,7 +89,7 @@ class PlausibleRanges:
                 continue
             series = recording[name]
             if (series.unit, series.joint_count) != (known.unit, len(known.centre)):
-                text = f"logged in {series.unit}, learned in {known.unit}: not checked for values that no sensor gives"
+                text = f"logged in {series.unit}, learned in {known.unit}: not checked for implausible values"
                 findings.append(Finding(text, name))
                 continue
             of_channel = factors.get(name, ())
@@ -231,8 +231,8 @@ def _far_words(series: Series, j: int, wrong: BoolArray, known: ChannelRange, jo
     rows = np.flatnonzero(wrong)
     verb = "is" if len(rows) == 1 else "are"
     return (
-        f"{counted(len(rows), 'value')}{joint} {verb} none that its sensor gives (first "
-        f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual are "
+        f"{counted(len(rows), 'value')}{joint} {verb} implausible (first "
+        f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual: "
         f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}), masked"
     )
 

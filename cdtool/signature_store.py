@@ -46,7 +46,7 @@ def write_signature(path: str | Path, signature: SignatureFile) -> None:
 def check_name(file: Path) -> None:
     """Raise SignatureError where a file's name is none of a signature's: that of a recording would be lost."""
     if file.suffix.lower() != ".json":
-        raise SignatureError(f"{file}: is no name of a signature file", "let it end in .json")
+        raise SignatureError(f"{file}: is not a name for a signature file", "it must end in .json")
 
 
 def read_signature(path: str | Path) -> SignatureFile:

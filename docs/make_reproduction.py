@@ -1,4 +1,4 @@
-"""Make docs/reproduction.md's tables and figures anew: python docs/make_reproduction.py (about half a minute)
+"""Make docs/reproduction.md's tables and figures again: python docs/make_reproduction.py (about half a minute)
 
 Simulates gate and arm with one seed, runs the thesis's detectors over them, writes the tables between the markers of
 the page and the figures to docs/images. Nothing is taken from a file but the page's own text.
@@ -210,7 +210,7 @@ def write_page(parts: dict[str, str]) -> None:
 
 
 def main(say: Callable[[str], None] = print) -> None:
-    """Make everything anew."""
+    """Make everything again."""
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         say("simulating")

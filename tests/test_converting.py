@@ -156,7 +156,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path):
 def test_nothing_is_overwritten_unless_it_is_asked_for_and_never_the_log(tmp_path):
     log, machine = gate(tmp_path)
     (tmp_path / "out.csv").write_text("mine")
-    with pytest.raises(UsageError, match=r"out\.csv: is there already"):
+    with pytest.raises(UsageError, match=r"out\.csv: already exists"):
         convert(log, tmp_path / "out.csv", machine=machine)
     assert (tmp_path / "out.csv").read_text() == "mine"
     convert(log, tmp_path / "out.csv", machine=machine, force=True)

@@ -98,7 +98,7 @@ def _show(found: BuildComparison) -> None:
         for row in found.rows
     ]
     table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
-    _say("old / new; contacts: the same in both, unless two numbers stand there; n.a.: not assessable")
+    _say("old / new; contacts: the same in both, unless there are two numbers; n.a.: not assessable")
     if any(row.few for row in found.rows):
         _say(EXPLAINED)
     typer.echo()

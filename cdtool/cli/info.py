@@ -24,7 +24,7 @@ def info(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a log's channels, units, rates, duration, gaps, and everything that is odd.
+    """Show a log's channels, units, rates, duration, gaps, and warnings.
 
     Example: cdtool info sample_logs/gate/stiff/01.csv --machine sample_logs/gate/machine.toml
     """
@@ -74,7 +74,7 @@ def _show(item: Info) -> None:
         for name, text in grouped(told):
             typer.echo(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
     if not item.findings:
-        typer.echo("nothing odd found")
+        typer.echo("no warnings")
     if item.dialect:
         typer.echo("\nHow the table is written, to be pasted into a machine file:\n")
         for line in item.dialect.splitlines():

@@ -25,7 +25,7 @@ JointsOption = Annotated[
 ]
 DebounceOption = Annotated[
     int | None,
-    typer.Option("--debounce", help="Samples in succession outside the band that raise an alarm. Default: 9 ms."),
+    typer.Option("--debounce", help="Consecutive samples outside the band that raise an alarm. Default: 9 ms."),
 ]
 RearmOption = Annotated[
     float | None, typer.Option("--rearm", help="Seconds inside the band until an alarm is armed again. Default: 0.5.")

@@ -99,7 +99,7 @@ def season(
         float, typer.Option("--friction-change", help="Share by which friction changes over the season: 0.3, -0.2.")
     ] = 0.0,
     obstruction_growth: Annotated[
-        float, typer.Option("--obstruction-growth", help="Resistance that grows at one place [N a run].")
+        float, typer.Option("--obstruction-growth", help="Resistance that grows at one place [N per run].")
     ] = 0.0,
     obstruction_at: Annotated[float, typer.Option("--obstruction-at", help="That place along the travel [m].")] = 0.9,
     seed: SeedOption = 1,

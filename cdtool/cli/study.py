@@ -84,7 +84,7 @@ def figures(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw the thesis's figures of impacts anew: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
+    """Draw the thesis's figures of impacts again: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
 
     Example: cdtool study figures -o figures
     """

@@ -168,7 +168,7 @@ def _show_bounds(evaluated: Evaluated) -> None:
         if quiet:
             rate = max(item.at_most_per_operation for item in quiet)
             who = _named(quiet, items)
-            typer.echo(f"{plain(group)}: 0 false alarms ({who}) means at most {rate:.2g} an operation (95 %)")
+            typer.echo(f"{plain(group)}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
 
 
 def _named(some: Sequence[Summary], of: Sequence[Summary]) -> str:

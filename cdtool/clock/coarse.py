@@ -26,7 +26,7 @@ def line_through(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
 
     A stamp is the last tick of its clock, so that its first sample lies at most one period behind it. The times are the
     line through (index, stamp) of the first samples of the stamps so far: least squares, recursive, with the weight
-    1 - 1/100 from one change of the stamp to the next. The line begins anew where it is off by more than a stamp step
+    1 - 1/100 from one change of the stamp to the next. The line restarts where it is off by more than a stamp step
     (the median of the last 9): after a pause with its slope, else with a new one. A sample lies within a stamp step
     of the line where the stamp changes, and never more than two from its stamp: what would is not kept, its clock is
     stuck. With a clock that rounds, all times are half a stamp step late.

@@ -12,7 +12,7 @@ import numpy as np
 
 from cdtool.recording import FloatArray
 
-# A clock that counts from 1970 in one of these units stands there between the years 2001 and 2100.
+# A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
 EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # No clock counts more than this many seconds, whatever its zero: the year 0 lies 6.4e10 s back.

@@ -18,11 +18,12 @@ from cdtool.recording import BoolArray, Finding, FloatArray, Series
 GAP_PERIODS = 2.5
 # Above this share of repeated stamps the clock is coarse, not faulty.
 _COARSE_SHARE = 0.2
-# Stamps that are dropped are a loss above this share, and where so many in succession run backward: the clock restarts.
+# Stamps that are dropped are a loss above this share, and where so many consecutive ones run backward: the clock
+# restarts.
 _STRAY_SHARE, _RESTART_ROWS = 0.01, 3
 # Counters are this wide, in bits, where they wrap within a log.
 _COUNTERS = (16, 32)
-# What is told of wild stamps.
+# What is reported of wild stamps.
 FAR_OFF = "lie far off those around them"
 
 

@@ -204,7 +204,7 @@ def run_arm_filter(
         held = k
         friction[k] = d
         if not math.isfinite(d + a + v + q):
-            # Steps too long for the speed: the linearised model has run away, and begins anew.
+            # Steps too long for the speed: the linearised model has run away, and restarts.
             started = False
             friction[k] = viscous
             status[k] = 1

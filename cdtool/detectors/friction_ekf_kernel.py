@@ -90,8 +90,8 @@ def progress_of_settling(
     """How far the estimate has settled: (settled, against, forward, last_applicable) after one more sample.
 
     `settled` is the integral of the rough bandwidth over time, `gained` this step's part: ready once it reaches 3. It
-    starts anew after a stop longer than `glitch` and after a rebound, when the estimate has the wrong sign for a while;
-    fewer than 3 samples in succession of the other sign are wild ones.
+    restarts after a stop longer than `glitch` and after a rebound, when the estimate has the wrong sign for a while;
+    fewer than 3 consecutive samples of the other sign are wild ones.
     """
     if applicable:
         against = against + 1 if moves_forward != forward else 0
@@ -233,7 +233,7 @@ def run_filter(
             inverse_inertia = 1.0 / inertia[k]
         friction[k] = d
         if not math.isfinite(d + a + v):
-            # Steps too long for the speed: the linearised model has run away, and begins anew.
+            # Steps too long for the speed: the linearised model has run away, and restarts.
             started = False
             friction[k] = viscous
             status[k] = 1

@@ -24,7 +24,7 @@ class Momentum:
 
     dp/dt = tau - beta - tau_c with beta = g - C'v + friction: no acceleration and no inverse of M is needed. Needs:
     torque, speed (and position, where joints are coupled). Unit: N or N m, positive where the contact opposes positive
-    travel. Start-up 3 / K; after a gap longer than that it starts anew. Fails: friction that the machine file does not
+    travel. Start-up 3 / K; after a gap longer than that it restarts. Fails: friction that the machine file does not
     know stays in the residual; a compliant drive or clearance delays what the motor's speed can tell.
     """
 

@@ -35,7 +35,7 @@ def observe_velocity(
 
     K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
     A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
-    of the slowest mode and 0.15 s without a sample it starts anew. Fills `residual` and `status` (n, J).
+    of the slowest mode and 0.15 s without a sample it restarts. Fills `residual` and `status` (n, J).
     """
     root = np.sqrt(gains)
     known = np.flatnonzero(~motion_missing)

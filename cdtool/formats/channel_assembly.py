@@ -1,7 +1,7 @@
 """A file's columns -> channels in SI: the same for every format.
 
 Times are cleaned (clock.clean_time), values scaled; saturated and infinite ones and those that no sensor gives are
-masked; what was odd is told, all at once. Nothing is resampled.
+masked; warnings are reported, all at once. Nothing is resampled.
 """
 
 from __future__ import annotations
@@ -189,11 +189,11 @@ class Masked:
         )
 
     def findings(self, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-        """What is told of them, by joint."""
+        """The findings about them, by joint."""
         kinds: tuple[tuple[Counts, str, Literal["warning", "loss"]], ...] = (
             (self.infinite, "infinite", "loss"),
             (self.saturated, "at the sensor's limit", "warning"),
-            (self.impossible, "none that a sensor gives", "loss"),
+            (self.impossible, "outside the possible range", "loss"),
         )
         return [
             Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)

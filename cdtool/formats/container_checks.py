@@ -54,7 +54,7 @@ def check_chunks(path: Path, name: str, dataset: Any) -> None:
     packing = dataset.id.get_create_plist()
     packers = [packing.get_filter(i)[0] for i in range(packing.get_nfilters())]
     if sum(packer not in _NO_PACKERS for packer in packers) > 1:
-        raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it anew")
+        raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it again")
 
 
 @contextmanager
@@ -66,7 +66,7 @@ def one_line_errors(path: Path, kind: str) -> Iterator[None]:
         raise
     except Exception as fault:  # damaged bytes provoke all kinds of errors
         reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
-        raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it anew") from fault
+        raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it again") from fault
 
 
 def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:

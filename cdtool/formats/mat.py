@@ -106,10 +106,12 @@ def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
     for variable, shape in variables.items():
         value = np.asarray(values.get(variable))
         if value.dtype.kind not in "biufc" or value.shape != shape:
-            raise RecordingError(f"{path}: damaged: variable '{variable}' is not as announced", "save it anew with -v7")
+            raise RecordingError(
+                f"{path}: damaged: variable '{variable}' is not as announced", "save it again with -v7"
+            )
     return values
 
 
 def _unreadable(path: Path, fault: Exception) -> RecordingError:
     reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
-    return RecordingError(f"{path}: damaged or not a MATLAB file: {reason}", "save it anew with -v7")
+    return RecordingError(f"{path}: damaged or not a MATLAB file: {reason}", "save it again with -v7")

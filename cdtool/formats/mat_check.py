@@ -43,7 +43,7 @@ def check_whole(path: Path) -> None:
                 _check_array(element, order)
         except (ValueError, struct.error, zlib.error) as fault:
             raise RecordingError(
-                f"{path}: damaged at byte {at}: {fault}", "copy the file anew or save it again"
+                f"{path}: damaged at byte {at}: {fault}", "copy the file again or save it again"
             ) from fault
         at = start + size
 

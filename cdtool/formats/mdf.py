@@ -101,7 +101,7 @@ def _opened(asammdf: Any, path: Path) -> Any:
         clear_frames(fault.__traceback__)
     gc.collect()
     sys.unraisablehook = hook
-    raise RecordingError(f"{path}: damaged or not an MDF file: {reason}", "copy or save it anew")
+    raise RecordingError(f"{path}: damaged or not an MDF file: {reason}", "copy or save it again")
 
 
 def _channels(log: Any, findings: list[Finding]) -> dict[str, tuple[int, int]]:

@@ -73,7 +73,7 @@ def choose_format(path: Path) -> Format:
     seen = kind_of(head) if seen == "JSON" else seen
     if wide and not seen and _is_damaged_text(path, wide):
         raise RecordingError(
-            f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it anew from where it was made"
+            f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it again from where it was made"
         )
     expected = f", nor a whole {by_suffix[0].name.upper()} file" if by_suffix and not seen else ""
     raise RecordingError(
@@ -83,7 +83,7 @@ def choose_format(path: Path) -> Format:
 
 
 def survey(path: Path) -> Source:
-    """All numeric columns of a file, or of the folder that rosbag2 made, and what is odd; raises RecordingError."""
+    """All numeric columns of a file, or of the folder that rosbag2 made, and its warnings; raises RecordingError."""
     if path.is_dir():
         return joined_sources(path, [choose_format(part).columns(part) for part in log_parts(path)])
     return choose_format(path).columns(path)

@@ -98,7 +98,7 @@ _ALSO_IN_FOLDER = re.compile(
 def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
     """Raise UsageError where a target cannot be written: unknown suffix, no such folder, no permission, a dead link.
 
-    A report may be written anew. What cdtool did not write is replaced with `force` only: a recording, a file of
+    A report may be rewritten. What cdtool did not write is replaced with `force` only: a recording, a file of
     another program, a folder that holds anything but a report.
     """
     for target in targets:

@@ -31,7 +31,7 @@ def require_trial(trial: int) -> None:
 class ArmParameters:
     """On the joint side unless said otherwise; a pair is (arm, forearm), or (trial 1, trial 2) where that is said.
 
-    Choices that carry weight: the torque ripple has a fixed phase to the encoder, as a motor's cogging has; drawn anew
+    Choices that carry weight: the torque ripple has a fixed phase to the encoder, as a motor's cogging has; redrawn
     in each run it would widen the forearm's normal band in trial 2 and make the momentum observer there far slower. The
     speed controller works on the logged, filtered speed. Friction factors and the obstacle's angle are normal, one
     draw a run (and joint), the factor scaling Coulomb and static friction alike. The bumper's slope changes at its

@@ -95,7 +95,7 @@ class _Part:
             if lost.any():
                 raise SignatureError(
                     f"{self._place(lost, unit)} no limit would be left: too few runs are valid there",
-                    "inspect the sensors there, then learn anew",
+                    "inspect the sensors there, then relearn",
                 )
             known = np.isfinite(old) & np.isfinite(new)
             moved = np.where(known, np.abs(new - np.where(known, old, 0.0)) / self.spread, 0.0)
@@ -104,7 +104,7 @@ class _Part:
                 raise SignatureError(
                     f"{place} the limit would be {moved.max():.1f} spreads from the one first learned, "
                     f"{reserve:g} are allowed",
-                    "inspect the machine there, then learn anew",
+                    "inspect the machine there, then relearn",
                 )
 
     def _place(self, mask: BoolArray, unit: str) -> str:

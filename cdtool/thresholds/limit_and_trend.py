@@ -24,7 +24,7 @@ class LimitAndTrend:
     `shape` "line": statistic = i + `lead` di/dt, a straight line in the plane of value and trend: it sees the value
     `lead` [s] ahead. "table": I_max = f(di/dt), a limit on i for each of `steps` levels of the trend: the runs' extreme
     of i where the trend is at or above that level. The trend is filtered with `time_constant` [s]; limits as those of
-    `limit`, in the signal's unit. A gap above 3 time constants starts the trend anew. Fails where the normal signal
+    `limit`, in the signal's unit. A gap above 3 time constants restarts the trend. Fails where the normal signal
     rises as fast as a contact makes it rise, and with a noisy signal.
     """
 

@@ -30,7 +30,7 @@ class PredictedLimit:
     periods of the runs learned from; steps are measured. Limits as those of `limit`, learned on the predicted signal.
     `order` 1 or 2. The longer the prediction, the more noise: order 1, forgetting 0.95 passes on 0.25 of white noise's
     standard deviation 0 samples ahead, 0.30 at 10; order 2 0.32 and 0.47. A gap that leaves less than 1 % of the weight
-    (90 samples by default) starts it anew. Fails at bends of the normal signal, where it overshoots; brings nothing
+    (90 samples by default) restarts it. Fails at bends of the normal signal, where it overshoots; brings nothing
     against an impact shorter than its memory, 1 / (1 - forgetting) samples.
     """
 
@@ -70,7 +70,7 @@ class PredictedLimit:
             _predict(values, step / period, self.forgetting, self.order, self.ahead, result)
             return result
 
-        # Behind a gap that leaves something of the samples before it they still count: it starts anew behind a longer.
+        # Behind a gap that leaves something of the samples before it they still count: it restarts behind a longer.
         start_up = period * np.log(_SETTLED) / np.log(self.forgetting)
         return filtered(signal, predict, start_up, start_up, signal.unit)
 

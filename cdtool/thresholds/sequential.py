@@ -45,7 +45,7 @@ class SequentialRule(Protocol):
         ...
 
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
-        """The statistic, causal; `side` +1 or -1 where one is watched; a gap above `longest_gap` [s] starts it anew."""
+        """The statistic, causal; `side` +1 or -1 where one is watched; a gap above `longest_gap` [s] restarts it."""
         ...
 
 

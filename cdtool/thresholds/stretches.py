@@ -1,4 +1,4 @@
-"""Running a causal filter over the samples that can be judged, and starting it anew where they break off."""
+"""Running a causal filter over the samples that can be judged, and restarting it where they break off."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ColumnFilter = Callable[[FloatArray, FloatArray], FloatArray]
 class Stretches:
     """The samples of one column that a filter takes: where they are, the step before each, time since its start [s].
 
-    The step is infinite where the filter starts anew.
+    The step is infinite where the filter restarts.
     """
 
     index: npt.NDArray[np.intp]
@@ -34,7 +34,7 @@ def stretch_bounds(step: FloatArray) -> list[tuple[int, int]]:
 
 
 def stretches(time: FloatArray, usable: BoolArray, broken: BoolArray, longest_gap: float) -> Stretches:
-    """The usable samples (n,) of one column; it starts anew behind a broken one, or a gap above `longest_gap` [s]."""
+    """The usable samples (n,) of one column; it restarts behind a broken one, or a gap above `longest_gap` [s]."""
     index = np.flatnonzero(usable)
     at = time[index]
     breaks = np.cumsum(broken)[index]
@@ -50,7 +50,7 @@ def filtered(signal: Signal, column_filter: ColumnFilter, longest_gap: float, st
     """The signal through a causal filter, column by column.
 
     A missing sample is skipped: the next step is longer. Behind a gap above `longest_gap` [s], and behind samples that
-    do not apply, are start-up or have no limit, the filter starts anew; its first `start_up` [s] are START_UP. NaN
+    do not apply, are start-up or have no limit, the filter restarts; its first `start_up` [s] are START_UP. NaN
     where the signal is not valid.
     """
     values: FloatArray = np.full(signal.values.shape, np.nan)

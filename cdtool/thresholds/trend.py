@@ -22,7 +22,7 @@ class Trend:
     """Constant limits on the signal's filtered trend, s / (1 + s `time_constant`) i (thesis 2.3.2).
 
     In the signal's unit per s; time constant in s, 0.01 to 0.03 is usual; exact for any step. Limits as those of
-    `limit`, learned on the trend. A gap above 3 time constants starts it anew. Fails against a soft impact, whose
+    `limit`, learned on the trend. A gap above 3 time constants restarts it. Fails against a soft impact, whose
     force rises slowly, and with a noisy signal such as pure torque.
     """
 

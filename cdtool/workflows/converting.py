@@ -135,7 +135,7 @@ def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> No
         if path.exists() and any(path.samefile(part) for part in parts):
             raise UsageError(f"{path}: is the log itself", "choose another name")
         if path.exists() and not force:
-            raise UsageError(f"{path}: is there already", "choose another name, or overwrite it with --force")
+            raise UsageError(f"{path}: already exists", "choose another name, or overwrite it with --force")
 
 
 def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[Group]]]:

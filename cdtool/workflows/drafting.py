@@ -47,7 +47,7 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     """
     target = Path(output)
     if target.exists() and not force:
-        raise UsageError(f"{target}: is there already", "choose another name with -o, or overwrite it with --force")
+        raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
     drafted = replace(_settled(Path(log), _drafted(Path(log))), path=str(target))
     write_text(target, drafted.text)
     return drafted

@@ -1,4 +1,4 @@
-"""What is in a log: channels, units, rates, gaps and everything that is odd, all findings at once."""
+"""What is in a log: channels, units, rates, gaps and all findings at once."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def recover(
         pass
     findings = surveyed.findings()
     if not surveyed.count:
-        raise RecordingError(f"{source}: no message can be recovered: {findings[0]}", "copy the file anew")
+        raise RecordingError(f"{source}: no message can be recovered: {findings[0]}", "copy the file again")
     if surveyed.unverified == surveyed.count and not unverified:
         raise RecordingError(
             f"{source}: no checksum covers any of its {surveyed.count} messages",
@@ -136,7 +136,7 @@ def _check_names(source: Path, output: Path, force: bool) -> None:
     if output.exists() and output.samefile(source):
         raise UsageError(f"{output}: is the file to recover from", "write to another one")
     if output.exists() and not force:
-        raise UsageError(f"{output}: is there already", "choose another name, or overwrite it with --force")
+        raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
 
 
 def _digest(path: Path) -> str:

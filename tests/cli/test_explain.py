@@ -50,7 +50,7 @@ def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_firs
     assert done.status == 0 and done.err == ""
     told = " ".join(done.out.split())
     assert "ms after the contact (onset at" in told and "load cell)" in told
-    assert "gate: above its upper limit" in told and "needs 9 samples outside in succession" in told
+    assert "gate: above its upper limit" in told and "needs 9 consecutive samples outside" in told
     assert "Moved first: acceleration down" in told
     assert "Likely cause: a contact: speed of gate" in told and "N where" in told
     assert "Compared with 11 impact-free runs at the same place of the motion." in told
@@ -70,7 +70,7 @@ def test_a_missed_contact_is_told_with_how_near_it_came(explain):
     told = " ".join(done.out.split())
     assert done.status == 0
     assert "missed: no alarm in the 1000 ms that were watched" in told
-    assert "from its limit of" in told and "For 9 samples in succession it stood at" in told
+    assert "from its limit of" in told and "For 9 consecutive samples it stood at" in told
     assert "The first that pure_inertia reads: acceleration" in told
     assert max(map(len, done.out.splitlines())) <= 100
 

@@ -8,7 +8,7 @@ from tests.cli.damaged_copies import damaged
 from tests.command import cdtool
 
 
-@pytest.mark.parametrize(("value", "what"), [("1e306", "none that a sensor gives"), ("inf", "infinite")])
+@pytest.mark.parametrize(("value", "what"), [("1e306", "outside the possible range"), ("inf", "infinite")])
 def test_a_masked_value_is_counted_once_as_what_it_is(gate_folder, tmp_path, value, what):
     cells = {("i_motor", 700): value, ("i_motor", 701): "nan"}
     log = damaged(gate_folder / "stiff" / "01.csv", tmp_path / "damaged.csv", cells)
@@ -36,7 +36,7 @@ def test_info_detect_explain_and_learning_report_the_same_about_a_log(gate_folde
     machine = ("-m", gate_folder / "machine.toml")
     info = cdtool("info", log, *machine)
     lost, warned = _of(info.out, "loss"), _of(info.out, "warning")
-    assert lost == {"torque: 1 value is none that a sensor gives, masked"}
+    assert lost == {"torque: 1 value is outside the possible range, masked"}
     assert "acceleration: the value never changes while the machine moves: stuck?" in warned
     assert {words.split(":")[0] for words in warned} >= {"time", "torque", "acceleration"}
     for command in ("detect", "explain"):

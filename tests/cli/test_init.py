@@ -136,7 +136,7 @@ def test_german_names_are_understood(tmp_path):
 def test_nothing_is_overwritten_unless_it_is_asked_for(tmp_path):
     path = tmp_path / "machine.toml"
     path.write_text("mine")
-    with pytest.raises(UsageError, match=r"machine\.toml: is there already"):
+    with pytest.raises(UsageError, match=r"machine\.toml: already exists"):
         init(LOGS / "gate/stiff/03.csv", path)
     assert path.read_text() == "mine"
     init(LOGS / "gate/stiff/03.csv", path, force=True)
@@ -192,6 +192,6 @@ def test_the_command_prints_the_draft_and_the_next_step(tmp_path):
     done = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml")
     assert done.status == 0 and "guessed" in done.out and "cdtool info" in done.out
     again = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml")
-    assert again.status == 2 and "is there already" in again.err and "Traceback" not in again.err
+    assert again.status == 2 and "already exists" in again.err and "Traceback" not in again.err
     shown = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml", "--force", "--json")
     assert "torque" in json.loads(shown.out)["channels"]

@@ -223,7 +223,7 @@ def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool]
 
 
 def _first(outside: BoolArray) -> int | None:
-    """The first of the samples in succession that are outside; missing ones (False) break them."""
+    """The first of the consecutive samples that are outside; missing ones (False) break them."""
     if len(outside) < _SUCCESSION:
         return None
     run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)

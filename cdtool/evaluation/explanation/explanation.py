@@ -33,7 +33,7 @@ _AFTERMATH = 0.5
 
 @dataclass(frozen=True)
 class AlarmExplanation:
-    """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` samples in succession.
+    """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` consecutive samples.
 
     `skipped` samples were missing among them. `contact` is the one that the alarm belongs to. `moved` are the channels
     in the order in which they moved; `inputs` names those that the detector needs. `cause` is the likely one, of which

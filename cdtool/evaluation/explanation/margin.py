@@ -133,7 +133,7 @@ def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
 
 
 def _held(share: FloatArray, debounce: int) -> float:
-    """The largest share that `debounce` samples in succession all had; one that was not judged (NaN) breaks them."""
+    """The largest share that `debounce` consecutive samples all had; one that was not judged (NaN) breaks them."""
     if len(share) < debounce:
         return math.nan
     least = np.lib.stride_tricks.sliding_window_view(share, debounce).min(axis=1)

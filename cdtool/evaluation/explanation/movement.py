@@ -56,7 +56,7 @@ def which_moved_first(
 ) -> tuple[Movement, ...]:
     """The measured and reference channels of a joint in the order in which they moved, those that did not behind them.
 
-    A channel moves at the first of 3 samples in succession more than 6 noises off the straight line through its
+    A channel moves at the first of 3 consecutive samples more than 6 noises off the straight line through its
     `before` seconds up to `around - lead`, followed back to 2 noises; it is looked for until `around + after` [s]. The
     noise is how far the channel usually was off such a line, as far ahead of it (at most 0.2 s), in those seconds: a
     median absolute deviation, and at least the rounding of a quantised channel. `joint` may be the whole machine. Fails

@@ -10,6 +10,7 @@ from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanat
 from cdtool.evaluation.explanation.margin import Approach
 from cdtool.evaluation.explanation.movement import COMMANDS, Movement
 from cdtool.evaluation.explanation.normal_choice import Absence
+from cdtool.plain_text import counted
 from cdtool.recording import REFERENCES, Contact
 
 _ABSENT = {
@@ -77,7 +78,7 @@ def _crossing(item: AlarmExplanation) -> list[str]:
     skipped = f", {item.skipped} missing ones skipped" if item.skipped else ""
     return [
         f"{item.joint}: {item.alarm.side} its {limit} limit, {values}. It left the band for good {since}{waited}, "
-        f"which needs {_samples(item.debounce)} outside in succession{skipped}."
+        f"which needs {_consecutive(item.debounce)} outside{skipped}."
     ]
 
 
@@ -111,12 +112,10 @@ def _approach(found: Approach, item: MissExplanation) -> str:
     text += f"{_figure(abs(nearest.margin))}{_unit(item.unit)} {where} its limit of {_figure(nearest.limit)}"
     text += f" ({_percent(nearest.share)} of it)." if math.isfinite(nearest.share) else "."
     if found.longest:
-        needed = f"{_samples(found.longest)} outside in succession, {item.debounce} are needed"
+        needed = f"{_consecutive(found.longest)} outside; {item.debounce} are needed"
         text += f" At most {needed}."
     if math.isfinite(found.held):
-        text += (
-            f" For {_samples(item.debounce)} in succession it stood at {_percent(found.held)} of its limit or above."
-        )
+        text += f" For {_consecutive(item.debounce)} it stood at {_percent(found.held)} of its limit or above."
     return text
 
 
@@ -227,8 +226,8 @@ def _counted(seconds: float, event: str) -> str:
     return f"{abs(late)} ms {'after' if late > 0 else 'before'} {event}"
 
 
-def _samples(count: int) -> str:
-    return "1 sample" if count == 1 else f"{count} samples"
+def _consecutive(count: int) -> str:
+    return counted(count, "sample" if count == 1 else "consecutive sample")
 
 
 def _percent(share: float) -> str:

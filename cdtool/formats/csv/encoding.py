@@ -72,7 +72,7 @@ def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]
         try:
             stream = codecs.getincrementaldecoder(encoding)().decode(stream).encode()
         except UnicodeError as fault:
-            raise RecordingError(f"{path}: is damaged: no {encoding.upper()}", "save it anew as UTF-8") from fault
+            raise RecordingError(f"{path}: is damaged: no {encoding.upper()}", "save it again as UTF-8") from fault
     elif pinned:
         _check_pinned(path, stream, encoding)
     control = _CONTROL.search(stream[:4096])

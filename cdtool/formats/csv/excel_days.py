@@ -19,7 +19,7 @@ def two_readings(stamps: FloatArray, factor: float) -> str:
 
     `stamps` (n,) are all of the column; those that are missing are passed over. The step is the mean of the middle
     half: stamps with four decimals repeat, and one at an edge may be wild. A clock above 20 kHz that has run for so
-    long that it looks like a date of 2000 to 2100 cannot be told from one in days.
+    long that it looks like a date of 2000 to 2100 cannot be distinguished from one in days.
     """
     known = stamps[np.isfinite(stamps)]
     if len(known) < 2 or not _FIRST < np.median(known) < _LAST:

@@ -122,7 +122,7 @@ class OddLines:
         if "\r" in text:
             raise RecordingError(
                 f"{self.path}: line {line} holds a carriage return: line ends are mixed",
-                "save the file anew with one kind of line end",
+                "save the file again with one kind of line end",
             )
         if text.count('"') % 2:
             raise RecordingError(

@@ -98,7 +98,7 @@ def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatA
         first, other = names[clocks.groups[0][0]], names[group[0]]
         apart = _apart(dialect, values, first, other) if columns and {first, other} <= values.keys() else ""
         if apart:
-            text = f"another clock than '{first}' ({apart}), beside it {first_of(columns)}"
+            text = f"another clock than '{first}' ({apart}), next to {first_of(columns)}"
             found.append(Finding(f"{text}; {OWN} in a machine file gives each channel the clock beside it", other))
     return found
 

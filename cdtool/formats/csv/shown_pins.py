@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def shown_pins(dialect: Dialect) -> str:
-    """Lines of TOML. Where names and units stand is found in each file anew, so that line is shown as a comment.
+    """Lines of TOML. Where names and units stand is found again in each file, so that line is shown as a comment.
 
     The next log may have another line above them; only what was pinned stays pinned.
     """
@@ -50,4 +50,4 @@ def quoted(text: str) -> str:
 def _line(key: str, pinned: int | bool | None, number: int) -> str:
     if pinned is not None:
         return f"{key} = {number or 'false'}"
-    return f"# {key} = {number}  (in this file; found anew in each)"
+    return f"# {key} = {number}  (in this file; looked for again in each)"

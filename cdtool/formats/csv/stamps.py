@@ -64,7 +64,7 @@ class Layout:
 
     @property
     def wraps(self) -> tuple[int, str]:
-        """After how many ns stamps without a day begin anew, and what they pass there."""
+        """After how many ns stamps without a day start again, and what they pass there."""
         if "%H" in self.pattern or ("%I" in self.pattern and "%p" in self.pattern):
             return _DAY, "midnight"
         if "%I" in self.pattern:
@@ -210,7 +210,7 @@ def unwrapped(
     known: np.ndarray[tuple[int], np.dtype[np.bool_]],
     period: int = _DAY,
 ) -> int:
-    """Count `period` [ns] on each time that stamps without a day begin anew, in place; returns how often they did.
+    """Count `period` [ns] on each time that stamps without a day start again, in place; returns how often they did.
 
     A step back by more than half of it is such a passage, as midnight for times of day; a smaller one is left, and told
     with the clock. A pause of a whole period or more does not show in the stamps.

@@ -186,7 +186,7 @@ def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None
 
 
 def _set_exact(dialect: Dialect, rows: Rows, table: Table, clock: str, factor: float) -> None:
-    """Read the clock anew where its stamps have more digits than float64."""
+    """Read the clock again where its stamps have more digits than float64."""
     if clock in table.stamped or table.origin:
         return
     exact = exact_differences(dialect, rows, dialect.names.index(clock), table.values[clock], factor)

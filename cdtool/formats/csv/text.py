@@ -67,7 +67,7 @@ class Text:
                 except UnicodeError as fault:
                     raise RecordingError(
                         f"{self.path}: is damaged: no {self.encoding.upper()} near byte {self.size - left}",
-                        "save it anew as UTF-8",
+                        "save it again as UTF-8",
                     ) from fault
 
     def tail(self) -> list[bytes]:

@@ -68,7 +68,7 @@ class _Count:
 
     def add(self, numbers: Numbers, stamps: npt.NDArray[np.uint64], origin: int) -> None:
         known = np.concatenate((self._last, numbers))
-        steps = np.diff(known).view(np.int32)  # modulo 2^32, where the count begins anew
+        steps = np.diff(known).view(np.int32)  # modulo 2^32, where the count restarts
         jumps = np.flatnonzero(steps > 1)
         self._steps += len(steps)
         self._ones += int(np.count_nonzero(steps == 1))

@@ -1,4 +1,4 @@
-"""Do the stamps of a topic run forward? Messages are sorted by them, which must not hide that a clock started anew."""
+"""Do the stamps of a topic run forward? Messages are sorted by them, which must not hide that a clock restarted."""
 
 from __future__ import annotations
 
@@ -72,4 +72,4 @@ class StampOrder:
         if self._back <= _PERIODS * period:
             return [Finding(f"{text}: sorted by time", topic, "note")]
         where = f"message {self._first} is stamped {self._back / 1e9:.4g} s before one ahead of it"
-        return [Finding(f"{where}; {text}: sorted by time. Was the clock set or started anew?", topic)]
+        return [Finding(f"{where}; {text}: sorted by time. Was the clock set or restarted?", topic)]

@@ -60,7 +60,7 @@ def write_mcap(
 
 
 class _Filler:
-    """One message, filled anew with each sample."""
+    """One message, refilled with each sample."""
 
     def __init__(self, stream: Stream) -> None:
         definition = DEFINITIONS.get(stream.schema)

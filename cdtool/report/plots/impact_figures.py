@@ -1,4 +1,4 @@
-"""The figures of the thesis's two chapters on impacts, drawn anew into a folder."""
+"""The figures of the thesis's two chapters on impacts, redrawn into a folder."""
 
 from __future__ import annotations
 

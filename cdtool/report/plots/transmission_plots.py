@@ -1,4 +1,4 @@
-"""The thesis's figures 4.3, 4.4 and 4.7 anew: an impact simulated, and what makes it quick and what the motor feels."""
+"""The thesis's figures 4.3, 4.4 and 4.7: a simulated impact, what makes it quick and what the motor feels."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def test_a_miss_tells_how_near_it_came_for_how_long_and_when():
     assert (near.longest, near.outside_from) == pytest.approx((5, 3.04))
     assert near.held == pytest.approx(0.9)
     assert math.isnan(near.latched_from)
-    assert any("5 samples outside in succession, 9 are needed" in line for line in words(found))
+    assert any("5 consecutive samples outside; 9 are needed" in line for line in words(found))
 
 
 def test_a_limit_just_below_the_share_that_was_held_would_have_alarmed_and_one_above_not():
@@ -281,7 +281,7 @@ def test_the_words_name_joint_limit_debounce_and_what_moved_first():
     assert words(found) == [
         "alarm at 3.028 s, 28 ms after the contact (onset at 3.000 s, load cell)",
         "hip: above its upper limit, 1.5 against 1 N m. It left the band for good 20 ms after the onset, 8 ms before "
-        "the alarm, which needs 9 samples outside in succession.",
+        "the alarm, which needs 9 consecutive samples outside.",
         "Likely cause: not clear.",
         "Nothing to compare with: with limits set by hand nothing was learned; learn a signature with cdtool "
         "learn-signature and give it with --signature. Until then what follows is against this log's own past alone.",

@@ -80,7 +80,7 @@ def test_what_grows_at_one_place_is_told_with_its_place_and_is_no_drift_of_the_w
     assert joint.overall is None and joint.local.outward
     assert joint.local.place == pytest.approx(0.40, abs=0.021)
     assert any(line.startswith(("grows at 0.4", "grows at 0.3")) for line in joint.verdicts)
-    assert joint.verdicts[-1].endswith("inspect the machine there BEFORE learning anew")
+    assert joint.verdicts[-1].endswith("inspect the machine there before relearning")
     assert advice(None, found).startswith("inspect the machine at 0.")
     assert joint.runs[-1].local_at == pytest.approx(0.40, abs=0.041)
     assert joint.runs[-1].local > 3.0 > abs(joint.runs[-1].overall)

@@ -82,7 +82,7 @@ def test_the_verdicts_stand_above_the_panels(growing, steady, tmp_path):
     for expected in (
         "30 runs, safety factor 5.5",
         "grows at 0.4",
-        "BEFORE learning anew",
+        "before relearning",
         "alarm",
         "travel [m]",
         "limit",

@@ -160,7 +160,7 @@ class Log:
         elif self._strict and self.unverified:
             raise RecordingError(
                 f"{self.path}: the checksum of the data does not fit: values are damaged, and none can be told right",
-                "copy the file anew from its source",
+                "copy the file again from its source",
             )
         elif self.unverified or not self.section.losses:
             text = "the checksum of the data section does not fit"
@@ -182,7 +182,7 @@ class Log:
         reason = " ".join(place.reason.split())[:200]
         raise RecordingError(
             f"{self.path}: damaged at byte {place.at}, before its first message: {reason}",
-            "copy the file anew from its source; no message in it can be read",
+            "copy the file again from its source; no message in it can be read",
         )
 
     def findings(self) -> list[Finding]:

@@ -63,7 +63,7 @@ class Room:
         return self._data[self._used : self._used + size]
 
     def renew(self, memory: Bytes, covered: bool) -> None:
-        """Begin anew with `memory`, once what is there was handed out."""
+        """Start again with `memory`, once what is there was handed out."""
         self._data, self._covered = memory, covered
 
     def pass_over(self, size: int, taken: Taken) -> Iterator[Piece]:
@@ -92,7 +92,7 @@ class Room:
         return Walked(at - begin, reason, times, tuple(faults))
 
     def take_window(self, window: Bytes) -> Generator[Piece, None, Walked]:
-        """Begin anew with records that stand in the file itself, outside of chunks; gives a Walked."""
+        """Start again with records that stand in the file itself, outside of chunks; gives a Walked."""
         yield from self.flush()
         self._data, self._covered = window, False
         walked = yield from self.walk(len(window), top_level=True)
