@@ -91,7 +91,7 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
     """
     target = resolved(path)
     if target.exists() and not target.is_dir():
-        raise UsageError(f"{plain(path)}: exists and is no folder", "choose another name")
+        raise UsageError(f"{plain(path)}: exists and is not a folder", "choose another name")
     if target.exists() and not os.access(target, os.W_OK | os.X_OK):
         raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
     whole = not has_to_stay(target) and (may_replace is None or not target.exists() or may_replace(target))
@@ -131,7 +131,7 @@ def made_folder(path: Path) -> Iterator[Path]:
 def resolved(path: Path) -> Path:
     """Where a path really is; raises UsageError for a link that leads nowhere."""
     if path.is_symlink() and not path.exists():
-        raise UsageError(f"{plain(path)}: is a link to something that is not there", "remove the link, or mend it")
+        raise UsageError(f"{plain(path)}: is a link to a missing file", "remove or repair the link")
     return Path(os.path.realpath(path))
 
 
@@ -145,7 +145,7 @@ def _checked(path: Path) -> Path:
     if path.is_dir():
         raise UsageError(f"{plain(path)}: is a folder", "give the name of a file")
     if _is_special(path):
-        raise UsageError(f"{plain(path)}: is no regular file", "give the name of a file")
+        raise UsageError(f"{plain(path)}: is not a regular file", "give the name of a file")
     target = resolved(path)
     if not target.parent.is_dir():
         raise UsageError(f"{plain(path)}: no folder {plain(path.parent)}", "make it first")

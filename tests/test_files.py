@@ -54,7 +54,7 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
 def test_a_link_that_leads_nowhere_is_refused(tmp_path):
     (tmp_path / "link.md").symlink_to("elsewhere/a.md")
     (tmp_path / "elsewhere").mkdir()
-    with pytest.raises(UsageError, match=r"link\.md: is a link to something that is not there"):
+    with pytest.raises(UsageError, match=r"link\.md: is a link to a missing file"):
         write_text(tmp_path / "link.md", "new")
     with pytest.raises(UsageError, match="is not there"), replaced_folder(tmp_path / "link.md"):
         pass

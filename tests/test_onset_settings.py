@@ -32,7 +32,7 @@ def test_what_cannot_be_read_is_refused_with_the_way_to_migrate():
     with pytest.raises(ConfigurationError, match=r"onset\.samples: is 200: the onset rule counts in seconds") as found:
         read(samples=200)
     assert found.value.hint == "write hold_s, at most 0.1"
-    with pytest.raises(ConfigurationError, match=r"onset\.samples: is given beside hold_s"):
+    with pytest.raises(ConfigurationError, match=r"onset\.samples: is given together with hold_s"):
         read(samples=3, hold_s=0.003)
     with pytest.raises(ConfigurationError, match=r"onset\.hold_s: is 0.5"):
         read(hold_s=0.5)

@@ -60,7 +60,7 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), 
     for every, word in ((left_out, "left out"), (damaged, "loss"), (findings, "warning"), (notes, "note")):
         items = alike(list(dict.fromkeys(Skipped(item.recording, _bare(item)) for item in every)))
         for item in items[:_SHOWN]:
-            typer.echo(one_line(f"{word}: {item.recording}: {item.reason}"), err=True)
+            typer.echo(one_line(f"{word}: {item.recording}: {item.reason.removeprefix(f'{word}: ')}"), err=True)
         if len(items) > _SHOWN:
             typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 

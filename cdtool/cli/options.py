@@ -12,7 +12,7 @@ from cdtool.errors import UsageError
 
 MachineOption = Annotated[Path, typer.Option("--machine", "-m", help="Machine file (TOML); see docs/machine-file.md.")]
 MachineUnlessBenchmarkOption = Annotated[
-    Path | None, typer.Option("--machine", "-m", help="Machine file (TOML); not beside --benchmark.")
+    Path | None, typer.Option("--machine", "-m", help="Machine file (TOML); not with --benchmark.")
 ]
 OperationsOption = Annotated[
     str,

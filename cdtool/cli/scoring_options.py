@@ -42,4 +42,6 @@ def refuse_beside_benchmark(benchmark: Path, **given: object) -> None:
     for name, value in given.items():
         if value is not None and value != "":
             option = f"--{name.replace('_', '-')}"
-            raise UsageError(f"{option} is given beside --benchmark", f"write it in {benchmark}, or leave one out")
+            raise UsageError(
+                f"{option} is given together with --benchmark", f"write it in {benchmark}, or leave one out"
+            )

@@ -113,7 +113,7 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
             known = ", ".join(_WRITERS)
             raise UsageError(f"--output is '{plain(target)}'", f"a folder, or a name that ends in {known}")
         if not target.suffix and target.exists():
-            raise UsageError(f"--output '{plain(target)}' exists and is no folder", "choose another name")
+            raise UsageError(f"--output '{plain(target)}' exists and is not a folder", "choose another name")
         if not target.parent.is_dir():
             raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
         _check_writable(target, target.parent)
@@ -181,7 +181,7 @@ def _whole_report(folder: Path, *, force: bool) -> bool:
     others = [path for path in held if path not in known or path.is_symlink() or not path.is_file()]
     if others and not force:
         raise UsageError(
-            f"{plain(others[0])}: is no part of a report of cdtool, and the folder is replaced as a whole",
+            f"{plain(others[0])}: is not part of a cdtool report, and the folder would be replaced as a whole",
             "choose another folder, or keep what else is in it with --force",
         )
     return not others and all(_KINDS[path.suffix].is_kind_of(path) for path in known)

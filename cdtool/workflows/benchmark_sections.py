@@ -88,7 +88,9 @@ def _hold(table: Table) -> float:
         return hold
     samples = table.whole("samples", 3, minimum=1)
     if "hold_s" in table:
-        raise table.fault("samples", "is given beside hold_s", "leave samples out: the onset rule counts in seconds")
+        raise table.fault(
+            "samples", "is given together with hold_s", "leave samples out: the onset rule counts in seconds"
+        )
     if samples * SAMPLE > LONGEST_HOLD:
         raise table.fault(
             "samples", f"is {samples}: the onset rule counts in seconds now", f"write hold_s, at most {LONGEST_HOLD:g}"

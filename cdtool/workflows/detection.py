@@ -89,7 +89,7 @@ def detect(
     """
     if benchmark is not None:
         if machine is not None or limit or joints or operations != "whole" or activation or rules:
-            raise UsageError("settings are given beside a benchmark file", "all of them come from there")
+            raise UsageError("settings are given together with a benchmark file", "all of them come from there")
         if isinstance(benchmark, PreparedBenchmark):
             return _detect_prepared(Path(log), benchmark)
         return _detect_prepared(Path(log), prepare_benchmark(benchmark, detector=detector, signature=signature))

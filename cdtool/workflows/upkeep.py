@@ -124,8 +124,8 @@ def check_signature(
     known = {(run.sha256, run.operation) for run in file.runs}
     learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
     if 0 < sum(learned) < len(file.runs):
-        some = f"given are {sum(learned)} of the {counted(len(file.runs), 'run')} that it was learned from"
-        skipped.append(Skipped(str(path), f"{some}: coverage is that of a signature of these alone"))
+        some = f"given: only {sum(learned)} of the {counted(len(file.runs), 'run')} that it was learned from"
+        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these alone"))
     classes, served = [], set()
     for current, first in signatures:
         own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import sys
 
 import pytest
@@ -25,7 +23,7 @@ def terminal(monkeypatch, capsys):
 
     def shown(columns: int, rows=ROWS) -> list[str]:
         monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
-        monkeypatch.setattr(shutil, "get_terminal_size", lambda *_: os.terminal_size((columns, 40)))
+        monkeypatch.setenv("COLUMNS", str(columns))
         table(HEADINGS, rows)
         return re.sub("\x1b\\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
 

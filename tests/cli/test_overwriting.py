@@ -162,7 +162,7 @@ def test_a_folder_with_anything_but_a_report_keeps_it(folder):
     (report / "notes.txt").write_text(TEXT, encoding="utf-8")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", report)
-    assert done.status == 2 and "notes.txt: is no part of a report of cdtool" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and "notes.txt: is not part of a cdtool report" in done.err and done.err.count("\n") == 1
     assert bytes_of(folder) == before
     assert cdtool("benchmark", folder / "benchmark.toml", "-o", report, "--force").status == 0
     assert (report / "notes.txt").read_text(encoding="utf-8") == TEXT and (report / "report.html").exists()
@@ -191,7 +191,7 @@ def test_a_dead_link_is_refused_before_any_work(folder):
     for words in (("benchmark", folder / "benchmark.toml"), ("learn-signature", folder / "free" / "01.csv")):
         more = ("-m", folder / "machine.toml", "-d", "gm", "--force") if words[0] == "learn-signature" else ()
         done = cdtool(*words, *more, "-o", folder / "link.json")
-        assert done.status == 2 and "is a link to something that is not there" in done.err and done.out == ""
+        assert done.status == 2 and "is a link to a missing file" in done.err and done.out == ""
     assert not (folder / "nowhere.json").exists()
 
 

@@ -153,7 +153,7 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
 
 def test_some_of_the_runs_learned_from_are_no_verdict_on_all(gate_folder, signature):
     done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
-    assert done.status == 3 and "given are 4 of the 11 runs that it was learned from" in done.err
+    assert done.status == 3 and "given: only 4 of the 11 runs that it was learned from" in done.err
     done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
     assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing could be judged" in done.out
 

@@ -67,9 +67,9 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
             raise RecordingError(f"{path}: belongs to other results", "put the two files of one benchmark together")
         return tuple(_checked(_trace(item)) for item in values["traces"])
     except ContentError as fault:
-        raise RecordingError(f"{path}: damaged, or no file of traces: {fault}", "run cdtool benchmark again") from fault
+        raise RecordingError(f"{path}: damaged, or not a traces file: {fault}", "run cdtool benchmark again") from fault
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError) as fault:
-        raise RecordingError(f"{path}: damaged, or no file of traces", "run cdtool benchmark again") from fault
+        raise RecordingError(f"{path}: damaged, or not a traces file", "run cdtool benchmark again") from fault
 
 
 def _checked(trace: Trace) -> Trace:

@@ -43,7 +43,7 @@ def _only_figures(folder: Path, *, force: bool) -> bool:
         if force:
             return False
         raise UsageError(
-            f"{plain(path)}: is no figure of cdtool, and the folder is replaced as a whole",
+            f"{plain(path)}: is not a cdtool figure, and the folder would be replaced as a whole",
             "choose another folder, or keep what else is in it with --force",
         )
     return True

@@ -66,9 +66,10 @@ def test_the_interval_of_a_change_is_the_same_in_both_directions():
 
 def test_equal_results_show_no_change_and_say_that_all_is_the_same():
     results = single(latencies(), false_alarms={KEY: 2})
-    found = compare_builds(results, results)
+    found = compare_builds(results, single(latencies(), false_alarms={KEY: 2}, benchmark_sha256="another"))
     assert found.verdict == "no change shown" and not found.changed and not found.notes
     assert row_of(found).words == "no change shown (every latency is the same)"
+    assert compare_builds(results, results).words == "no change shown: both files hold the same results"
 
 
 def test_no_change_shown_tells_the_change_that_would_have_been():
@@ -161,7 +162,7 @@ def test_false_alarms_are_compared_by_hours():
 
 def test_an_impact_free_group_says_how_many_false_alarms_would_have_been_shown():
     old = build({}, holdout=["momentum"])
-    found = compare_builds(old, old)
+    found = compare_builds(old, build({}, holdout=["momentum"], benchmark_sha256="another"))
     least = int(asked(found, "false_alarms").detectable)
     assert row_of(found).words == f"no change shown ({least} false alarms instead of 0 would have been)"
     shown = {
@@ -277,7 +278,7 @@ def test_the_same_bytes_are_paired_under_any_name():
 def test_copies_of_a_recording_are_paired_one_to_one():
     results = single(latencies())
     copies = replace(results, recordings=tuple(replace(item, sha256="same") for item in results.recordings))
-    found = compare_builds(copies, copies)
+    found = compare_builds(copies, replace(copies, provenance={**copies.provenance, "benchmark_sha256": "another"}))
     assert row_of(found).pairs == 30 and row_of(found).words == "no change shown (every latency is the same)"
 
 

@@ -70,19 +70,17 @@ def test_a_run_unlike_the_others_alarms_when_it_is_left_out_though_not_when_it_w
 
 def test_runs_that_differ_as_a_whole_need_more_of_them_than_runs_that_do_not():
     alike, apart = (check_coverage(season(14, together=share), RULE, ACTIVATION) for share in (0.1, 2.0))
-    assert alike.enough and alike.more_runs == 0 and alike.verdict.startswith("enough: ")
+    assert alike.enough and alike.more_runs == 0 and alike.verdict.startswith("enough runs: ")
     assert apart.chance > 10.0 * alike.chance and apart.factor_needed > alike.factor_needed
 
 
 def test_the_verdict_says_how_many_runs_or_which_factor():
-    assert coverage().verdict.startswith("needs 16 more runs, or raise the safety factor to at least 6.3: the next")
-    assert "a chance of 1 in 100, 1 in 1000 is allowed" in coverage().verdict
+    assert coverage().verdict.startswith("needs 16 more runs, or raise the safety factor to at least 6.3: the chance")
+    assert "operation is 1 in 100; at most 1 in 1000 is allowed" in coverage().verdict
     assert coverage(runs_needed=15).verdict.startswith("needs 1 more run, ")
     hopeless = coverage(runs_needed=None, chance=0.4)
-    assert (
-        hopeless.verdict.startswith("more runs like these would not suffice: ")
-        and "operation is 40 %" in hopeless.verdict
-    )
+    assert hopeless.verdict.startswith("more runs like these would not suffice: ")
+    assert "operation is 40 %" in hopeless.verdict
     assert coverage(chance=1e-9).verdict.endswith("1 in 1000 is allowed")
     assert "less than 1 in a million" in coverage(chance=1e-9).verdict
     assert "14 runs could be judged: too few" in coverage(chance=math.nan).verdict

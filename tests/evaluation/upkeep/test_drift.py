@@ -108,13 +108,13 @@ def test_a_step_is_told_with_its_run():
     assert line.startswith("step of +1.") and "at run 26 (run25): if something was changed then" in line
     (place,) = audited(lambda number, travel: 3.0 * (number >= 25) * near(travel, 0.3)).joints
     (line,) = [line for line in place.verdicts if "step" in line]
-    assert "at run 26 (run25) at 0." in line and "BEFORE" in line
+    assert "at run 26 (run25) at 0." in line and "before relearning" in line
 
 
 def test_with_one_side_what_goes_away_from_the_limit_leaves_no_runs_to_count():
     (joint,) = audited(lambda number, _: -0.05 * number).joints
     assert not joint.overall.outward and joint.runs_left == math.inf
-    assert "drifts away from the limit, -0.0" in joint.verdicts[0] and "contacts are noticed later" in joint.verdicts[0]
+    assert "drifts away from the limit by -0.0" in joint.verdicts[0] and "detected later" in joint.verdicts[0]
     (place,) = audited(lambda number, travel: -0.1 * number * near(travel, 0.4)).joints
     assert place.local is None
 
@@ -141,7 +141,7 @@ def test_with_two_sides_what_comes_back_to_the_middle_leaves_no_runs_to_count():
     found = audited(lambda number, _: 2.0 - 0.045 * number, sides="two")
     (joint,) = found.joints
     assert not joint.overall.outward and joint.runs_left == math.inf
-    assert joint.verdicts[-1].startswith("drifts back to the middle of the band, -0.0")
+    assert joint.verdicts[-1].startswith("drifts back towards the middle of the band by -0.0")
     assert advice(None, found) == "keep the signature"
 
 
@@ -155,8 +155,8 @@ def test_each_run_has_its_critical_factor_and_its_alarm():
         assert run.margin_used == pytest.approx(run.critical_factor / 5.5)
         assert run.alarm == (detection.verdict.outcome == "alarm")
     assert found.alarms == (7,) and joint.runs[7].local_at == pytest.approx(0.4, abs=0.03)
-    assert joint.verdicts[0] == "1 of 12 runs alarms, the first is run 8 (run7)"
-    assert advice(None, found) == "look at the alarms with cdtool explain: they are no drift"
+    assert joint.verdicts[0] == "an alarm in 1 of 12 runs, first in run 8 (run7)"
+    assert advice(None, found) == "look at the alarms with cdtool explain: no drift is shown"
 
 
 def test_joints_are_audited_apart():
