@@ -43,7 +43,7 @@ class FactorOrigin:
         if self.by != "budget":
             return "by default" if self.by == "default" else "set by hand"
         set_on = f"set for {self.budget} on {counted(self.operations, 'operation')}, {counted(self.alarms, 'alarm')}"
-        return f"{set_on}, before {counted(self.added, 'run')} more" if self.added else set_on
+        return f"{set_on}, before {counted(self.added, 'more run')}" if self.added else set_on
 
 
 @dataclass(frozen=True)

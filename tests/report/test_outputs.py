@@ -65,7 +65,7 @@ def test_each_suffix_gets_its_content(done, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("a.txt", "a.txt"), ("no/a.json", "no folder"), ("no/report", "no folder"), ("file", "no folder")],
+    [("a.txt", "a.txt"), ("no/a.json", "no folder"), ("no/report", "no folder"), ("file", "not a folder")],
 )
 def test_a_wrong_target_is_refused_before_any_work(tmp_path, name, words):
     (tmp_path / "file").write_text("x", encoding="utf-8")

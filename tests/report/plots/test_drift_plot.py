@@ -98,7 +98,7 @@ def test_of_many_joints_those_with_a_change_are_drawn_first(growing, steady, tmp
     both = replace(growing, joints=(*still, replace(growing.joints[0], joint="stiff")))
     plot_drift(both, tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
-    assert "stiff" in shown and "2 joints more are not drawn" in shown
+    assert "stiff" in shown and "2 more joints are not drawn" in shown
     assert sum(f"still{i}" in shown for i in range(4)) == 2
 
 
