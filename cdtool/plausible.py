@@ -240,8 +240,8 @@ def _far_words(series: Series, j: int, wrong: BoolArray, known: ChannelRange, jo
 def _leap_words(leaps: Sequence[Leap], masked: int, unit: str, joint: str) -> str:
     first = leaps[0]
     text = (
-        f"{counted(masked, 'value')}{joint} behind {counted(len(leaps), 'leap')} that no motion makes masked (first "
-        f"from {first.before:.4g} to {first.after:.4g} {unit} at {first.time:.3f} s)"
+        f"{counted(masked, 'value')}{joint} behind {counted(len(leaps), 'leap')} faster than the machine moves (first "
+        f"from {first.before:.4g} to {first.after:.4g} {unit} at {first.time:.3f} s), masked"
     )
     zeros = [leap.new_zero for leap in leaps if np.isfinite(leap.new_zero)]
     if zeros:
