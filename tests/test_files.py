@@ -298,9 +298,27 @@ def test_sigterm_cleans_up_as_sigint_does(tmp_path, name, status, word):
     assert names(tmp_path) == set()
 
 
+@posix_only
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_command_as_such_whatever_an_import_makes_of_it(monkeypatch, number, status):
+    import cdtool.registry
+    from tests.command import cdtool as run
+
+    def struck(*_: object, **__: object) -> None:
+        try:
+            signal.raise_signal(number)
+        except BaseException:
+            raise ImportError("initialization failed") from None
+
+    monkeypatch.setattr(cdtool.registry.Registry, "names", struck)
+    done = run("list", "detectors")
+    assert done.status == status and "Traceback" not in done.err
+
+
 def test_the_command_line_gives_signals_back_as_they_were():
     from tests.command import cdtool
 
-    before = signal.getsignal(signal.SIGTERM)
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    before = [signal.getsignal(number) for number in numbers]
     assert cdtool("list", "detectors").status == 0
-    assert signal.getsignal(signal.SIGTERM) == before
+    assert [signal.getsignal(number) for number in numbers] == before

@@ -111,40 +111,62 @@ def _print_usage_error(fault: Any) -> None:
 
 
 @contextmanager
-def _ending_as_if_interrupted() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP undo what is half written, as Ctrl-C does; the exit status is 128 and their number."""
+def _ending_as_if_interrupted() -> Iterator[list[int]]:
+    """Let SIGTERM and SIGHUP undo what is half written, as Ctrl-C does; the exit status is 128 and their number.
+
+    Yields the signals that have come.
+    """
+    came: list[int] = []
 
     def end(number: int, _: object) -> None:
         signal.signal(number, signal.SIG_IGN)  # a second one must not stop the undoing
-        raise SystemExit(128 + number)
+        came.append(number)
+        raise _end_of(number)
 
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield came
         return
-    before = {number: signal.getsignal(number) for number in _ENDING}
-    for number in (number for number, handler in before.items() if handler == signal.SIG_DFL):
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *_ENDING)}
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    for number in (number for number, handler in before.items() if handler in usual):
         signal.signal(number, end)
     try:
-        yield
+        yield came
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
+def _end_of(number: int) -> BaseException:
+    return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
+
+
 def main() -> None:
     """Run the app; a known error ends with one line on stderr and status 2."""
-    with _ending_as_if_interrupted():
-        _main()
+    with _ending_as_if_interrupted() as came:
+        _main(came)
 
 
-def _main() -> None:
+def _run_app(came: list[int]) -> Any:
+    """The app's status; a signal ends it as such, whatever a library has made of it that was being imported."""
+    try:
+        return app(standalone_mode=False)
+    except (KeyboardInterrupt, SystemExit, typer.Abort):
+        raise
+    except BaseException:
+        if came:
+            raise _end_of(came[0]) from None
+        raise
+
+
+def _main(came: list[int]) -> None:
     open_standard_streams()
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
     try:
-        status = app(standalone_mode=False)
+        status = _run_app(came)
         if fault := lost_output():
             raise CdtoolError(f"standard output: {fault.strerror}", "what was printed is incomplete: check the space")
         status = status if isinstance(status, int) else status_of([])
