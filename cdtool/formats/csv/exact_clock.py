@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cdtool.clock.wild import EPOCH, leading_wild
 from cdtool.formats.csv.blank_lines import filled
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_kernel import Integers
@@ -31,14 +32,17 @@ _AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
 def exact_differences(
     dialect: Dialect, rows: Rows, column: int, stamps: FloatArray, factor: float
 ) -> tuple[FloatArray, float] | None:
-    """Stamps (n,) less the first of them, in the column's own unit, and that one [s]; None where float64 holds them.
+    """Stamps (n,) less the first of them that is not wild, in the column's own unit, and that one [s]; None where float64 holds them.
 
     `factor` leads to s. A stamp that is written in another way than as plain digits (in quotes, with an exponent) is
     taken as float64 has it; a missing one is NaN.
     """
     known = np.isfinite(stamps)
     decimals = _DECIMALS.get(factor)
-    if decimals is None or not known.any() or not _is_large(stamps[known] * factor):
+    if decimals is None or not known.any():
+        return None
+    first_row = leading_wild(stamps[known], EPOCH / factor)
+    if not _is_large(stamps[known] * factor, first_row):
         return None
     scale = 10**decimals
     whole = np.rint(stamps[known])
@@ -50,14 +54,14 @@ def exact_differences(
         same = read & known[place]
         same[same] = np.abs(ticks[same] / scale - stamps[place][same]) <= 4.0 * np.spacing(stamps[place][same])
         exact[place][same] = ticks[same]
-    start = int(exact[known][0])
+    start = int(exact[known][first_row])
     differences = np.full(len(stamps), np.nan)
     differences[known] = (exact[known] - start) / scale
     return differences, start / NS
 
 
-def _is_large(seconds: FloatArray) -> bool:
-    return bool(seconds[0] > _FIRST and np.all(np.abs(seconds) < _LAST))
+def _is_large(seconds: FloatArray, first: int) -> bool:
+    return bool(seconds[first] > _FIRST and np.all(np.abs(seconds) < _LAST))
 
 
 def _cells(dialect: Dialect, rows: Rows, column: int, decimals: int) -> Iterator[tuple[int, Integers, BoolArray]]:
