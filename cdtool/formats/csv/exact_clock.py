@@ -32,9 +32,9 @@ _AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
 def exact_differences(
     dialect: Dialect, rows: Rows, column: int, stamps: FloatArray, factor: float
 ) -> tuple[FloatArray, float] | None:
-    """Stamps (n,) less the first of them that is not wild, in the column's own unit, and that one [s]; None where float64 holds them.
+    """Stamps (n,) less the first of them, in the column's own unit, and that one [s]; None where float64 holds them.
 
-    `factor` leads to s. A stamp that is written in another way than as plain digits (in quotes, with an exponent) is
+    A wild stamp is not the first. `factor` leads to s. A stamp that is written in another way than as plain digits (in quotes, with an exponent) is
     taken as float64 has it; a missing one is NaN.
     """
     known = np.isfinite(stamps)
