@@ -34,8 +34,8 @@ def exact_differences(
 ) -> tuple[FloatArray, float] | None:
     """Stamps (n,) less the first of them, in the column's own unit, and that one [s]; None where float64 holds them.
 
-    A wild stamp is not the first. `factor` leads to s. A stamp that is written in another way than as plain digits (in quotes, with an exponent) is
-    taken as float64 has it; a missing one is NaN.
+    A wild stamp is not the first. `factor` leads to s. A stamp that is written in another way than as plain digits (in
+    quotes, with an exponent) is taken as float64 has it; a missing one is NaN.
     """
     known = np.isfinite(stamps)
     decimals = _DECIMALS.get(factor)
