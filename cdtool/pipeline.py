@@ -17,6 +17,7 @@ from cdtool.detectors.contract import checked_signal
 from cdtool.judgement import Judgement, judged
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD
+from cdtool.motion.speed_course import TOLERANCE
 from cdtool.operations import Operation
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
@@ -82,7 +83,9 @@ class Detection:
         classes = [replace(item, unit=item.unit or unit) for item in self.judgement.classes]
         moves = abs(speed) >= _AT_REST * min(item.nominal_speed for item in classes)
         measured = MotionClass(int(np.sign(speed)) if moves else 0, abs(speed), joint, unit=unit)
-        return f"measured {measured.described}, learned {' and '.join(item.described for item in classes)}"
+        # A speed of the right size may come at the wrong place: a start where the stroke should run, say.
+        where = " in another part of the stroke" if any(measured.matches(item, TOLERANCE) for item in classes) else ""
+        return f"measured {measured.described}{where}, learned {' and '.join(item.described for item in classes)}"
 
     @property
     def leading(self) -> int:

@@ -123,7 +123,9 @@ def _show_not_judged(detections: list[Detection]) -> None:
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
             where = (
-                f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})" if math.isfinite(item.way_end) else ""
+                f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})"
+                if math.isfinite(item.way_start + item.way_end)
+                else ""
             )
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
         if more := len(not_judged) - len(longest):
