@@ -39,7 +39,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 def test_a_signature_goes_into_a_name_in_json_only(folder, name):
     before = bytes_of(folder)
     done = learn(folder, folder / name)
-    assert done.status == 2 and "let it end in .json" in done.err
+    assert done.status == 2 and "must end in .json" in done.err
     assert bytes_of(folder) == before
 
 
