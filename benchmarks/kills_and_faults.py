@@ -53,7 +53,7 @@ FAULTS = {
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 _STATUS_OF = {signal.SIGTERM: 143, signal.SIGINT: 130}
 # Lines about what was read, which have nothing to do with writing.
-_OF_THE_WORK = ("warning: ", "note: ", "left out: ", "damaged: ")
+_OF_THE_WORK = ("warning: ", "note: ", "left out: ", "loss: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
 _OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "asammdf", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
 Snapshot = dict[str, tuple[int, bytes]]
