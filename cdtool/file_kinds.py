@@ -8,7 +8,7 @@ _MARKS = (
     (re.compile(rb'\s*\{\s*"kind":\s*"cdtool signature"'), "a signature file"),
     (re.compile(rb'\s*\{\s*"provenance":\s*\{\s*"tool":\s*"cdtool"'), "a results file"),
     (re.compile(rb'\s*\{\s*"verdict":\s*"'), "a comparison of two results"),
-    (re.compile(rb"\s*[{\[]"), "JSON"),
+    (re.compile(rb"\s*(?:\{|\[\s*\[?\s*[{\"\d-])"), "JSON"),
     (re.compile(rb"(?:[^\n]*\n)*?\s*\[machine\]"), "a machine file"),
     (re.compile(rb"(?:[^\n]*\n)*?\s*\[(?:learn|holdout|impacts\.[^\]\n]+)\]"), "a benchmark file"),
     (re.compile(rb"\x89MCAP0"), "an MCAP recording"),
