@@ -34,7 +34,7 @@ def behind_leaps(
     """Return True (n,) for the values behind a leap, and the leaps; `is_leap` (n - 1,): the steps that are one.
 
     A value is back where it is within `near` of the one before the leap. With `usual` (centre and reach) a position may
-    have been set to a new zero too: an encoder that is set anew stands among the usual positions and moves on there,
+    have been set to a new zero too: one that is reset stands among the usual positions and moves on there,
     which one that reads nothing does not. Causal, but for a log that begins with what is wrong.
     """
     wrong = np.zeros(len(values), dtype=bool)

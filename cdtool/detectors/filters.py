@@ -26,7 +26,7 @@ def settling_time(cutoff: FloatArray | float) -> FloatArray:
 
 
 def longest_gap(cutoff: FloatArray | float) -> FloatArray:
-    """The longest gap over which a low-pass of `cutoff` [Hz] goes on [s]: a longer one starts it anew."""
+    """The longest gap over which a low-pass of `cutoff` [Hz] goes on [s]: a longer one restarts it."""
     return np.maximum(settling_time(cutoff), BRIDGED)
 
 
@@ -38,7 +38,7 @@ def low_pass(
     Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz] (one, or one a joint), bilinear
     with the measured step and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: over
     the longer step the value runs straight, and the filter takes it in steps of the usual length. After a gap longer
-    than `longest_gap` it starts anew, from rest at the first value.
+    than `longest_gap` it starts again, from rest at the first value.
     """
     filtered, rate = np.empty(values.shape), np.empty(values.shape)
     corners = np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1])

@@ -24,7 +24,7 @@ class Cusum:
     g+_k = max(0, g+_{k-1} + nu_k - `drift`), g-_k = max(0, g-_{k-1} - nu_k - `drift`); statistic = g+, or -g- where
     that is larger; with one side watched, that side's sum alone. nu is the innovation of `innovation`, all in its
     standard deviations; `drift` is half the shift to be found. The sum holds over a gap of up to 0.15 s or 20
-    samples and starts anew behind a longer one. A steady contact force moves innovations by (1 - sum a_i) of itself.
+    samples and starts again behind a longer one. A steady contact force moves innovations by (1 - sum a_i) of itself.
     Fails where the normal mean has moved (payload, temperature): the sum grows without end; and it clears slowly after
     an alarm.
     """

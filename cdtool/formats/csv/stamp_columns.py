@@ -68,12 +68,12 @@ class StampColumns:
         """How each is written, and what its seconds count from."""
         found = []
         for column in self._columns:
-            text, anew = "", self._layout(column).wraps[1]
+            text, wrap = "", self._layout(column).wraps[1]
             if column in self._dates:
                 text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
             elif self._passed[column]:
-                text = f"passes {anew} {self._passed[column]} times; "
-            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else anew
+                text = f"passes {wrap} {self._passed[column]} times; "
+            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wrap
             text += f"written as {self._layout(column).pattern}; in s since {since}"
             found.append(Finding(text, self._dialect.names[column], "note"))
         return found
