@@ -172,7 +172,7 @@ def observe_momentum(
 
     res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
     constant force and any T_k. Over missing samples it waits: the next step is longer. Where only the speed is missing
-    the force goes on; where the torque is, or the pose of coupled joints, a straight line stands for it. It starts again
+    the force goes on; where the torque is, or the pose of coupled joints, a straight line stands for it. It restarts
     behind a gap longer than 3/K and 0.15 s. `ready` (J,) is the time from which the residual may be judged. `momentum`
     is used up: the residual is written over it, since on long logs fresh memory costs as much as the filter.
     """

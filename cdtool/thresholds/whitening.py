@@ -122,7 +122,7 @@ class Whitening:
 def _deviation(signature: FittedSignature, recording: Recording, signal: Signal) -> Signal:
     """(i - mu(x)) / s(x), NO_LIMIT where no band is known.
 
-    START_UP at the sample where the signature changes from one curve to another: the model starts again behind it, since
+    START_UP at the sample where the signature changes from one curve to another: the model restarts behind it, since
     a jump of the mean would look like a contact.
     """
     statistic, band = signature.evaluate(recording, signal)
