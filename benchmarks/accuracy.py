@@ -73,8 +73,8 @@ Scores = Mapping[int, Mapping[str, Score]]
 def written_setup(write: Callable[[Path, Mapping[str, int]], int]) -> BenchmarkFile:
     """The benchmark file and machine file that a simulator writes beside its recordings."""
     with tempfile.TemporaryDirectory() as folder:
-        # One run a group: a benchmark file names no empty group.
-        write(Path(folder), dict.fromkeys(("free", HOLDOUT, *IMPACTS), 1))
+        # As few runs as make a benchmark: two to learn from, one of every other group, since it names no empty one.
+        write(Path(folder), {"free": 2, HOLDOUT: 1, **dict.fromkeys(IMPACTS, 1)})
         return read_benchmark_file(Path(folder) / "benchmark.toml")
 
 
