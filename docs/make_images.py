@@ -30,7 +30,13 @@ UR10E_MOMENTUM_LIMITS = "31.8,29.2,11.3,3.2,2.6,2.9"
 
 
 def cdtool(*arguments: object, folder: Path) -> None:
-    """Run a command in a folder, so that titles show short names; ends the script where it fails."""
+    """Run a command in a folder, so that titles show short names; ends the script where it fails.
+
+    An image that it is to make is removed before: one of an earlier version does not say that cdtool made it.
+    """
+    for image in arguments:
+        if isinstance(image, Path) and image.parent == IMAGES:
+            image.unlink(missing_ok=True)
     code = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", code, *map(str, arguments)]

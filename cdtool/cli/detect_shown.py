@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Operations whose sections that could not be judged are shown, and how many sections of each.
 _SHOWN, _STRETCHES = 6, 3
+# How a contact is found whose onset the rule for the load cell says.
+_CELL = "load cell"
 
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
@@ -58,6 +60,9 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     typer.echo(f"{first.detector}: {plain(threshold)}")
     table(columns, cells)
+    rules = {found.onset for found, _, matching in rows for item in matching.matches if item.contact.found_by == _CELL}
+    for rule in sorted(rules):
+        say(f"latency from contact onset to alarm, debounce included; onset: {rule}")
 
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:

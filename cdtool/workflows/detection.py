@@ -41,8 +41,8 @@ class Detected:
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     `normals`: what impact-free runs look like, or why that is not known.
     `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
-    `not_scored` names contacts without an onset, `warnings` are about the log itself, `notes`
-    about the signature file.
+    `not_scored` names contacts without an onset, `warnings` are about the log itself, `notes` about the signature file.
+    `onset` says how the onset is found on the load cell.
     """
 
     recording: Recording
@@ -58,6 +58,7 @@ class Detected:
     warnings: tuple[Skipped, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
     notes: tuple[Skipped, ...] = ()
+    onset: str = ""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -146,6 +147,7 @@ def detect(
         matched.warnings,
         normals,
         tuple(notes),
+        rules.onset.described,
     )
 
 
@@ -175,6 +177,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         matched.warnings,
         benchmark.normals,
         benchmark.notes,
+        benchmark.setup.onset.described,
     )
 
 
