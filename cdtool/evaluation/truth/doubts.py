@@ -13,6 +13,8 @@ from cdtool.recording import Contact, Finding, FloatArray, Recording, Series
 
 # Above this magnitude of the correlation the force follows the torque.
 _FOLLOWS = 0.95
+# A cell that rests off zero by more than the upper level, or than this share of the first contact's peak, is not tared.
+_NOT_TARED = 0.05
 # It is compared around each contact: this long before its onset and after it [s].
 _BEFORE, _AFTER = 0.2, 0.5
 # A load cell that feels what the drive then answers leads the torque: shifts up to this one are tried [s].
@@ -31,6 +33,7 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     if "force" not in recording:
         return []
     found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]
+    found += [item for item in [_not_tared(contacts, rule)] if item]
     found += [item for item in [_not_back(recording["force"], contacts, rule)] if item]
     found += [item for item in [_begins_late(recording, contacts, rule)] if item]
     joint, r = follows_torque(recording, contacts)
@@ -39,6 +42,18 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
         text = f"follows the torque{name} without lag (r = {r:.3f}): not an independent truth, if it is made from it"
         found.append(Finding(text, "force"))
     return found
+
+
+def _not_tared(contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
+    """A warning where the load cell rests off zero before its first contact."""
+    first = next((item for item in contacts if item.found_by == "load cell" and not item.in_progress), None)
+    if first is None or abs(first.rest) <= max(rule.above or 0.0, _NOT_TARED * first.peak_force):
+        return None
+    return Finding(
+        f"the cell rests at {digits(float(f'{first.rest:.3g}'))} N before the contact at {first.start:.3f} s: it is not "
+        "tared, or was pressed already; forces count from there",
+        "force",
+    )
 
 
 def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:

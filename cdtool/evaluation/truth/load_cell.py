@@ -21,6 +21,9 @@ from cdtool.recording import Contact, FloatArray, Series
 _ROUNDING = 12.0**-0.5
 # Readings closer than this share of the largest one differ by what arithmetic rounds, not by a step of the cell.
 _SAME = 1e-6
+# A step above this [N] must be proved by so many readings, none off its grid by more than this share of a step. Eight
+# deviations of its rounding are 46 N: a coarser load cell is no truth for contacts that limits of 65 N and more allow.
+_COARSEST, _GRID, _OFF_GRID = 20.0, 4, 0.01
 # The rest level is estimated again from the samples up to this long before the onset [s].
 _BEFORE_ONSET = 0.05
 # A burst of noise: within this time [s] before and after, the force crosses both levels so often, goes to the other
@@ -37,13 +40,19 @@ def reading_step(force: FloatArray) -> float:
 
     Where it is coarser than the cell's noise, the median absolute deviation is 0 although the reading flickers by a
     step: the noise is then no less than the rounding's own, step / sqrt(12) (Widrow and Kollar, Quantization Noise,
-    2008), so that 8 standard deviations are 2.3 steps. A cell that gives two readings only, such as a switch, has no
-    step beside its contacts, which stay below that: it is a `label`, or needs a level by hand. `force` holds no missing
-    samples.
+    2008), so that 8 standard deviations are 2.3 steps. A cell that rests at one reading shows no step but those of its
+    contacts, and of a short one they are as large as it: more than 20 N counts only where readings prove it, four or
+    more of them, each on the grid of that step. `force` holds no missing samples.
     """
-    distances = np.diff(np.unique(force))
+    readings = np.unique(force)
+    distances = np.diff(readings)
     distances = distances[distances > _SAME * float(np.max(np.abs(force), initial=0.0))]
-    return float(distances.min()) if len(distances) else 0.0
+    if not len(distances):
+        return 0.0
+    step = float(distances.min())
+    on_grid = (readings - readings[0]) / step
+    proved = len(distances) >= _GRID - 1 and bool(np.all(np.abs(on_grid - np.round(on_grid)) < _OFF_GRID))
+    return step if proved else min(step, _COARSEST)
 
 
 def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
@@ -249,7 +258,7 @@ class _Search:
 
         It was one where the force does not come back to what it was at first, but settles at half of it or less, and
         closer to zero by more than the upper level. So a load cell that is not tared is at rest as long as it comes
-        back, or nearly so.
+        back, or nearly so, and where the force went further to the other side of zero than a release does.
         """
         line, onset = rise.rest, rise.onset
         level = float(line.value(self.time[onset : onset + 1])[0])
@@ -262,11 +271,22 @@ class _Search:
         if settled is None:
             return None
         sample, rest = settled
+        if self.rest.reaches(onset, sample, -level, _RELEASED * level) or self._goes_on(sample, level, rest):
+            return None
         over = self.force[: sample + 1] - rest
         if abs(level - rest) < _SHARE_OF_PEAK * float(np.max(np.abs(over))):
             return None
         _, ends = self._held_runs(0, np.where(np.abs(over) > self.back_to, np.sign(over), 0.0))
         return int(ends[-1]) if len(ends) else sample, rest
+
+    def _goes_on(self, sample: int, level: float, rest: float) -> bool:
+        """Whether the force that went from `level` to `rest` goes on that way, within the rule's separation.
+
+        A touch that is held before the impact: one contact, against the offset of a cell that is not tared.
+        """
+        until = int(np.searchsorted(self.time, self.time[sample] + self.rule.separation, side="right"))
+        further = np.sign(rest - level) * (self.force[sample:until] - rest)
+        return float(np.max(further)) > _RELEASED * abs(level - rest)
 
     def _in_progress(self, last: int, rest: float) -> Contact:
         return Contact(

@@ -128,6 +128,13 @@ class RunningRest:
                 return int(self._first[i]), float(np.median(part))
         return None
 
+    def reaches(self, first: int, last: int, level: float, lasting: float) -> bool:
+        """Whether samples `first` to `last` reach a level [N] on its side of zero, or for an interval `lasting` [N]."""
+        side = float(np.sign(level))
+        intervals = self._median[self._own[first] : self._own[last] + 1]
+        longest = float(np.max(side * intervals))
+        return float(np.max(side * self.force[first : last + 1])) > abs(level) or longest > abs(lasting)
+
     def _by_interval(self, values: FloatArray) -> FloatArray:
         """The median of each interval."""
         ordered = values[np.lexsort((values, self._own))]

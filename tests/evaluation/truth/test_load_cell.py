@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
@@ -234,3 +235,73 @@ def test_a_cell_whose_rest_shifts_in_the_contact_is_not_taken_for_one_that_began
     for before, after in ((-29.0, -25.0), (30.0, 20.0)):
         (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
         assert not found.in_progress and found.start == pytest.approx(3.003, abs=5e-3)
+
+
+@pytest.mark.parametrize("rest", [0.0, 3.0, -200.0], ids=["at exactly 0", "at one reading", "not tared"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("rate", "reading"),
+    [(62.5, [157.0]), (62.5, [157.0, 157.0]), (62.5, [157.0, 310.0]), (1000.0, [157.0] * 5), (1000.0, [157.0] * 3)],
+    ids=["one slow sample", "two slow samples", "two that differ", "5 ms at 1 kHz", "3 ms at 1 kHz"],
+)
+def test_a_short_contact_is_found_where_the_cell_rests_at_one_constant_reading(rate, reading, sign, rest):
+    time = clock(rate)
+    force = np.full(len(time), rest)
+    hit = int(5.0 * rate)
+    force[hit : hit + len(reading)] += sign * np.array(reading)
+    for rule in (OnsetRule(), GATE):
+        (found,) = contacts(time, force, rule)
+        assert (found.start, found.peak_force, found.in_progress) == (time[hit], pytest.approx(max(reading)), False)
+
+
+@pytest.mark.parametrize("step", [0.05, 1.0, 20.0, 50.0])
+def test_no_flicker_of_a_coarse_cell_is_a_contact_beside_one_that_it_felt(step):
+    time = clock(62.5)
+    force = step * np.round(pulse(time, 6.0, peak=60.0 * step) / step)
+    force[[100, 200, 201, 300]] += step * np.array([1.0, 1.0, 1.0, -1.0])
+    (found,) = contacts(time, force, OnsetRule())
+    assert found.start == pytest.approx(6.02, abs=0.02)
+
+
+@pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("offset", [60.0, 200.0, 700.0])
+@pytest.mark.parametrize("left", [0.45, -0.2])
+def test_a_cell_that_is_not_tared_is_at_rest_where_the_log_ends_in_a_contact_against_its_offset(
+    left, offset, sign, rule
+):
+    felt = np.interp(T, [6.0, 6.5, 7.2], [0.0, 2466.0, (1.0 + left) * offset])
+    kept = T < 7.2
+    (found,) = contacts(T[kept], (sign * (offset - felt) + noise(T))[kept], rule)
+    assert not found.in_progress
+    assert found.start == pytest.approx(6.003, abs=6e-3)
+    assert found.peak_force == pytest.approx(2466.0, abs=15.0)
+    assert found.rest == pytest.approx(sign * offset, abs=2.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("offset", [200.0, 291.0, 400.0])
+def test_a_touch_that_is_held_before_the_impact_is_no_release_to_zero(offset, sign):
+    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, and then hit."""
+    felt = np.interp(T, [6.0, 6.1, 6.35, 6.7, 7.2], [0.0, 290.0, 290.0, 2466.0, 600.0])
+    kept = T < 7.2
+    for rule in (OnsetRule(), GATE):
+        (found,) = contacts(T[kept], (sign * (offset - felt) + noise(T))[kept], rule)
+        assert not found.in_progress
+        assert found.start == pytest.approx(6.003, abs=6e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_release_that_rings_is_still_the_end_of_a_contact_in_progress(sign):
+    ringing = np.where(T > 1.0, np.exp(-(T - 1.0) / 0.05) * np.cos(2.0 * np.pi * 40.0 * (T - 1.0)), 1.0)
+    (begun,) = contacts(T, sign * 500.0 * ringing + noise(T))
+    assert begun.in_progress
+
+
+def test_the_offset_of_a_cell_that_is_not_tared_is_reported():
+    force = 200.0 - pulse(T, 6.0) + noise(T)
+    log = Recording("r", "r", ("axis",), {"force": Series(T, force, "N")})
+    (finding,) = truth_findings(log, find_contacts(log, GATE), GATE)
+    assert "rests at 200 N" in finding.message and "not tared" in finding.message
+    tared = Recording("r", "r", ("axis",), {"force": Series(T, force - 195.0, "N")})
+    assert truth_findings(tared, find_contacts(tared, GATE), GATE) == []
