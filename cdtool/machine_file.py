@@ -46,6 +46,11 @@ def read_machine_file(path: str | Path) -> MachineFile:
     if isinstance(values.get("machine"), str):
         raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
     table = root.table("machine", required=True)
+    for part in (root, table):
+        if "operations" in part.values:
+            raise part.fault(
+                "operations", "is a key of the benchmark file", "write it there, or give --operations motion"
+            )
     machines = _registry("cdtool.machines", "MACHINES")
     kind = table.choice("type", machines.names(plugins=True))
     machine = machines.load(kind).from_table(table)

@@ -11,7 +11,9 @@ import pytest
 import cdtool
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.results_file import read_results, to_json
+from cdtool.machine_file import read_machine_file
 from cdtool.workflows.benchmark import benchmark
+from cdtool.workflows.prepared_benchmark import prepare_benchmark
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["feekf", "gm"]\n'
 LEARN = '[learn]\nlogs = ["free/*.csv"]\n'
@@ -149,7 +151,12 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[force]\nprofile = "en_12453"\n', "unknown force profile 'en_12453'.*en_12453_reducing_gap"),
+        ('[force]\nprofile = "en_12453"\n', "force.profile: unknown force profile 'en_12453'.*en_12453_reducing_gap"),
+        (
+            '[impacts.x]\nlogs = ["holdout/*.csv"]\nforce_profile = "yard"\n',
+            "x.force_profile: .*'yard': .force. limits names no",
+        ),
+        ('[force]\nprofile = "yard"\nfile = "yard.toml"\n', "force.file: unknown key"),
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
         ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*'a' does too"),
         ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown figure"),
@@ -221,3 +228,24 @@ def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
     labelled = run(gate, HEAD, LEARN, ONSET, 'labels = "two.csv"\n', STIFF)
     peaks = [row.peak_force_n for row in labelled.results.contacts if row.recording == first.recording][:2]
     assert peaks[0] < 50.0 < 1000.0 < peaks[1]
+
+
+def test_detectors_may_be_named_on_the_command_line_alone(gate):
+    head = 'machine = "machine.toml"\n'
+    with pytest.raises(ConfigurationError, match="detectors: is missing"):
+        run(gate, head, LEARN, ONSET, STIFF)
+    limit = '[limits]\n"gm.stiff.missed" = { max = 0 }\n'
+    done = run(gate, head, LEARN, ONSET, STIFF, limit, detectors=("gm", "pi"))
+    assert done.results.detectors[0] == "momentum" and len(done.results.detectors) == 2
+    assert [item.outcome for item in done.results.limits] == ["met"]
+    assert "momentum" in run(gate, head, LEARN, ONSET, STIFF, detectors=("all",)).results.detectors
+    assert prepare_benchmark(gate / "b.toml", detector="gm").detector == "momentum"
+
+
+@pytest.mark.parametrize("made", ['operations = "motion"\n[machine]\n', '[machine]\noperations = "motion"\n'])
+def test_operations_in_a_machine_file_are_answered_with_where_they_belong(gate, made):
+    text = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "cut.toml").write_text(text.replace("[machine]\n", made), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"operations: is a key of the benchmark file") as fault:
+        read_machine_file(gate / "cut.toml")
+    assert "--operations motion" in fault.value.hint

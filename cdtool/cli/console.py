@@ -25,8 +25,8 @@ from cdtool.strict_json import strict_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from cdtool.pipeline import Detection
     from cdtool.recording import Finding
+    from cdtool.workflows.detection import Detected
     from cdtool.workflows.runs import Progress
 
 _SHOWN = 10
@@ -86,14 +86,24 @@ def leave_with(findings: Iterable[Finding], facts: Iterable[Fact] = ()) -> None:
     leave(facts=[*facts, *([Fact.LOST] if lost else [])])
 
 
-def print_not_assessable(logs: Iterable[tuple[str, Sequence[Detection]]]) -> list[Fact]:
-    """On stderr each log of which no operation could be assessed, with its reasons; what follows for the status."""
+def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
+    """On stderr each log of which no operation, or no contact, could be assessed, with its reasons; what follows.
+
+    As in `cdtool benchmark` an alarm without a contact says nothing of contacts that nobody could judge.
+    """
     facts: list[Fact] = []
-    for name, detections in logs:
-        if all(item.verdict.outcome == "not assessable" for item in detections):
-            reasons = dict.fromkeys(item.verdict.reason for item in detections)
-            typer.echo(f"not assessable: {plain(name)}: {plain('; '.join(reasons) or 'no operation in it')}", err=True)
-            facts.append(Fact.NOTHING_ASSESSABLE)
+    for name, found in logs:
+        contacts = [row for rows in found.contact_rows for row in rows if row.outcome != "in_progress"]
+        if all(item.verdict.outcome == "not assessable" for item in found.detections):
+            reasons = dict.fromkeys(item.verdict.reason for item in found.detections)
+            words = "; ".join(reasons) or "no operation in it"
+        elif contacts and all(row.outcome == "not_assessable" for row in contacts):
+            reasons = dict.fromkeys(row.reason or "no reason is known" for row in contacts)
+            words = f"none of {counted(len(contacts), 'contact')} could be assessed: {'; '.join(reasons)}"
+        else:
+            continue
+        typer.echo(f"not assessable: {plain(name)}: {plain(words)}", err=True)
+        facts.append(Fact.NOTHING_ASSESSABLE)
     return facts
 
 

@@ -188,7 +188,7 @@ def detect(
         for log, _ in done:
             if log in plot_names:
                 typer.echo(f"plot written to {plain(plot_names[log])}")
-    leave(skipped, print_not_assessable((str(log), found.detections) for log, found in done))
+    leave(skipped, print_not_assessable((str(log), found) for log, found in done))
 
 
 def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:

@@ -142,7 +142,7 @@ def explain(
     for path in _draw(explained, drawn, log.stem, force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
-    leave(skipped, print_not_assessable([(str(log), explained.found.detections)]))
+    leave(skipped, print_not_assessable([(str(log), explained.found)]))
 
 
 def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) -> list[Path]:

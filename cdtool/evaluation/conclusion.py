@@ -28,7 +28,10 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True)
 class ForceCheck:
-    """The verdict of one contact, or of one test point, that decides about a group's force profile."""
+    """The verdict of one contact, or of one test point, that decides about a group's force profile.
+
+    Without a name it is about the whole group, none of whose contacts was scored.
+    """
 
     group: str
     profile: str
@@ -65,7 +68,7 @@ def force_checks(results: Results) -> list[ForceCheck]:
         why = "no load-cell force"
         unseen = [f"{name}, contact {number}" for name, number in sorted(contacts - known)]
         if not contacts and not rows and not points:
-            unseen, why = ["every contact"], "no recording of the group could be scored"
+            unseen, why = [""], "no contact of the group was scored: its recordings were left out, or show none"
             if any(item.group == group for item in results.contacts):
                 why = "every contact was in progress when its recording began: its onset is not recorded"
         found += [ForceCheck(group, profile, name, "not_assessable", why, None) for name in unseen]
@@ -166,17 +169,21 @@ def _force_words(verdicts: Counter[str], checks: Sequence[ForceCheck]) -> Iterat
     of = _things(checks)
     if verdicts["fail"]:
         yield f"force profile violated by {verdicts['fail']} of {of}"
-    if verdicts["not_assessable"]:
-        yield f"force profile not assessable for {verdicts['not_assessable']} of {of}"
+    groups = [item.group for item in checks if not item.name]
+    if verdicts["not_assessable"] > len(groups):
+        yield f"force profile not assessable for {verdicts['not_assessable'] - len(groups)} of {of}"
+    if groups:
+        yield f"force profile not assessable in {', '.join(groups)}, where no contact was scored"
     if verdicts["pass"] == len(checks):
         yield f"force profile met by {of}"
 
 
 def _things(checks: Sequence[ForceCheck]) -> str:
     points = sum(isinstance(item.row, PointResult) for item in checks)
-    if points == len(checks):
+    contacts = sum(bool(item.name) for item in checks) - points
+    if points and not contacts:
         return counted(points, "test point")
-    return f"{len(checks)} contacts and test points" if points else counted(len(checks), "contact")
+    return f"{contacts + points} contacts and test points" if points else counted(contacts, "contact")
 
 
 def _missed_words(missed: Sequence[Summary], forbidden: Sequence[Summary]) -> Iterator[str]:
@@ -211,7 +218,9 @@ def _reasons(
     for verdict, what in (("fail", "violated by"), ("not_assessable", "not assessable for")):
         for (group, profile), items in parts.items():
             those = [item for item in items if item.verdict == verdict]
-            if those:
+            if those and not those[0].name:
+                yield plain(f"force, {group}, {profile}: not assessable: {those[0].reason}")
+            elif those:
                 first = f"{those[0].name}: {those[0].reason}" if those[0].reason else those[0].name
                 text = f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"
                 yield plain(text)

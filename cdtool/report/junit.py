@@ -66,7 +66,7 @@ def _limit(item: LimitResult) -> ElementTree.Element:
 
 
 def _force(item: ForceCheck) -> ElementTree.Element:
-    name = f"{item.group}: {item.name}"
+    name = f"{item.group}: {item.name or 'no contact'}"
     if item.verdict == "pass":
         return _case("force", name, lines=[f"{item.profile}: pass"])
     kind = "failure" if item.verdict == "fail" else "error"

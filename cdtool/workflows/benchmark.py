@@ -74,7 +74,7 @@ def benchmark(
     nothing can be learned, RecordingError where nothing could be scored, UsageError where the runs learned from are too
     few for the budget.
     """
-    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file)
+    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
     limits = len(setup.limits)
     setup = with_detectors(setup, detectors) if detectors else setup
     setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup

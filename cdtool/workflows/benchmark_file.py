@@ -116,9 +116,12 @@ class BenchmarkFile:
         return tuple(self.impacts)
 
 
-def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Sequence[str] = ()) -> BenchmarkFile:
+def read_benchmark_file(
+    path: str | Path, learning: bool = True, also_known: Sequence[str] = (), detectors: Sequence[str] = ()
+) -> BenchmarkFile:
     """Read and check a benchmark file; raises ConfigurationError naming the key.
 
+    `detectors` stand for the file's own where it names none; `all` for every one that is registered.
     Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from, and
     [limits] may be on the detectors `also_known`.
     """
@@ -129,7 +132,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         raise ConfigurationError(text, f'a benchmark file names it: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(base / root.text("machine"))
-    wanted = root.texts("detectors", None if learning else ())
+    wanted = root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "names a detector twice", "name each once")
@@ -137,6 +140,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
     threshold, rule = read_threshold(root, signature)
     learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
     force = root.table("force")
+    mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
     impacts = _groups(root, base, window, force)
     onset = root.table("onset")
@@ -155,7 +159,7 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
-        mass_before_cell=force.number("mass_before_cell_kg", 0.0, minimum=0.0),
+        mass_before_cell=mass_before_cell,
         learn=learn,
         impacts=impacts,
         campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
@@ -167,7 +171,6 @@ def read_benchmark_file(path: str | Path, learning: bool = True, also_known: Seq
         window=window,
         migrated=migrated,
     )
-    force.finish()
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
         raise root.fault("points", "there is no force profile that they are held against", "set [force] profile")
@@ -190,11 +193,14 @@ def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
 
     Raises ConfigurationError for an unknown name, UsageError for one that is named twice.
     """
-    known = DETECTORS.usable_names() if list(names) == ["all"] else names
-    chosen = tuple(setup.machine_file.detector(name).name for name in known)
+    chosen = tuple(setup.machine_file.detector(name).name for name in _all_or(names))
     if len(set(chosen)) < len(chosen):
         raise UsageError(f"detectors {', '.join(names)} name one twice", "name each once")
     return with_only(setup, chosen)
+
+
+def _all_or(names: Sequence[str]) -> Sequence[str]:
+    return DETECTORS.usable_names() if list(names) == ["all"] else names
 
 
 def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
@@ -210,14 +216,18 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
         raise tables.fault(HOLDOUT, "is the name of the impact-free group", "choose another name for the impacts")
     profiles = read_force_limits(base / force.text("limits") if "limits" in force else None)
     profile = force.text("profile", "")
+    if profile:
+        _profile(profiles, force, "profile", force)
     groups = {}
     for name in tables.values:
         if name.strip() in ("", ALL):
             raise tables.fault(name, "is no name of a group", f"a name is needed; {ALL} stands for every group")
         table = tables.table(name)
-        wanted = table.text("force_profile", profile)
+        limits = _profile(profiles, table, "force_profile", force) if "force_profile" in table else None
+        if profile and "force_profile" not in table:
+            limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        groups[name] = Group(logs_of(table, base), own, profile_of(profiles, wanted) if wanted else None)
+        groups[name] = Group(logs_of(table, base), own, limits)
     if HOLDOUT in root:
         groups[HOLDOUT] = Group(logs_of(root.table(HOLDOUT), base), window)
     if "limits" in force and not any(group.force for group in groups.values()):
@@ -225,6 +235,26 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
     if not groups:
         raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
     return groups
+
+
+def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
+    """The force profile that a key names, None for an empty text; raises ConfigurationError naming key and file."""
+    if not (name := table.text(key)):
+        return None
+    try:
+        return profile_of(profiles, name)
+    except UsageError as fault:
+        where = f" in {force.text('limits')}" if "limits" in force else ": [force] limits names no file of your own"
+        raise table.fault(key, f"{fault.message}{where}", fault.hint) from fault
+
+
+def _mass_before_cell(force: Table) -> float:
+    """The mass before the cell [kg]; every key of [force] is asked for, so that an unknown one is named first."""
+    mass = force.number("mass_before_cell_kg", 0.0, minimum=0.0)
+    for name in ("limits", "profile"):
+        force.raw(name)
+    force.finish()
+    return mass
 
 
 def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:

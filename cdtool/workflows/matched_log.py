@@ -17,6 +17,7 @@ from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.runs import DAMAGED
 from cdtool.workflows.scoring_rules import ScoringRules
+from cdtool.workflows.uncut_log import uncut_log
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def match_log(
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
         (*_not_scored(recording, contacts, inside, cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_unseen_forces(recording, contacts, courses), *doubts),
+        (*warned, *uncut_log(recording, found, cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
     )
 
 

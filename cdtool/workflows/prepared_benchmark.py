@@ -71,7 +71,7 @@ def prepare_benchmark(
     wrong file, SignatureError where nothing can be learned or the signature does not belong, UsageError for a detector
     that is not clear.
     """
-    setup = read_benchmark_file(file)
+    setup = read_benchmark_file(file, detectors=(detector,) if detector else ())
     machine_file = setup.machine_file
     if signature is not None:
         stored = read_signature(signature)

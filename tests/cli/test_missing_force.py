@@ -171,6 +171,26 @@ def test_a_group_of_contacts_in_progress_alone_says_so(tmp_path):
     assert done.status == 3
 
 
+def test_a_group_whose_logs_were_all_left_out_counts_no_contact_and_gives_the_true_reason(tmp_path):
+    (tmp_path / "force.toml").write_text(PROFILE, encoding="utf-8")
+    file = folder_of(
+        tmp_path,
+        {"felt": lambda _, force: force},
+        '[force]\nprofile = "yard"\nlimits = "force.toml"\n[impacts.soft]\nlogs = ["none.csv"]\n',
+    )
+    source = Path(__file__).parents[2] / "sample_logs" / "gate" / "stiff" / "03.csv"
+    changed(source, tmp_path / "none.csv", lambda _, force: 0.0 * force)
+    done = cdtool("benchmark", file, "-o", tmp_path / "results.json", "-o", tmp_path / "results.xml")
+    conclusion = read_results(tmp_path / "results.json").conclusion
+    words = " ".join(done.out.split())
+    assert "force profile not assessable in soft, where no contact was scored" in conclusion.headline
+    assert "of 1 contact;" in f"{conclusion.headline};" and "of 2 contacts" not in words
+    assert "force, soft, yard: not assessable: no contact of the group was scored" in words
+    assert "no load-cell force" not in words and "every contact:" not in words
+    assert "no contact found" in done.err and done.status in (1, 3)
+    assert 'name="soft: no contact"' in (tmp_path / "results.xml").read_text(encoding="utf-8")
+
+
 def test_changed_logs_keep_their_blank_cells(tmp_path):
     source = Path(__file__).parents[2] / "sample_logs" / "gate" / "stiff" / "03.csv"
     changed(source, tmp_path / "a.csv", without(0.0, 0.1))

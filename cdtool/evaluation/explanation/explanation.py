@@ -20,7 +20,7 @@ from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import GROUND_TRUTH, Contact
 
-Role = Literal["detection", "further alarm", "false alarm", "alarm"]
+Role = Literal["detection", "further alarm", "in progress", "false alarm", "alarm"]
 
 # When the margin is told [s]: to the alarm; from the onset of a missed contact.
 _TO_ALARM = (-0.1, -0.05, -0.02, -0.01, -0.005, 0.0)
@@ -35,8 +35,9 @@ _AFTERMATH = 0.5
 class AlarmExplanation:
     """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` consecutive samples.
 
-    `skipped` samples were missing among them. `contact` is the one that the alarm belongs to. `moved` are the channels
-    in the order in which they moved; `inputs` names those that the detector needs. `cause` is the likely one, of which
+    `skipped` samples were missing among them. `contact` is the one that the alarm belongs to; None also where that was
+    in progress when the recording began: its onset is not recorded. `moved` are the channels in the order in which they
+    moved; `inputs` names those that the detector needs. `cause` is the likely one, of which
     neither load cell nor labels were asked. `runs`: how many impact-free runs the channels were compared with; where
     none, `absent` is why, and the log's own past had to do.
     """
@@ -150,6 +151,8 @@ def explain_alarm(
     left = float(margin.time[first])
     times = [alarm.time + step for step in _TO_ALARM]
     recording = detection.operation.recording.without_ground_truth()
+    if contact is not None and contact.in_progress:
+        contact, role = None, "in progress"
     if contact:
         times.append(contact.start)
         moved = _moved_at_contact(detection, margin.name, contact, alarm.time)

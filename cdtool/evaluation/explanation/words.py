@@ -10,6 +10,7 @@ from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanat
 from cdtool.evaluation.explanation.margin import Approach
 from cdtool.evaluation.explanation.movement import COMMANDS, Movement
 from cdtool.evaluation.explanation.normal_choice import Absence
+from cdtool.evaluation.truth.matching import IN_PROGRESS
 from cdtool.plain_text import counted
 from cdtool.recording import REFERENCES, Contact
 
@@ -53,6 +54,8 @@ def words(explanation: Explanation) -> list[str]:
 
 def _headline(item: AlarmExplanation) -> str:
     at = f"{item.alarm.time:.3f} s"
+    if item.role == "in progress":
+        return f"alarm at {at}, in a contact {IN_PROGRESS}: no latency"
     if item.contact is None:
         known = "false alarm" if item.role == "false alarm" else "alarm"
         why = "no contact belongs to it" if item.role == "false alarm" else "this log does not tell of contacts"

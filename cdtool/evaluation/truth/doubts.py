@@ -49,11 +49,11 @@ def _not_tared(contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     first = next((item for item in contacts if item.found_by == "load cell" and not item.in_progress), None)
     if first is None or abs(first.rest) <= max(rule.above or 0.0, _NOT_TARED * first.peak_force):
         return None
-    return Finding(
-        f"the cell rests at {digits(float(f'{first.rest:.3g}'))} N before the contact at {first.start:.3f} s: it is not "
-        "tared, or was pressed already; forces count from there",
-        "force",
+    rest = digits(float(f"{first.rest:.3g}"))
+    text = (
+        f"the cell rests at {rest} N before the contact at {first.start:.3f} s: not tared, or pressed already; forces"
     )
+    return Finding(f"{text} count from there", "force")
 
 
 def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:

@@ -247,6 +247,18 @@ def test_every_alarm_and_every_miss_is_explained_once_in_order_of_time_with_its_
     assert words(found[2])[0].startswith("further alarm at 3.708 s, 708 ms after the contact")
 
 
+def test_an_alarm_of_a_contact_in_progress_has_neither_onset_nor_latency():
+    item = detection(pulse(400, 30) + pulse(3020, 30))
+    begun = Contact(0.0, 1.0, 0.0, in_progress=True)
+    first, second = explain(item, matching(item, begun, CONTACT), NINE)
+    assert isinstance(first, AlarmExplanation) and isinstance(second, AlarmExplanation)
+    assert (first.role, first.contact, second.role) == ("in progress", None, "detection")
+    told = " ".join(words(first))
+    assert told.startswith("alarm at 0.408 s, in a contact in progress when the recording begins")
+    assert "its onset is not recorded: no latency" in told
+    assert "onset at" not in told and "after the contact" not in told and "after the onset" not in told
+
+
 def test_without_ground_truth_an_alarm_is_not_called_false():
     item = detection(pulse(1000, 30))
     (found,) = explain(item, matching(item), NINE)
