@@ -179,9 +179,10 @@ def make_bench(folder: Path) -> None:
         log.write_text("\n".join([lines[0], *lines[1::5]]) + "\n")
     benchmark = (folder / "benchmark.toml").read_text()
     lines = [line for line in benchmark.splitlines() if not line.startswith("detectors")]
-    benchmark = "\n".join(['detectors = ["gm", "pt"]', *lines]) + "\n[signature]\nforce = true\n"
+    benchmark = "\n".join(['detectors = ["gm", "pt"]', *lines]) + "\n"
+    assert "[signature]\nforce = true" in benchmark
     (folder / "benchmark.toml").write_text(benchmark)
-    (folder / "full.toml").write_text(benchmark.replace("[signature]\nforce = true\n", "") + _MORE)
+    (folder / "full.toml").write_text(benchmark.partition("[signature]")[0] + _MORE)
     labelled = benchmark.replace("[onset]", '[onset]\nlabels = "labels.csv"')
     (folder / "labelled.toml").write_text(labelled)
     (folder / "labels.csv").write_text(_LABELS)
