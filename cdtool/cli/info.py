@@ -60,7 +60,7 @@ def _show(item: Info) -> None:
             channel.samples,
             channel.missing or "-",
             number(channel.rate_hz, 5),
-            number(channel.start_s, 7),
+            number(channel.start_s if channel.start_s is None else round(channel.start_s, 9), 7),
             number(channel.duration_s, 6),
             number(channel.minimum, 4),
             number(channel.maximum, 4),

@@ -19,6 +19,8 @@ simulate = typer.Typer(
 )
 
 _FORMATS = ("csv", "mcap", "mixed")
+# As many logs of a group as a folder of numbered files is still handled with.
+_MOST = 100_000
 
 
 @simulate.callback()
@@ -26,10 +28,10 @@ def _simulate() -> None:
     """Write simulated recordings with known contacts."""
 
 
-FreeOption = Annotated[int, typer.Option("--free", min=0, help="Impact-free runs to learn from.")]
-HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, help="Impact-free runs kept apart.")]
-StiffOption = Annotated[int, typer.Option("--stiff", min=0, help="Impacts on the bare load cell.")]
-SoftOption = Annotated[int, typer.Option("--soft", min=0, help="Impacts with a rubber bumper.")]
+FreeOption = Annotated[int, typer.Option("--free", min=0, max=_MOST, help="Impact-free runs to learn from.")]
+HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, max=_MOST, help="Impact-free runs kept apart.")]
+StiffOption = Annotated[int, typer.Option("--stiff", min=0, max=_MOST, help="Impacts on the bare load cell.")]
+SoftOption = Annotated[int, typer.Option("--soft", min=0, max=_MOST, help="Impacts with a rubber bumper.")]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")]
 FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")]
 ReferenceOption = Annotated[
@@ -94,7 +96,7 @@ def arm(
 @simulate.command("season", epilog=statuses_words("simulate season"))
 def season(
     output: OutputOption,
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Impact-free runs, one after another.")] = 60,
+    runs: Annotated[int, typer.Option("--runs", min=1, max=_MOST, help="Impact-free runs, one after another.")] = 60,
     friction_change: Annotated[
         float, typer.Option("--friction-change", help="Share by which friction changes over the season: 0.3, -0.2.")
     ] = 0.0,

@@ -149,7 +149,7 @@ class _Told:
         share = len(rows) / self._count
         shown = ", ".join(str(int(row) + self._first_row) for row in rows[:3])
         where = f"{self._name} {shown}{', ...' if len(rows) > 3 else ''}"
-        text = f"{counted(len(rows), 'time stamp', what)} ({where}), dropped ({100.0 * share:.2g} % of the rows){why}"
+        text = f"{counted(len(rows), 'time stamp', what)} ({where}), dropped ({_percent(share)} % of the rows){why}"
         severity: Literal["warning", "loss"] = "loss" if why or share > _STRAY_SHARE else "warning"
         self.findings.append(Finding(text, "time", severity))
 
@@ -175,3 +175,7 @@ def _restart(stamps: FloatArray, backward: BoolArray) -> str:
     if np.any(run == _RESTART_ROWS):
         return "; the clock starts again there, or has jumped ahead before: cut the log there, or correct its stamps"
     return ""
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g}" if share < 0.1 else f"{100.0 * share:.0f}"

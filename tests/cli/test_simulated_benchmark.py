@@ -31,3 +31,8 @@ def test_what_cannot_be_run_is_not_written_and_the_reason_is_said(tmp_path, coun
     assert not (tmp_path / "gate" / "benchmark.toml").exists()
     assert len(shown) == 2 and shown[1].startswith("no benchmark.toml: ") and shown[1].endswith(why)
     assert "recordings" in shown[0] or counts == (0, 0, 1)
+
+
+def test_more_logs_than_a_folder_holds_are_refused_at_once(tmp_path):
+    done = cdtool("simulate", "gate", "--free", "99999999999999999999", "-o", tmp_path / "logs")
+    assert done.status == 2 and "100000" in done.err and not (tmp_path / "logs").exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.clock import clean_time
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.formats.reading import read_recording
@@ -60,3 +61,8 @@ def test_channels_whose_clocks_have_no_time_in_common_are_told_with_their_distan
     later, before = ("torque", "speed") if starts[0] < starts[1] else ("speed", "torque")
     assert [item.channel for item in findings] == [later] * bool(distance)
     assert all(f"begins {distance} s after {before} ends" in item.message for item in findings)
+
+
+def test_a_clock_that_runs_backward_throughout_is_counted_in_plain_figures():
+    (found,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
+    assert "4999 time stamps run backward" in found.message and "dropped (100 % of the rows)" in found.message

@@ -105,9 +105,10 @@ def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[s
     time, reading = force.time[present], force.values[present, 0]
     near = _near(time, contacts)
     time, reading = time[near], reading[near]
-    period = np.nanmax([force.period, torque.period])
-    if len(time) < _FEWEST or not np.isfinite(period) or np.ptp(reading) == 0.0:
+    periods = [item.period for item in (force, torque) if np.isfinite(item.period)]
+    if len(time) < _FEWEST or not periods or np.ptp(reading) == 0.0:
         return none
+    period = max(periods)
     best = none
     for j, joint in enumerate(recording.joints):
         r = _correlation(reading, _at(torque, j, time))

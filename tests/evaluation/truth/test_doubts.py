@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,12 @@ def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
     assert found[0].start == pytest.approx(3.3, abs=0.3)  # the first push, by the observer: 3.4 s
     name, r = follows_torque(recording, found)
     assert (name, r) == ("abcdef"[joint], pytest.approx(1.0, abs=0.02))
+
+
+def test_of_a_single_sample_nothing_is_followed_and_numpy_has_nothing_to_say():
+    one = np.zeros((1, 1))
+    channels = {"torque": Series(np.zeros(1), one, "N m"), "force": Series(np.zeros(1), one, "N")}
+    recording = Recording("one", "made up", ("axis",), channels)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(follows_torque(recording, [])[1])
