@@ -36,6 +36,21 @@ def shorten(text: str, length: int) -> str:
     return f"{text[: length - 1 - tail]}…{text[len(text) - tail :]}"
 
 
+def shorten_names(text: str, length: int) -> str:
+    """As `shorten`, but of a list behind "known: " as many whole names as fit stay, with how many more there are.
+
+    >>> shorten_names("did you mean two? known: one, two, three, four", 42)
+    'did you mean two? known: one and 3 more'
+    """
+    head, known, listed = text.partition("known: ")
+    names = listed.split(", ")
+    for count in range(len(names) - 1, 0, -1) if known and len(text) > length else ():
+        shown = f"{head}{known}{', '.join(names[:count])} and {len(names) - count} more"
+        if len(shown) <= length:
+            return shown
+    return shorten(text, length)
+
+
 def digits(value: float, least: int = 6) -> str:
     """A number with `least` significant digits, a whole one with all of them; never an exponent."""
     if not math.isfinite(value) or value == 0.0:

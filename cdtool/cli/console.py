@@ -18,7 +18,7 @@ from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact, status_of
-from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten
+from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten, shorten_names
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
@@ -39,7 +39,7 @@ def print_error(fault: CdtoolError) -> None:
     """One line of at most 300 characters: what is wrong, then the next step."""
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
-    hint = shorten(hint, max(_SHORTEST_HINT, room - len(message)))
+    hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
     message = shorten(message, room - len(hint))
     typer.echo(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
 

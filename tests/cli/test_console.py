@@ -8,6 +8,8 @@ from unittest import mock
 import pytest
 
 from cdtool.cli import console
+from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.force.limits import read_force_limits
 from tests.command import cdtool
 
 
@@ -59,3 +61,13 @@ def test_a_packed_log_or_a_workbook_is_told_how_to_become_one(gate_folder, tmp_p
     (tmp_path / "log.csv").write_bytes(head + bytes(range(256)) * 4)
     done = cdtool("detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert done.status == 2 and step in done.err
+
+
+def test_a_long_list_of_known_names_is_not_cut_in_a_name(capsys):
+    known = read_force_limits()
+    console.print_error(UsageError("a" * 200, nearest("yard", known)))
+    line = capsys.readouterr().err.strip()
+    listed, _, more = line.partition("known: ")[2].removesuffix(")").partition(" and ")
+    shown = listed.split(", ")
+    assert len(line) <= 300 and set(shown) < set(known) and len(shown) >= 2
+    assert more == f"{len(known) - len(shown)} more"
