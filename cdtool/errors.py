@@ -12,10 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-# So many characters of known names fit the line of an error whole, with how many more there are.
-_ROOM = 125
-
-
 class CdtoolError(Exception):
     """A known fault: `message` says what is wrong and where, `hint` what to do next."""
 
@@ -53,17 +49,10 @@ class NothingValidError(SignatureError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Words that help after a wrong name: the nearest known ones first, then as many whole names as fit.
-
-    >>> nearest("torqe", ["speed", "torque"])
-    'did you mean torque? known: speed, torque'
-    """
+    """Words that help after a wrong name: the nearest known ones first, then all of them."""
     names = sorted(known)
     close = get_close_matches(name, names, n=2, cutoff=0.5)
-    words = f"did you mean {' or '.join(close)}? known: " if close else "known: "
-    room, fitting = _ROOM - len(words), 0
-    while fitting < len(names) and (room := room - len(names[fitting]) - len(", ")) >= 0:
-        fitting += 1
-    fitting = max(fitting, 1)
-    more = f" and {len(names) - fitting} more" if len(names) > fitting else ""
-    return words + (", ".join(names[:fitting]) + more if names else "none")
+    listed = ", ".join(names) if names else "none"
+    if close:
+        return f"did you mean {' or '.join(close)}? known: {listed}"
+    return f"known: {listed}"
