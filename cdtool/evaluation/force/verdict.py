@@ -137,7 +137,8 @@ def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdic
     above = inside[course.force[inside] > step.at_most_n]
     if len(above):
         budget = _crossing(course, int(above[0]), step)
-        reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after the onset"
+        since = "it was first seen" if course.hole else "the onset"
+        reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after {since}"
         return StepVerdict(step, "fail", peak, peak_at, budget, reason)
     reason = _unseen(course, step, ends) or _may_exceed(course, step, ends)
     if not reason and course.clipped[inside].any():

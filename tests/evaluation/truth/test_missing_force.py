@@ -116,7 +116,10 @@ def test_a_force_that_nobody_saw_never_passes(begin, end, own_clock):
 def test_a_violation_that_was_seen_stands():
     one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
     (contact,) = find_contacts(one, RULE)
-    assert judge(force_course(one, contact), PROFILE).outcome == "fail"
+    verdict = judge(force_course(one, contact), PROFILE)
+    assert verdict.outcome == "fail"
+    (failed,) = [item for item in verdict.steps if item.outcome == "fail"]
+    assert "ms after it was first seen" in failed.reason and "after the onset" not in failed.reason
 
 
 def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
