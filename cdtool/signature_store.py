@@ -75,7 +75,9 @@ def read_signature(path: str | Path) -> SignatureFile:
 
 def _no_signature(file: Path, content: bytes, why: str = "") -> SignatureError:
     kind = kind_of(content)
-    what = f"is {kind}, not a signature file" if kind and kind != "a signature file" else f"not a signature file{why}"
+    # A signature file is JSON itself: what is wrong in it says more.
+    own = not kind or kind in ("a signature file", "JSON")
+    what = f"not a signature file{why}" if own else f"is {kind}, not a signature file"
     return SignatureError(f"{file}: {what}", "make one with cdtool learn-signature")
 
 
