@@ -94,7 +94,7 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     assert len(read_recording(path, machine(only))[kept]) == 4000
     for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
         (told,) = said(source)
-        assert told.startswith("time2: another clock than 'time1' (") and "beside it torque, speed" in told
+        assert told.startswith("time2: another clock than 'time1' (") and "next to torque, speed" in told
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_values_without_a_time_are_a_loss(log, machine):
     recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
     lost = [str(found) for found in recording.findings if found.severity == "loss"]
-    text = "1 values stand in rows in which its clock is empty: left out"
+    text = "1 value in rows in which its clock is empty: left out"
     assert lost == [f"torque: {text}", f"speed: {text}"]
 
 

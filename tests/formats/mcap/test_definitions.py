@@ -66,7 +66,7 @@ def test_a_schema_that_is_not_there_loses_its_messages_only(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, channel(3, b"/c", 9), message(1, 1), message(3, 2)))
     found, findings = read_or_refused(path)
     assert [time for _, time, _ in found] == [1]
-    assert findings == ["channel '/c' names schema 9, which is not there: 1 messages lost"]
+    assert findings == ["channel '/c' names schema 9, which is not there: 1 message lost"]
 
 
 def test_a_schema_with_the_id_0_is_ignored(tmp_path):
