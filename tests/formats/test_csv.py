@@ -150,7 +150,7 @@ def test_a_half_written_last_line_is_dropped_with_a_finding(log, machine, last):
 
 
 def test_a_short_last_line_with_its_end_is_ragged(log):
-    with pytest.raises(RecordingError, match="line 3 has 1 cells"):
+    with pytest.raises(RecordingError, match="line 3 has 1 cell"):
         read(log("t,a\n0,1\n2\n"))
 
 

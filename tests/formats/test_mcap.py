@@ -146,7 +146,7 @@ def test_an_empty_array_is_nan_and_counted(by_hand):
     for field, values in {"q[:]": [[0, 0], [np.nan] * 2, [2, 4], [3, 6]], "q[1]": [0, np.nan, 4, 6]}.items():
         source = Mcap().columns(path, wanted(("/a", field)))
         assert np.array_equal(source.columns[f"/a {field}"].values, np.array(values), equal_nan=True)
-    assert "1 messages hold an empty array" in str(Mcap().columns(path, wanted(("/a", "q[:]"))).findings[-1])
+    assert "1 message holds an empty array" in str(Mcap().columns(path, wanted(("/a", "q[:]"))).findings[-1])
 
 
 def test_an_array_of_varying_length_is_a_clear_error(by_hand):

@@ -42,7 +42,7 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
     source = Mcap().columns(path)
     assert not source.columns
-    assert "1 of 1 messages cannot be decoded" in str(source.findings[0])
+    assert "1 of 1 message cannot be decoded" in str(source.findings[0])
     assert source.findings[0].severity == "loss" and cdtool("info", path).status == 3
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
@@ -76,7 +76,7 @@ def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
     source = Mcap().columns(path)
     assert source.columns["/a x"].values.tolist() == list(range(30))
     assert "was read (30 messages)" in str(source.findings[0])
-    assert "no checksum" in str(source.findings[1])
+    assert "without a checksum" in str(source.findings[1])
 
 
 def test_no_flipped_byte_ever_gives_a_wrong_value(written):

@@ -85,7 +85,7 @@ def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
     assert any("passes midnight 3 times" in finding.message for finding in source.findings)
 
 
-@pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cells")])
+@pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])
 def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     lines = [f"{k},{k}" for k in range(4000)]

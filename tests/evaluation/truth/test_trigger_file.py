@@ -62,7 +62,7 @@ def test_a_file_name_that_fits_several_recordings_is_refused(tmp_path):
         ("recording,time_s\n", "holds no row"),
         ("recording,time_s\na.csv,1\n\n,2\n", "line 4: no recording is named"),
         ("recording,time_s\na.csv,6,123\n", "line 2: 3 cells under 2 columns"),
-        ("recording,time_s\na.csv\n", "line 2: 1 cells under 2 columns"),
+        ("recording,time_s\na.csv\n", "line 2: 1 cell under 2 columns"),
         ("recording,time_s\na.csv,soon\n", "line 2: time_s is 'soon'"),
         ("recording,time_s\na.csv,nan\n", "line 2: time_s is 'nan'"),
         ("recording,time_s\na.csv,1e999\n", "line 2: time_s is '1e999'"),
