@@ -70,7 +70,7 @@ def choose_format(path: Path) -> Format:
     wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
     start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
     seen = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
-    seen = kind_of(head) if seen == "JSON" else seen
+    seen = kind_of(head) or seen if seen == "JSON" else seen
     if wide and not seen and _is_damaged_text(path, wide):
         raise RecordingError(
             f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it again from where it was made"

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, nearest
-from cdtool.plain_text import first_of
+from cdtool.plain_text import counted, first_of
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> 
     where = f"{path} line {line}"
     if len(cells) != len(header):
         raise ConfigurationError(
-            f"{where}: {len(cells)} cells under {len(header)} columns",
+            f"{where}: {counted(len(cells), 'cell')} under {counted(len(header), 'column')}",
             "one cell a column, empty where there is nothing; decimals with a point",
         )
     values = dict(zip(header, cells, strict=True))

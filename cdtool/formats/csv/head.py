@@ -12,6 +12,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import holds_numbers, kind, split_line
 from cdtool.formats.csv.head_words import are_numbered, are_types, is_unit
 from cdtool.formats.csv.lines import Line, is_ruler, shown_lines
+from cdtool.plain_text import counted
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
@@ -197,7 +198,9 @@ class HeadFinder:
         header = next((row for row in cut if row.line.number == number), None)
         names = self._names(header) if header else None
         if header is None or names is None:
-            width = f"has {len(header.cells)} cells, the rows have {self.width}" if header else "holds no cells"
+            width = (
+                f"has {counted(len(header.cells), 'cell')}, the rows have {self.width}" if header else "holds no cells"
+            )
             raise RecordingError(
                 f"{self.path}: line {number}, [csv] header, {width}", "correct or remove header in [csv]"
             )
@@ -233,8 +236,8 @@ class HeadFinder:
         if self.separator == " ":
             hint = "names with blanks need quotes or two blanks between them; or pin header = false in [csv]"
         raise RecordingError(
-            f"{self.path}: line {last.line.number} has {len(last.cells)} names or words, "
-            f"line {first.line.number} has {self.width} cells",
+            f"{self.path}: line {last.line.number} has {counted(len(last.cells), 'name')} or words, "
+            f"line {first.line.number} has {counted(self.width, 'cell')}",
             hint,
         )
 

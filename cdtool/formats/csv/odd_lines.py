@@ -13,6 +13,7 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
 from cdtool.formats.csv.shown_pins import quoted
+from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
 # A survey keeps a column of numbers with so many cells that are none, or with this share of the rows.
@@ -146,7 +147,7 @@ class OddLines:
             self._refuse_footer()
         has = f"the header has {self.dialect.width}" if self.dialect.header else f"the first has {self.dialect.width}"
         raise RecordingError(
-            f"{self.path}: line {line} has {len(cells)} cells, {has}",
+            f"{self.path}: line {line} has {counted(len(cells), 'cell')}, {has}",
             "repair or remove the line; the first row sets the width",
         )
 
@@ -158,7 +159,7 @@ class OddLines:
     def _refuse_footer(self) -> None:
         _, line, text = self.words[0]
         raise RecordingError(
-            f"{self.path}: line {line} has 1 cells, the header has {self.dialect.width}: "
+            f"{self.path}: line {line} has 1 cell, the header has {self.dialect.width}: "
             f"{text.strip()[:40]!r} between the rows",
             "repair or remove the line; pin comment in [csv] if such lines are comments",
         )
@@ -167,7 +168,7 @@ class OddLines:
         if target == EMPTY:
             if cell:
                 raise RecordingError(
-                    f"{self.path}: line {line} has {self.dialect.width} cells, the header has {self.dialect.width - 1}",
+                    f"{self.path}: line {line} has {counted(self.dialect.width, 'cell')}, the header has {self.dialect.width - 1}",
                     "the other rows end with a separator; repair the line",
                 )
             return

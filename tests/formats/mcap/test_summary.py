@@ -124,7 +124,7 @@ def test_a_chunk_whose_times_are_not_those_of_its_messages_is_found(tmp_path, fi
     found, findings, _ = read(path)
     assert found == sent
     text = "; ".join(map(str, findings))
-    assert "1 chunks have other sizes or times than its index says" in text
+    assert "1 chunk has other sizes or times than its index says" in text
     assert "1 chunk claims other times than the messages have" in text
 
 

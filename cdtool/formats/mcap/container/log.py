@@ -221,11 +221,11 @@ class Log:
             other = sum(not same_figures(summary.chunks[at], chunks[at]) for at in both)
             for number, what in (
                 (missing, "are not in its index"),
-                (absent, "of its index are not there"),
+                (absent, "are in its index alone"),
                 (other, "have other sizes or times than its index says"),
             ):
                 if number:
-                    found.append(Finding(f"the summary disagrees with the data: {number} chunks {what}"))
+                    found.append(Finding(f"the summary disagrees with the data: {counted(number, 'chunk', what)}"))
         if section.other_times:
             found.append(
                 Finding(f"{counted(section.other_times, 'chunk', 'claim')} other times than the messages have")
