@@ -168,7 +168,8 @@ class OddLines:
         if target == EMPTY:
             if cell:
                 raise RecordingError(
-                    f"{self.path}: line {line} has {counted(self.dialect.width, 'cell')}, the header has {self.dialect.width - 1}",
+                    f"{self.path}: line {line} has {counted(self.dialect.width, 'cell')}, the header has "
+                    f"{self.dialect.width - 1}",
                     "the other rows end with a separator; repair the line",
                 )
             return
