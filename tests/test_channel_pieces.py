@@ -46,7 +46,7 @@ def write(path: Path, seed: int, start: float = 0.0, rows: int = 300, cell: bool
     time = start + np.arange(rows) / 100.0 + 0.5 * (np.arange(rows) > rows // 2)
     time[random.integers(1, rows, 5)] -= 0.01
     fields = {name: random.normal(size=(rows, 2)) for name in ("position", "velocity", "effort")}
-    fields["velocity"][random.integers(0, rows, 4), 0] = [np.nan, np.inf, -np.inf, -0.0]
+    fields["velocity"][random.choice(rows, 12, replace=False), 0] = [*[np.nan] * 9, np.inf, -np.inf, -0.0]
     fields["effort"][:, 1] = 3.0
     joints = Stream("/joints", "sensor_msgs/msg/JointState", time, fields, ("a", "b"))
     cell_time = start + 0.003 + np.arange(rows // 2) / 50.0

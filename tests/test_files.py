@@ -277,6 +277,7 @@ import os, signal, sys
 from pathlib import Path
 import cdtool.report.plots.figures as figures
 number = getattr(signal, sys.argv[1])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background of a script ignores it
 def slow(path, content):
     from cdtool.files import replaced
     with replaced(path) as (part,):
@@ -311,7 +312,11 @@ def test_a_signal_ends_a_command_as_such_whatever_an_import_makes_of_it(monkeypa
             raise ImportError("initialization failed") from None
 
     monkeypatch.setattr(cdtool.registry.Registry, "names", struck)
-    done = run("list", "detectors")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        done = run("list", "detectors")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert done.status == status and "Traceback" not in done.err
 
 
