@@ -277,7 +277,7 @@ def judged_cells(
 
 
 def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact, name: str) -> None:
-    """Add a contact to the cell's outcomes; what is late, or may be, is told on stderr."""
+    """Add a contact to the cell's outcomes; what is late, or may be, is reported on stderr."""
     if cost is None:
         return
     cell.outcomes[cost.outcome] = cell.outcomes.get(cost.outcome, 0) + 1

@@ -6,7 +6,7 @@
 Contacts of the simulated gate, and drawn ones: half sines of 8 to 250 ms with rebounds and a push that stays, on cells
 of 60 Hz to 1 kHz with and without jitter of their clock, noise, drift and either sign. Each is read whole and with
 faults: one to three holes of 1 ms to 1.5 s at places drawn about the contact, as NaN or as samples that are not there,
-or single samples lost at random (2 %), never two in succession.
+or single samples lost at random (2 %), never two consecutive ones.
 
 Wrong is an onset that lies farther from that of the whole log than the contact says (its uncertainty before it, its
 resolution around it), unless the contact is not assessable; and a force verdict of pass where that of the whole log is
@@ -43,7 +43,7 @@ KINDS = ("NaN", "no rows", "single samples")
 
 @dataclass(frozen=True)
 class Cell:
-    """One load cell's whole log, the rule for its contacts, and the limits that its force is held against."""
+    """One load cell's whole log, the rule for its contacts, and the limits that its force is compared with."""
 
     name: str
     series: Series

@@ -41,9 +41,12 @@ def show_table(evaluated: Evaluated) -> None:
     columns += [(name, "right") for name in names]
     table(columns, [_row(item, shown) for item in evaluated.summaries])
     provenance = evaluated.results.provenance
+    # A mean and its spread are of the contacts detected.
+    *most, last = (name for name in shown if name in ("median", "range", "P95"))
+    with_misses = f"{', '.join(most)} and {last}" if most else last
     say(
         "latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable; "
-        f"median, range and P95 count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
+        f"{with_misses} count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
     )
     few = explained(evaluated.summaries)
     if few:

@@ -123,7 +123,7 @@ def _cells(row: BuildRow) -> tuple[str, ...]:
 
 
 def _rows_table(rows: Sequence[BuildRow]) -> str:
-    """A row a detector and group; the ranges of latency where any row has too few contacts for a mean."""
+    """One row per detector and group; the ranges of latency where any row has too few contacts for a mean."""
     few, at = any(row.few for row in rows), _HEADS.index("latency ms") + 1
     heads = [*_HEADS[:at], *([_RANGE] if few else []), *_HEADS[at:]]
     cells = [[*_cells(row)[:at], *([ranges_of(row) or NOTHING] if few else []), *_cells(row)[at:]] for row in rows]
