@@ -125,8 +125,9 @@ class Registry:
         if found:
             raise UsageError(f"the short name '{name}' belongs to {' and '.join(found)}", "write the full name")
         hint = nearest(name, [*self.names(plugins=True), *self.short_names, *filter(None, short.values())])
-        told = "; ".join([hint, *(item.message for item in broken.values())])
-        raise UsageError(f"unknown {self.kind} '{name}'", told)
+        # What does not load stands before the hint: the list of known names is cut where the line is full.
+        told = "; ".join([f"unknown {self.kind} '{name}'", *(item.message for item in broken.values())])
+        raise UsageError(told, hint)
 
 
 def plugin_packages() -> dict[str, str]:

@@ -100,7 +100,8 @@ def test_the_others_are_listed_beside_a_package_that_cannot_be_used(install):
     assert listed.status == 3 and len(json.loads(listed.out)) == 10
     assert "left out: odd: detector plug-in 'odd' of package 'odd-things' does not load" in listed.err
     unknown = detect("momentun")
-    assert unknown.status == 2 and "unknown detector 'momentun' (did you mean momentum" in unknown.err
+    assert unknown.status == 2 and "unknown detector 'momentun'; " in unknown.err
+    assert "(did you mean momentum" in unknown.err
     assert "package 'odd-things' does not load" in unknown.err
 
 

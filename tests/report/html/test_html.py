@@ -35,12 +35,12 @@ VOID = {"meta", "br", "input", "link", "img", "hr"}
 TAGS = {
     *("html", "head", "meta", "title", "style", "body", "header", "main", "nav", "section", "h1", "h2", "h3", "p", "a"),
     *("strong", "small", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "svg"),
-    *("span", "ul", "details", "summary", "noscript", "script", "button"),
+    *("span", "ul", "details", "summary", "noscript", "script", "button", "link"),
 }
 ATTRIBUTES = {
     *("lang", "charset", "http-equiv", "content", "name", "id", "class", "href", "type", "hidden", "open", "title"),
     *("role", "aria-label", "tabindex", "scope", "height", "data-key", "data-table", "data-plot", "data-number"),
-    *("data-for", "data-do"),
+    *("data-for", "data-do", "rel", "blocking"),
 }
 
 
@@ -132,6 +132,7 @@ def test_the_page_loads_nothing_and_has_no_handlers_or_style_attributes(made, pa
     assert {name for _, name, _ in page.attributes} <= ATTRIBUTES
     links = [value for _, name, value in page.attributes if name == "href"]
     ids = {value for _, name, value in page.attributes if name == "id"}
+    assert {value for _, name, value in page.attributes if name == "rel"} == {"expect"}
     assert links and all(link and link[0] == "#" and link[1:] in ids for link in links)
     assert "http:" not in re.sub(r"http://www\.w3\.org/2000/svg", "", made[1])
     assert "https:" not in made[1]

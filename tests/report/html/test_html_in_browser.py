@@ -258,10 +258,13 @@ def test_nothing_moves_while_the_page_is_built(shown, browser):
     )
     script = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": watch})
     try:
-        shown(to_html(*case()))
-        drawn_range(browser)
-        assert sum(browser.execute_script("return window.moved")) < 0.01
+        for times_slower in (1, 8, 8, 8, 50):  # a busy machine shows a page while it is still read in
+            browser.execute_cdp_cmd("Emulation.setCPUThrottlingRate", {"rate": times_slower})
+            shown(to_html(*case()))
+            drawn_range(browser)
+            assert sum(browser.execute_script("return window.moved")) < 0.001
     finally:
+        browser.execute_cdp_cmd("Emulation.setCPUThrottlingRate", {"rate": 1})
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
 
 
@@ -274,7 +277,7 @@ def test_hostile_names_stay_text(shown, kind):
     with pytest.raises(NoAlertPresentException):
         _ = browser.switch_to.alert
     assert browser.get_log("browser") == []
-    assert not all_of(browser, "img, iframe, object, embed, form, base, link")
+    assert not all_of(browser, "img, iframe, object, embed, form, base, link:not([rel=expect])")
     assert len(all_of(browser, "script")) == len(all_of(browser, 'script[type="application/json"]')) + 1
     name = plain(f"{hostile}stiff/{hostile}01.csv")
     assert texts(browser, "#viewer-title") == [name]
