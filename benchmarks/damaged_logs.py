@@ -44,6 +44,14 @@ def damaged(recording: Recording, faults: Sequence[Fault]) -> Recording:
     return replace(recording, channels=channels)
 
 
+def bridged(recording: Recording, fault: Fault) -> Recording:
+    """The whole recording, but with a straight line where the fault takes samples, as if nothing had happened there."""
+    channels = {
+        name: _straight(series, fault) if _hit(name, fault) else series for name, series in recording.channels.items()
+    }
+    return replace(recording, channels=channels)
+
+
 def without(recording: Recording, prefix: str) -> Recording:
     """The recording without the channels whose names begin with `prefix`."""
     kept: Mapping[str, Series] = {n: s for n, s in recording.channels.items() if not n.startswith(prefix)}
@@ -52,6 +60,16 @@ def without(recording: Recording, prefix: str) -> Recording:
 
 def _hit(channel: str, fault: Fault) -> bool:
     return channel == fault.channel if fault.channel else channel not in ("force", "label")
+
+
+def _straight(series: Series, fault: Fault) -> Series:
+    first = int(np.searchsorted(series.time, fault.start))
+    last = min(first + fault.count, len(series))
+    ends = [max(first - 1, 0), min(last, len(series) - 1)]
+    values = series.values.copy()
+    for column in range(values.shape[1]):
+        values[first:last, column] = np.interp(series.time[first:last], series.time[ends], series.values[ends, column])
+    return replace(series, values=values)
 
 
 def _spoilt(series: Series, fault: Fault) -> Series:

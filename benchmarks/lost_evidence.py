@@ -1,6 +1,6 @@
 """What a fault at a contact may cost: its own length and 20 ms, but for what of the contact lay within it.
 
-A method cannot see what was never logged. Two questions tell whether that is why a contact was found late; neither asks
+A method cannot see what was never logged. Three questions tell whether that is why a contact was found late; none asks
 what a detector or threshold made of the fault, so that none can excuse itself.
 
 * The load cell: outside the fault, did the contact press as hard and as long (peak and impulse of the force) within the
@@ -8,12 +8,16 @@ what a detector or threshold made of the fault, so that none can excuse itself.
 * The whole log's own statistic: without the samples that the fault took, and with all others as they are, when does it
   alarm? Only samples within the fault's own length count as taken, and of those only the ones for which the damaged log
   has no judged sample, or one that rests on a held value.
+* The whole log with a straight line where the fault lies, and nothing marked as missing: when does it alarm? Detectors
+  and thresholds remember: what the fault took is missing in what they show long behind it (a pulse summed up, a rise
+  that a filter followed). No method is blind in such a log, but it shows no more than the damaged one.
 
 Nor is a contact late that the whole log itself finds so late with limits 5 % wider: its alarm hung by a hair.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,8 +44,8 @@ class Cost:
     """A detected contact with a fault of `length` [s]: first crossing of the whole and of the damaged log [s].
 
     `reachable`: the first crossing of the whole log's statistic without the samples that the fault took; `wider`: that
-    of the whole log with wider limits. Infinite: none. `pressed`: whether the contact showed enough of its force
-    outside the fault.
+    of the whole log with wider limits; `bridged`: that of the log with a straight line in the fault's place. Infinite:
+    none. `pressed`: whether the contact showed enough of its force outside the fault.
     """
 
     length: float
@@ -49,6 +53,7 @@ class Cost:
     damaged: float
     reachable: float
     wider: float
+    bridged: float
     pressed: bool
 
     @property
@@ -61,7 +66,7 @@ class Cost:
         """In time: at most the fault's length and 20 ms later."""
         if self.seconds <= ALLOWED + _SAME:
             return "in time"
-        if not self.pressed or self.damaged <= self.reachable + ALLOWED + _SAME:
+        if not self.pressed or self.damaged <= max(self.reachable, self.bridged) + ALLOWED + _SAME:
             return "evidence lost"
         if self.damaged <= self.wider + self.length + ALLOWED + _SAME:
             return "by a hair"
@@ -75,9 +80,13 @@ def cost_of(
     fault: tuple[float, float],
     activation: Activation,
     factor: float,
+    bridged: Callable[[], Detection],
     window: float = 1.0,
 ) -> Cost | None:
-    """What a `fault` (start, length) [s] costs a contact at a safety factor; None where the whole log misses it."""
+    """What a `fault` (start, length) [s] costs a contact at a safety factor; None where the whole log misses it.
+
+    `bridged` judges the whole log with a straight line in the fault's place; it is called where the alarm comes late.
+    """
     span = contact.start - contact.uncertainty, contact.start + window
     before = first_crossing(whole, activation, factor, span)
     if np.isinf(before):
@@ -92,12 +101,17 @@ def cost_of(
     judged = np.abs(seen[near] - time) <= _SAME if len(seen) else np.zeros(len(time), dtype=bool)
     taken = (time >= start - _SAME) & (time < start + length - _SAME) & ~judged
     late = span[0], span[1] + length + ALLOWED
+    after = first_crossing(damaged, activation, factor, late)
+    # The line leads up to the first sample behind the fault: it may alarm before the onset.
+    straight = min(span[0], start), late[1]
+    in_time = after <= before + length + ALLOWED + _SAME
     return Cost(
         length,
         before,
-        first_crossing(damaged, activation, factor, late),
+        after,
         first_crossing(whole, activation, factor, late, taken),
         first_crossing(whole, activation, (1.0 + _HAIR) * factor, late),
+        before if in_time else first_crossing(bridged(), activation, factor, straight),
         pressed_outside(whole.operation.recording, contact, fault, before),
     )
 

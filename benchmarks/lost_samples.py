@@ -23,7 +23,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from functools import cache, partial
 from time import monotonic
 from typing import Any
 
@@ -31,7 +31,7 @@ import arm_accuracy
 import gate_accuracy
 import numpy as np
 from accuracy import IMPACTS, written_setup
-from damaged_logs import Fault, damaged, random_faults, without
+from damaged_logs import Fault, bridged, damaged, random_faults, without
 from lost_evidence import Cost, cost_of
 from scipy.stats import binomtest
 from thresholds import WHITENING, SharedWhitening
@@ -149,13 +149,16 @@ class Cell:
 
 @dataclass(frozen=True)
 class Bench:
-    """A machine's operations: to learn from, to judge whole and damaged, and contacts, each with its damaged copies."""
+    """A machine's operations: to learn from, to judge whole and damaged, and contacts.
+
+    A contact has copies with a fault each, and beside each the log with a straight line in the fault's place.
+    """
 
     setup: BenchmarkFile
     learned: Sequence[Operation]
     whole: Sequence[Operation]
     damaged: Sequence[Operation]
-    contacts: Sequence[tuple[Operation, Contact, Sequence[tuple[Fault, Operation]]]]
+    contacts: Sequence[tuple[Operation, Contact, Sequence[tuple[Fault, Operation, Operation]]]]
 
 
 def bench_of(name: str, options: argparse.Namespace) -> Bench:
@@ -182,7 +185,7 @@ def bench_of(name: str, options: argparse.Namespace) -> Bench:
             contact = find_contacts(whole.recording, setup.onset)[0]
             # Two of three faults at the onset.
             faults = [at_contact(raw, contact.start, i % 3 < 2, rng) for i in range(options.copies)]
-            copies = [(fault, operation(damaged(raw, [fault]))) for fault in faults]
+            copies = [(item, operation(damaged(raw, [item])), operation(bridged(raw, item))) for item in faults]
             contacts.append((whole, contact, copies))
     return Bench(setup, learned, [operation(raw) for raw in judged], [operation(raw) for raw in spoilt], contacts)
 
@@ -212,10 +215,10 @@ def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[C
             print(f"{name} {detector_name}: left out: {fault.message}", flush=True)
             continue
         whole, spoilt = ([signal(item) for item in items] for items in (bench.whole, bench.damaged))
-        contacts = [
-            (signal(item), contact, [(fault, signal(copy)) for fault, copy in copies])
-            for item, contact, copies in bench.contacts
-        ]
+        contacts = []
+        for item, contact, copies in bench.contacts:
+            pairs = [(fault, signal(copy), cache(partial(signal, line))) for fault, copy, line in copies]
+            contacts.append((signal(item), contact, pairs))
         usual = RememberedActivation(**{item.name: getattr(setup.activation, item.name) for item in fields(Activation)})
         activations = (usual, replace(setup.activation, debounce=1))
         shared: dict[tuple[str, ...], FittedSequential] = {}
@@ -268,10 +271,11 @@ def judged_cells(
             cell.assessed.append((found[0].assessed_seconds, found[1].assessed_seconds))
     for pair, contact, copies in contacts:
         one = judged(fitted, pair)
-        for fault, copy in copies:
+        for fault, copy, line in copies:
             other, length = judged(fitted, copy), fault.count * pair[0].recording["speed"].period
+            straight = cache(lambda line=line: judged(fitted, line()))
             for cell, activation, factor in tried:
-                cost = cost_of(one, other, contact, (fault.start, length), activation, factor)
+                cost = cost_of(one, other, contact, (fault.start, length), activation, factor, straight)
                 count_contact(cell, cost, fault, contact, pair[0].name)
     return cells
 
@@ -282,10 +286,11 @@ def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact,
         return
     cell.outcomes[cost.outcome] = cell.outcomes.get(cost.outcome, 0) + 1
     if cost.outcome != "in time":
-        times = (cost.whole, cost.damaged, cost.reachable, fault.start)
-        whole, damaged, reachable, start = (f"{1e3 * (item - contact.start):.0f}" for item in times)
+        times = (cost.whole, cost.damaged, cost.reachable, cost.bridged, fault.start)
+        whole, damaged, reachable, straight, start = (f"{1e3 * (item - contact.start):.0f}" for item in times)
         print(
-            f"  {cost.outcome}: {cell.title}, {name}: {whole} -> {damaged} ms, reachable {reachable}; "
+            f"  {cost.outcome}: {cell.title}, {name}: {whole} -> {damaged} ms, reachable {reachable}, "
+            f"by a straight line {straight}; "
             f"{fault.kind} {fault.channel} x{fault.count} at {start} ms",
             file=sys.stderr,
             flush=True,

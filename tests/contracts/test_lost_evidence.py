@@ -49,9 +49,16 @@ def detection(force: np.ndarray, missing: tuple[float, float] = (9.0, 9.0)) -> D
 
 
 def outcome(force: np.ndarray, fault: float, missing: tuple[float, float]) -> str:
-    cost = cost_of(detection(force), detection(force, missing), CONTACT, (fault, LENGTH), AT_ONCE, FACTOR)
+    whole, damaged = detection(force), detection(force, missing)
+    cost = cost_of(whole, damaged, CONTACT, (fault, LENGTH), AT_ONCE, FACTOR, lambda: straight(force, fault))
     assert cost is not None
     return cost.outcome
+
+
+def straight(force: np.ndarray, fault: float) -> Detection:
+    """The whole log with a straight line where the fault lies."""
+    lost = within((fault, fault + LENGTH))
+    return detection(np.where(lost, np.interp(TIME, TIME[~lost], force[~lost]), force))
 
 
 LASTING, PULSE = force_of((ONSET, 2.5)), force_of((ONSET, ONSET + 0.02))
@@ -81,15 +88,33 @@ def test_a_fault_that_takes_no_sample_of_the_detector_excuses_nothing():
     whole = detection(LASTING)
     level = whole.statistic.values[:, 0].copy()
     later = detection(np.where(TIME < ONSET + 0.2, 0.0, LASTING))
-    cost = cost_of(whole, later, CONTACT, (ONSET, LENGTH), AT_ONCE, FACTOR)
+    cost = cost_of(whole, later, CONTACT, (ONSET, LENGTH), AT_ONCE, FACTOR, lambda: whole)
     assert cost is not None
     assert cost.reachable == cost.whole
     assert cost.outcome == "late"
     assert np.nanmax(level) > 50.0
 
 
+def test_what_a_filter_remembers_of_a_pulse_in_the_fault_is_lost_and_what_a_log_without_the_pulse_shows_is_not():
+    # The statistic stays high long behind the pulse, so that the whole log's shows it outside the fault, too.
+    whole, fault = detection(force_of((ONSET, ONSET + 0.2))), ONSET - 0.005
+    calm, late, span = np.zeros(N), force_of((ONSET + 0.1, ONSET + 0.2)), (ONSET - 0.005, LENGTH)
+
+    def outcome_of(damaged: np.ndarray, bridged: np.ndarray) -> str:
+        gap = (fault, fault + LENGTH)
+        cost = cost_of(whole, detection(damaged, gap), CONTACT, span, AT_ONCE, FACTOR, lambda: detection(bridged))
+        assert cost is not None
+        assert cost.reachable <= ONSET + LENGTH
+        return cost.outcome
+
+    assert outcome_of(calm, calm) == "evidence lost"
+    assert outcome_of(late, late) == "evidence lost"
+    assert outcome_of(calm, late) == "missed"
+    assert outcome_of(late, force_of((ONSET + 0.05, ONSET + 0.2))) == "late"
+
+
 def test_a_contact_that_hangs_by_a_hair_is_one_that_wider_limits_miss():
-    cost = Cost(LENGTH, whole=ONSET, damaged=np.inf, reachable=ONSET, wider=np.inf, pressed=True)
+    cost = Cost(LENGTH, whole=ONSET, damaged=np.inf, reachable=ONSET, wider=np.inf, bridged=ONSET, pressed=True)
     assert cost.outcome == "by a hair"
     assert replace(cost, wider=ONSET).outcome == "missed"
     assert replace(cost, wider=ONSET + 0.1, damaged=ONSET + 0.14).outcome == "by a hair"
@@ -106,6 +131,7 @@ def test_what_the_load_cell_felt_outside_the_fault_is_compared_up_to_the_time_al
 
 def test_a_fault_behind_the_alarm_changes_nothing():
     whole, fault = detection(LASTING), ONSET + 0.02
-    cost = cost_of(whole, detection(LASTING, (fault, fault + LENGTH)), CONTACT, (fault, LENGTH), AT_ONCE, FACTOR)
+    damaged = detection(LASTING, (fault, fault + LENGTH))
+    cost = cost_of(whole, damaged, CONTACT, (fault, LENGTH), AT_ONCE, FACTOR, lambda: pytest.fail("not needed"))
     assert cost is not None
     assert cost.damaged == cost.whole
