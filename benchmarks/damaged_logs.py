@@ -44,12 +44,18 @@ def damaged(recording: Recording, faults: Sequence[Fault]) -> Recording:
     return replace(recording, channels=channels)
 
 
-def bridged(recording: Recording, fault: Fault) -> Recording:
-    """The whole recording, but with a straight line where the fault takes samples, as if nothing had happened there."""
-    channels = {
-        name: _straight(series, fault) if _hit(name, fault) else series for name, series in recording.channels.items()
-    }
-    return replace(recording, channels=channels)
+def filled(recording: Recording, fault: Fault) -> tuple[Recording, ...]:
+    """The whole recording as if nothing had happened in the fault: with a straight line there, and with held values."""
+    return tuple(
+        replace(
+            recording,
+            channels={
+                name: _filled(series, fault, held) if _hit(name, fault) else series
+                for name, series in recording.channels.items()
+            },
+        )
+        for held in (False, True)
+    )
 
 
 def without(recording: Recording, prefix: str) -> Recording:
@@ -62,13 +68,15 @@ def _hit(channel: str, fault: Fault) -> bool:
     return channel == fault.channel if fault.channel else channel not in ("force", "label")
 
 
-def _straight(series: Series, fault: Fault) -> Series:
+def _filled(series: Series, fault: Fault, held: bool) -> Series:
     first = int(np.searchsorted(series.time, fault.start))
     last = min(first + fault.count, len(series))
-    ends = [max(first - 1, 0), min(last, len(series) - 1)]
+    before = max(first - 1, 0)
+    ends = series.time[[before, min(last, len(series) - 1)]]
+    end_values = series.values[[before, before if held else min(last, len(series) - 1)]]
     values = series.values.copy()
     for column in range(values.shape[1]):
-        values[first:last, column] = np.interp(series.time[first:last], series.time[ends], series.values[ends, column])
+        values[first:last, column] = np.interp(series.time[first:last], ends, end_values[:, column])
     return replace(series, values=values)
 
 

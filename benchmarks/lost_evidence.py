@@ -8,16 +8,17 @@ what a detector or threshold made of the fault, so that none can excuse itself.
 * The whole log's own statistic: without the samples that the fault took, and with all others as they are, when does it
   alarm? Only samples within the fault's own length count as taken, and of those only the ones for which the damaged log
   has no judged sample, or one that rests on a held value.
-* The whole log with a straight line where the fault lies, and nothing marked as missing: when does it alarm? Detectors
-  and thresholds remember: what the fault took is missing in what they show long behind it (a pulse summed up, a rise
-  that a filter followed). No method is blind in such a log, but it shows no more than the damaged one.
+* The whole log with a straight line where the fault lies, or with the values held, and nothing marked as missing: when
+  does it alarm, at the latest? Detectors and thresholds remember: what the fault took is missing in what they show long
+  behind it (a pulse summed up, a rise that a filter followed). In such a log no sample is missing, yet it shows no more
+  than the damaged one: where a method is late in it, what is left of the contact does not suffice for that method.
 
 Nor is a contact late that the whole log itself finds so late with limits 5 % wider: its alarm hung by a hair.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,8 +45,8 @@ class Cost:
     """A detected contact with a fault of `length` [s]: first crossing of the whole and of the damaged log [s].
 
     `reachable`: the first crossing of the whole log's statistic without the samples that the fault took; `wider`: that
-    of the whole log with wider limits; `bridged`: that of the log with a straight line in the fault's place. Infinite:
-    none. `pressed`: whether the contact showed enough of its force outside the fault.
+    of the whole log with wider limits; `filled`: the latest of the logs with a straight line or held values in the
+    fault's place. Infinite: none. `pressed`: whether the contact showed enough of its force outside the fault.
     """
 
     length: float
@@ -53,7 +54,7 @@ class Cost:
     damaged: float
     reachable: float
     wider: float
-    bridged: float
+    filled: float
     pressed: bool
 
     @property
@@ -66,7 +67,7 @@ class Cost:
         """In time: at most the fault's length and 20 ms later."""
         if self.seconds <= ALLOWED + _SAME:
             return "in time"
-        if not self.pressed or self.damaged <= max(self.reachable, self.bridged) + ALLOWED + _SAME:
+        if not self.pressed or self.damaged <= max(self.reachable, self.filled) + ALLOWED + _SAME:
             return "evidence lost"
         if self.damaged <= self.wider + self.length + ALLOWED + _SAME:
             return "by a hair"
@@ -80,12 +81,12 @@ def cost_of(
     fault: tuple[float, float],
     activation: Activation,
     factor: float,
-    bridged: Callable[[], Detection],
+    filled: Callable[[], Sequence[Detection]],
     window: float = 1.0,
 ) -> Cost | None:
     """What a `fault` (start, length) [s] costs a contact at a safety factor; None where the whole log misses it.
 
-    `bridged` judges the whole log with a straight line in the fault's place; it is called where the alarm comes late.
+    `filled` judges the whole log with the fault filled in, in each way; it is called where the alarm comes late.
     """
     span = contact.start - contact.uncertainty, contact.start + window
     before = first_crossing(whole, activation, factor, span)
@@ -111,7 +112,7 @@ def cost_of(
         after,
         first_crossing(whole, activation, factor, late, taken),
         first_crossing(whole, activation, (1.0 + _HAIR) * factor, late),
-        before if in_time else first_crossing(bridged(), activation, factor, straight),
+        before if in_time else max(first_crossing(item, activation, factor, straight) for item in filled()),
         pressed_outside(whole.operation.recording, contact, fault, before),
     )
 

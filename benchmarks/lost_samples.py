@@ -31,7 +31,7 @@ import arm_accuracy
 import gate_accuracy
 import numpy as np
 from accuracy import IMPACTS, written_setup
-from damaged_logs import Fault, bridged, damaged, random_faults, without
+from damaged_logs import Fault, damaged, filled, random_faults, without
 from lost_evidence import Cost, cost_of
 from scipy.stats import binomtest
 from thresholds import WHITENING, SharedWhitening
@@ -151,14 +151,14 @@ class Cell:
 class Bench:
     """A machine's operations: to learn from, to judge whole and damaged, and contacts.
 
-    A contact has copies with a fault each, and beside each the log with a straight line in the fault's place.
+    A contact has copies with a fault each, and beside each the log with the fault filled in, in each way.
     """
 
     setup: BenchmarkFile
     learned: Sequence[Operation]
     whole: Sequence[Operation]
     damaged: Sequence[Operation]
-    contacts: Sequence[tuple[Operation, Contact, Sequence[tuple[Fault, Operation, Operation]]]]
+    contacts: Sequence[tuple[Operation, Contact, Sequence[tuple[Fault, Operation, Sequence[Operation]]]]]
 
 
 def bench_of(name: str, options: argparse.Namespace) -> Bench:
@@ -185,7 +185,10 @@ def bench_of(name: str, options: argparse.Namespace) -> Bench:
             contact = find_contacts(whole.recording, setup.onset)[0]
             # Two of three faults at the onset.
             faults = [at_contact(raw, contact.start, i % 3 < 2, rng) for i in range(options.copies)]
-            copies = [(item, operation(damaged(raw, [item])), operation(bridged(raw, item))) for item in faults]
+            copies = [
+                (item, operation(damaged(raw, [item])), [operation(log) for log in filled(raw, item)])
+                for item in faults
+            ]
             contacts.append((whole, contact, copies))
     return Bench(setup, learned, [operation(raw) for raw in judged], [operation(raw) for raw in spoilt], contacts)
 
@@ -209,6 +212,9 @@ def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[C
         def signal(operation: Operation, detector: Any = detector) -> Pair:
             return operation, run_detector(operation, machine, detector, setup.watched)
 
+        def signals(operations: Sequence[Operation], signal: Any = signal) -> list[Pair]:
+            return [signal(item) for item in operations]
+
         try:
             learned = [signal(item) for item in bench.learned]
         except CdtoolError as fault:
@@ -217,7 +223,7 @@ def cells_of(name: str, bench: Bench, options: argparse.Namespace) -> Iterator[C
         whole, spoilt = ([signal(item) for item in items] for items in (bench.whole, bench.damaged))
         contacts = []
         for item, contact, copies in bench.contacts:
-            pairs = [(fault, signal(copy), cache(partial(signal, line))) for fault, copy, line in copies]
+            pairs = [(fault, signal(copy), cache(partial(signals, logs))) for fault, copy, logs in copies]
             contacts.append((signal(item), contact, pairs))
         usual = RememberedActivation(**{item.name: getattr(setup.activation, item.name) for item in fields(Activation)})
         activations = (usual, replace(setup.activation, debounce=1))
@@ -271,11 +277,11 @@ def judged_cells(
             cell.assessed.append((found[0].assessed_seconds, found[1].assessed_seconds))
     for pair, contact, copies in contacts:
         one = judged(fitted, pair)
-        for fault, copy, line in copies:
+        for fault, copy, logs in copies:
             other, length = judged(fitted, copy), fault.count * pair[0].recording["speed"].period
-            straight = cache(lambda line=line: judged(fitted, line()))
+            whole_again = cache(lambda logs=logs: [judged(fitted, item) for item in logs()])
             for cell, activation, factor in tried:
-                cost = cost_of(one, other, contact, (fault.start, length), activation, factor, straight)
+                cost = cost_of(one, other, contact, (fault.start, length), activation, factor, whole_again)
                 count_contact(cell, cost, fault, contact, pair[0].name)
     return cells
 
@@ -286,11 +292,11 @@ def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact,
         return
     cell.outcomes[cost.outcome] = cell.outcomes.get(cost.outcome, 0) + 1
     if cost.outcome != "in time":
-        times = (cost.whole, cost.damaged, cost.reachable, cost.bridged, fault.start)
-        whole, damaged, reachable, straight, start = (f"{1e3 * (item - contact.start):.0f}" for item in times)
+        times = (cost.whole, cost.damaged, cost.reachable, cost.filled, fault.start)
+        whole, damaged, reachable, filled_in, start = (f"{1e3 * (item - contact.start):.0f}" for item in times)
         print(
             f"  {cost.outcome}: {cell.title}, {name}: {whole} -> {damaged} ms, reachable {reachable}, "
-            f"by a straight line {straight}; "
+            f"filled in {filled_in}; "
             f"{fault.kind} {fault.channel} x{fault.count} at {start} ms",
             file=sys.stderr,
             flush=True,

@@ -50,7 +50,7 @@ def detection(force: np.ndarray, missing: tuple[float, float] = (9.0, 9.0)) -> D
 
 def outcome(force: np.ndarray, fault: float, missing: tuple[float, float]) -> str:
     whole, damaged = detection(force), detection(force, missing)
-    cost = cost_of(whole, damaged, CONTACT, (fault, LENGTH), AT_ONCE, FACTOR, lambda: straight(force, fault))
+    cost = cost_of(whole, damaged, CONTACT, (fault, LENGTH), AT_ONCE, FACTOR, lambda: [straight(force, fault)])
     assert cost is not None
     return cost.outcome
 
@@ -88,7 +88,7 @@ def test_a_fault_that_takes_no_sample_of_the_detector_excuses_nothing():
     whole = detection(LASTING)
     level = whole.statistic.values[:, 0].copy()
     later = detection(np.where(TIME < ONSET + 0.2, 0.0, LASTING))
-    cost = cost_of(whole, later, CONTACT, (ONSET, LENGTH), AT_ONCE, FACTOR, lambda: whole)
+    cost = cost_of(whole, later, CONTACT, (ONSET, LENGTH), AT_ONCE, FACTOR, lambda: [whole])
     assert cost is not None
     assert cost.reachable == cost.whole
     assert cost.outcome == "late"
@@ -100,9 +100,11 @@ def test_what_a_filter_remembers_of_a_pulse_in_the_fault_is_lost_and_what_a_log_
     whole, fault = detection(force_of((ONSET, ONSET + 0.2))), ONSET - 0.005
     calm, late, span = np.zeros(N), force_of((ONSET + 0.1, ONSET + 0.2)), (ONSET - 0.005, LENGTH)
 
-    def outcome_of(damaged: np.ndarray, bridged: np.ndarray) -> str:
+    def outcome_of(damaged: np.ndarray, filled: np.ndarray) -> str:
         gap = (fault, fault + LENGTH)
-        cost = cost_of(whole, detection(damaged, gap), CONTACT, span, AT_ONCE, FACTOR, lambda: detection(bridged))
+        cost = cost_of(
+            whole, detection(damaged, gap), CONTACT, span, AT_ONCE, FACTOR, lambda: [whole, detection(filled)]
+        )
         assert cost is not None
         assert cost.reachable <= ONSET + LENGTH
         return cost.outcome
@@ -114,7 +116,7 @@ def test_what_a_filter_remembers_of_a_pulse_in_the_fault_is_lost_and_what_a_log_
 
 
 def test_a_contact_that_hangs_by_a_hair_is_one_that_wider_limits_miss():
-    cost = Cost(LENGTH, whole=ONSET, damaged=np.inf, reachable=ONSET, wider=np.inf, bridged=ONSET, pressed=True)
+    cost = Cost(LENGTH, whole=ONSET, damaged=np.inf, reachable=ONSET, wider=np.inf, filled=ONSET, pressed=True)
     assert cost.outcome == "by a hair"
     assert replace(cost, wider=ONSET).outcome == "missed"
     assert replace(cost, wider=ONSET + 0.1, damaged=ONSET + 0.14).outcome == "by a hair"

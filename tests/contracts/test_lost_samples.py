@@ -32,7 +32,7 @@ from tests.motions import moving
 from tests.robots import six_joint_robot
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from damaged_logs import KINDS, Fault, bridged, damaged, random_faults
+from damaged_logs import KINDS, Fault, damaged, filled, random_faults
 from lost_evidence import cost_of
 
 CELLS = [(detector, threshold) for detector in DETECTORS.names() for threshold in THRESHOLDS.names()]
@@ -138,15 +138,17 @@ def test_a_fault_at_a_contact_costs_its_own_length_and_20_ms(learned):
             replace(random_faults(whole, 1, rng)[0], start=float(contact.start + rng.uniform(*span))) for span in spans
         ]
         copies = [with_faults(whole, [fault], f"at {i}") for i, fault in enumerate(faults)]
-        lines = [replace(bridged(whole, fault), name=f"{whole.name} line {i}") for i, fault in enumerate(faults)]
+        fillings = [
+            [replace(log, name=f"{whole.name} filled {i} {j}") for j, log in enumerate(filled(whole, fault))]
+            for i, fault in enumerate(faults)
+        ]
         for detector, threshold in CELLS:
             factor = learned.threshold(detector, threshold).safety_factor
             found = learned.judged(detector, threshold, whole, AT_ONCE)
-            for fault, copy, line in zip(faults, copies, lines, strict=True):
-                other = learned.judged(detector, threshold, copy, AT_ONCE)
-                straight = partial(learned.judged, detector, threshold, line, AT_ONCE)
+            judged = partial(learned.judged, detector, threshold, activation=AT_ONCE)
+            for fault, copy, logs in zip(faults, copies, fillings, strict=True):
                 span = fault.start, 1e-3 * fault.count
-                cost = cost_of(found, other, contact, span, AT_ONCE, factor, straight)
+                cost = cost_of(found, judged(copy), contact, span, AT_ONCE, factor, partial(list, map(judged, logs)))
                 if cost is not None:
                     outcomes.setdefault(cost.outcome, []).append((detector, threshold, kind, fault, cost))
                     assert cost.damaged == cost.whole or fault.start <= cost.whole + 1e-9, (detector, threshold, cost)
