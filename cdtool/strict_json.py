@@ -25,5 +25,9 @@ def finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
+        # Columns of traces are a million plain numbers: no call for each.
+        return [
+            item if type(item) is int or (type(item) is float and math.isfinite(item)) else finite(item)
+            for item in value
+        ]
     return value

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
@@ -14,6 +15,10 @@ from cdtool.recording import Recording
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from cdtool.tables import Table
+
+# No test is timed: a busy machine needs longer for an example.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 GATE = {
     "motor_inertia": 9.5e-4,

@@ -133,13 +133,14 @@ def _offer(choice: TraceChoice, number: int, judged: Judged, setup: BenchmarkFil
     slowest = max((match.latency for _, made in pairs for match in made.matches if match.alarm), default=0.0)
 
     def make(why: str) -> Trace:
+        compared = normals.for_one_operation()
         return make_trace(
             judged.group,
             judged.operation,
             judged.contacts,
             judged.detections,
             judged.matchings,
-            [_explained(detection, matching, setup, normals) for detection, matching in pairs],
+            [_explained(detection, matching, setup, compared) for detection, matching in pairs],
             why,
         )
 

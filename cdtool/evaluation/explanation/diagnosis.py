@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,11 +63,11 @@ class Event:
 
 
 def diagnose_alarm(
-    recording: Recording, event: Event, normals: NormalMotions, own_past: Sequence[Movement]
+    recording: Recording, event: Event, normals: NormalMotions, own_past: Callable[[], Sequence[Movement]]
 ) -> Diagnosis:
     """What led to an alarm.
 
-    `own_past`: the movements against the run's own past, which count where there are no impact-free runs.
+    `own_past` finds the movements against the run's own past, which count where there are no impact-free runs.
     """
     found = normals.of(recording, event.left - _LATEST)
     absent = None if isinstance(found, NormalMotion) else found
@@ -80,19 +80,24 @@ def diagnose_alarm(
     cause = Cause(CauseKind.UNCLEAR)
     if normal is not None or _steady(tracks, leading, begin):
         cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
-    moved = list(own_past) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
+    moved = list(own_past()) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
     if cause.transient is not None:
         moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
     return Diagnosis(in_order(moved, event.joint), cause, absent, normal.runs if normal is not None else 0)
 
 
 def diagnose_contact(
-    recording: Recording, joint: str, onset: float, until: float, normals: NormalMotions, own_past: Sequence[Movement]
+    recording: Recording,
+    joint: str,
+    onset: float,
+    until: float,
+    normals: NormalMotions,
+    own_past: Callable[[], Sequence[Movement]],
 ) -> Diagnosis:
     """What a contact moved, from its onset less what that is uncertain by; its cause is known."""
     normal = normals.of(recording, onset)
     if not isinstance(normal, NormalMotion):
-        return Diagnosis(tuple(own_past), Cause(CauseKind.CONTACT), normal)
+        return Diagnosis(tuple(own_past()), Cause(CauseKind.CONTACT), normal)
     end = min(until, recording.end)
     tracks = tracks_of(recording, normal, recording.joints, onset, end)
     leading = recording.joints[normal.motion.joint]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -155,11 +156,11 @@ def explain_alarm(
         contact, role = None, "in progress"
     if contact:
         times.append(contact.start)
-        moved = _moved_at_contact(detection, margin.name, contact, alarm.time)
+        own_past = partial(_moved_at_contact, detection, margin.name, contact, alarm.time)
     else:
-        moved = which_moved_first(recording, margin.name, alarm.time, lead=_LEAD_OF_ALARM, after=0.0)
+        own_past = partial(which_moved_first, recording, margin.name, alarm.time, lead=_LEAD_OF_ALARM, after=0.0)
     event = Event(margin.name, left, alarm.time, tuple(inputs), detection.operation.motion)
-    diagnosis = diagnose_alarm(recording, event, normals, moved)
+    diagnosis = diagnose_alarm(recording, event, normals, own_past)
     return AlarmExplanation(
         operation=detection.operation.name,
         detector=detection.detector,
@@ -203,7 +204,7 @@ def explain_miss(
         margin, approach = near[0]
         times = [contact.start + step for step in _FROM_ONSET if step <= match.watched]
         moments = margin.moments([*times, approach.nearest.time])
-    own_past = _moved_at_contact(detection, joint, contact, contact.start)
+    own_past = partial(_moved_at_contact, detection, joint, contact, contact.start)
     recording = detection.operation.recording.without_ground_truth()
     begin, until = contact.start - _LEAD_OF_ONSET - contact.uncertainty, contact.start + _AFTERMATH
     diagnosis = diagnose_contact(recording, joint, begin, until, normals, own_past)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 
 import numpy as np
 
 from cdtool.recording import Recording
-from cdtool.thresholds.normal_motion import NormalMotion
+from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 
 # A class of motion fits if the leading joint's speed is within this many spreads of it, in the median up to the event.
 _FITS = 4.0
@@ -33,6 +33,13 @@ class NormalMotions:
     motions: tuple[NormalMotion, ...] = ()
     absent: Absence = Absence.BY_HAND
 
+    def for_one_operation(self) -> NormalMotions:
+        """For explaining the alarms of several detectors in one operation: each channel is compared only once."""
+        known = fields(NormalMotion)
+        return replace(
+            self, motions=tuple(_OnceCompared(*(getattr(item, part.name) for part in known)) for item in self.motions)
+        )
+
     def of(self, recording: Recording, until: float) -> NormalMotion | Absence:
         """The normal motion whose leading speed fits the run best in the second up to `until` [s], or why none does."""
         if not self.motions:
@@ -43,6 +50,19 @@ class NormalMotions:
         distances = [_distance(item, recording, until) for item in able]
         best = int(np.argmin(distances))
         return able[best] if distances[best] <= _FITS else Absence.NO_CLASS
+
+
+@dataclass(frozen=True)
+class _OnceCompared(NormalMotion):
+    """A normal motion that one operation alone is compared with, whichever detector asks."""
+
+    compared: dict[str, Comparison] = field(default_factory=dict, compare=False, repr=False)
+
+    def compare(self, recording: Recording, channel: str) -> Comparison:
+        """As NormalMotion; the recording is always the same."""
+        if channel not in self.compared:
+            self.compared[channel] = super().compare(recording, channel)
+        return self.compared[channel]
 
 
 def _distance(normal: NormalMotion, recording: Recording, until: float) -> float:
