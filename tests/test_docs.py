@@ -157,7 +157,7 @@ def the_tables_of_choosing_are_what_the_runs_gave() -> None:
         for detector, cells in stated.items():
             for group, cell in zip(groups, cells[first:], strict=False):
                 seen = [c for c in results["contacts"] if (c["detector"], c["group"]) == (detector, group)]
-                assert len(seen) == 30
+                assert len(seen) == 15
                 agrees_with(cell, seen)
 
 
@@ -178,7 +178,7 @@ def agrees_with(cell: str, contacts: list[dict[str, Any]]) -> None:
 
 def a_narrow_tracking_limit_misses_the_stiff_impacts_as_stated() -> None:
     stated = (DOCS / "detectors" / "desired-dynamics.md").read_text(encoding="utf-8")
-    limit = re.search(r"with `tracking_limit = (\S+)`\s+all 30 stiff impacts .* are missed", stated)
+    limit = re.search(r"with `tracking_limit = (\S+)`\s+all 15 stiff impacts .* are missed", stated)
     assert limit
     gate = Path("gate")
     machine = (gate / "machine.toml").read_text(encoding="utf-8")
@@ -187,7 +187,7 @@ def a_narrow_tracking_limit_misses_the_stiff_impacts_as_stated() -> None:
     (gate / "narrow_benchmark.toml").write_text(text, encoding="utf-8")
     assert cdtool("benchmark", gate / "narrow_benchmark.toml", "--detectors", "ddd", "-o", "narrow.json").status == 0
     contacts = json.loads(Path("narrow.json").read_text(encoding="utf-8"))["contacts"]
-    assert [c["outcome"] for c in contacts if c["group"] == "stiff"] == ["missed"] * 30
+    assert [c["outcome"] for c in contacts if c["group"] == "stiff"] == ["missed"] * 15
 
 
 def choosing_says_what_the_runs_gave() -> None:
