@@ -1,0 +1,529 @@
+"""How the code is built: a recording's way through the modules, import cycles, single callers, lines, complexity.
+
+    python benchmarks/structure.py           # one table
+    python benchmarks/structure.py --show    # and what each number consists of
+
+* **Walk.** `cdtool.read` reads one CSV and one MCAP log (several clocks, declared units, one gap) while every call of a
+  public function is recorded, up to where the machine refers the channels to the load side. A stay is a run of calls
+  into one module, a return is a stay in a module that was left before. A call counts where it enters a module from
+  another one; every call does, also those of the second channel. The package of one format is one module, because its
+  caller knows only its contract; `every module` counts the modules inside it, too. `UTILITIES` are passed over. Only
+  the main thread is recorded.
+* **Import cycles.** Groups of modules that import one another, directly or through others; imports for the type checker
+  count. Imports inside functions close further cycles, which are counted separately.
+* **Single callers.** Modules that only one module imports, where that module stands in the same folder. A module that a
+  table names in a string (`"cdtool.detectors.momentum:Momentum"`) is registered and does not count.
+* **Code lines.** Lines without docstrings, comments, blank lines and imports.
+* **Complexity.** Functions above ruff's C901 (10) or PLR0913 (7); compiled kernels are left out, `noqa` is ignored.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import io
+import json
+import subprocess
+import sys
+import tempfile
+import tokenize
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
+from inspect import CO_GENERATOR, CO_OPTIMIZED
+from itertools import groupby
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+from timing import table
+
+PACKAGE = Path(__file__).parents[1] / "cdtool"
+MOST_STAYS, MOST_RETURNS, MOST_SINGLE_CALLERS = 12, 2, 40
+LINES_BEFORE = 38_498  # before the restructuring, which is to save 4,000
+MOST_LINES = LINES_BEFORE - 4_000
+MOST_COMPLEX, MOST_ARGUMENTS = 10, 7
+# Modules whose calls are no step of a recording's walk, and why.
+UTILITIES: Mapping[str, str] = {
+    "cdtool.errors": "how any module reports an error",
+    "cdtool.plain_text": "how any module writes a number",
+    "cdtool.units": "a table of units that is looked up",
+    "cdtool.registry": "a table of names that is looked up",
+    "cdtool.cores": "how many threads may be used",
+    "cdtool.kernels": "how a compiled loop is called",
+    "cdtool.instructions": "instructions of the processor",
+    "cdtool.channels": "a value: what the machine file maps",
+    "cdtool.recording": "a value: what has been read so far",
+}
+# Packages whose modules are each a format, and where a walk ends: the channels are there, the method begins.
+FORMATS = "cdtool.formats"
+METHOD = "cdtool.machines"
+
+
+@dataclass(frozen=True)
+class Import:
+    """One import: `kind` is "module", "types" (for the type checker), "function" or "name" (in a table of names)."""
+
+    importer: str
+    imported: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class Module:
+    """One file of a package; `name` is dotted."""
+
+    name: str
+    path: Path
+
+    @cached_property
+    def text(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+    @property
+    def is_package(self) -> bool:
+        return self.path.name == "__init__.py"
+
+
+def modules_of(package: Path) -> dict[str, Module]:
+    """Every module of a package, by its dotted name."""
+    found = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found[name] = Module(name, path)
+    return found
+
+
+def imports_of(modules: Mapping[str, Module]) -> list[Import]:
+    """The imports between the modules, as written: that importing `a.b` also imports `a` does not count."""
+    return [
+        Import(module.name, imported, kind)
+        for module in modules.values()
+        for imported, kind in _imports(module.tree, modules, "module")
+        if imported != module.name
+    ]
+
+
+def _imports(node: ast.AST, known: Mapping[str, Module], kind: str) -> Iterator[tuple[str, str]]:
+    if isinstance(node, ast.Import):
+        yield from ((found, kind) for item in node.names if (found := _known(item.name, known)))
+    elif isinstance(node, ast.ImportFrom) and node.module:
+        for item in node.names:
+            if found := _known(f"{node.module}.{item.name}", known):
+                yield found, kind
+    elif isinstance(node, ast.Call) and _last_name(node.func) == "import_module":
+        for argument in node.args[:1]:
+            if isinstance(argument, ast.Constant) and (found := _known(str(argument.value), known)):
+                yield found, "function"
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        name, colon, _ = node.value.partition(":")
+        if colon and name in known:
+            yield name, "name"
+    if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
+        for inner in node.body:
+            yield from _imports(inner, known, "types")
+        for inner in node.orelse:
+            yield from _imports(inner, known, kind)
+        return
+    inside = "function" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) else kind
+    for child in ast.iter_child_nodes(node):
+        yield from _imports(child, known, inside)
+
+
+def _known(name: str, known: Mapping[str, Module]) -> str:
+    """The module that an imported name is, or is a part of; empty where it is none of them."""
+    while name and name not in known:
+        name = name.rpartition(".")[0]
+    return name
+
+
+def _last_name(node: ast.AST) -> str:
+    """`numba.njit(...)` -> "njit"."""
+    node = node.func if isinstance(node, ast.Call) else node
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def cycles(imports: Iterable[Import], kinds: Sequence[str] = ("module", "types")) -> list[list[str]]:
+    """The groups of modules in which each one reaches every other by imports of these kinds, the largest first."""
+    graph: dict[str, set[str]] = defaultdict(set)
+    for item in imports:
+        if item.kind in kinds:
+            graph[item.importer].add(item.imported)
+    reached = {name: _reached(graph, name) for name in list(graph)}
+    groups = {
+        tuple(sorted(other for other in there if name in reached.get(other, ())))
+        for name, there in reached.items()
+        if name in there
+    }
+    return sorted(map(list, groups), key=lambda group: (-len(group), group))
+
+
+def _reached(graph: Mapping[str, set[str]], start: str) -> set[str]:
+    """Where imports lead to from a module; that module itself only where they lead back."""
+    found: set[str] = set()
+    waiting = [start]
+    while waiting:
+        for name in graph.get(waiting.pop(), set()) - found:
+            found.add(name)
+            waiting.append(name)
+    return found
+
+
+def single_callers(modules: Mapping[str, Module], imports: Iterable[Import]) -> list[tuple[str, str]]:
+    """Modules that only one other module imports, which stands in the same folder, as (caller, module)."""
+    callers: dict[str, set[str]] = defaultdict(set)
+    registered = set()
+    for item in imports:
+        callers[item.imported].add(item.importer)
+        if item.kind == "name":
+            registered.add(item.imported)
+    found = []
+    for name, its in callers.items():
+        module = modules[name]
+        if len(its) == 1 and name not in registered and not module.is_package:
+            (caller,) = its
+            if modules[caller].path.parent == module.path.parent:
+                found.append((caller, name))
+    return sorted(found)
+
+
+def code_lines(module: Module) -> int:
+    """How many lines hold code: no docstring, no import, not blank and not only a comment."""
+    ignored = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+    lines: set[int] = set()
+    for item in tokenize.generate_tokens(io.StringIO(module.text).readline):
+        if item.type not in ignored:
+            lines.update(range(item.start[0], item.end[0] + 1))
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import | ast.ImportFrom) or _is_docstring(node):
+            lines.difference_update(_span(node))
+        elif isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING" and not node.orelse:
+            lines.discard(node.lineno)
+    return len(lines)
+
+
+def _is_docstring(node: ast.AST) -> bool:
+    """A string that is a statement of its own documents what stands before it, and runs nothing."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def _span(node: Any) -> range:
+    return range(node.lineno, node.end_lineno + 1)
+
+
+def lines_by_room(modules: Mapping[str, Module]) -> dict[str, tuple[int, int]]:
+    """Files and code lines of each folder directly below the package; the package's own files are "(top level)"."""
+    rooms: dict[str, tuple[int, int]] = {}
+    for module in modules.values():
+        parts = module.name.split(".")
+        room = parts[1] if len(parts) > 2 or (module.is_package and len(parts) > 1) else "(top level)"
+        files, lines = rooms.get(room, (0, 0))
+        rooms[room] = files + 1, lines + code_lines(module)
+    return dict(sorted(rooms.items()))
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A function above one of the limits."""
+
+    rule: str
+    size: int
+    place: str
+
+
+def excesses(package: Path) -> list[Excess]:
+    """Functions that ruff reports as too complex or with too many arguments, the worst first, kernels left out."""
+    command = [sys.executable, "-m", "ruff", "check", "--isolated", "--ignore-noqa", "--no-cache"]
+    limits = [f"lint.mccabe.max-complexity={MOST_COMPLEX}", f"lint.pylint.max-args={MOST_ARGUMENTS}"]
+    options = [part for limit in limits for part in ("--config", limit)]
+    command += [*options, "--select", "C901,PLR0913", "--output-format", "json", str(package)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode > 1 or not done.stdout:
+        raise SystemExit(f"ruff does not run: {done.stderr.strip()}")
+    kernels: dict[Path, set[int]] = {}
+    found = []
+    for item in json.loads(done.stdout):
+        path, row = Path(item["filename"]), item["location"]["row"]
+        if path not in kernels:
+            kernels[path] = kernel_lines(ast.parse(path.read_text(encoding="utf-8")))
+        if row not in kernels[path]:
+            size = int(item["message"].partition("(")[2].split()[0])
+            found.append(Excess(item["code"], size, f"{path.relative_to(package.resolve().parent)}:{row}"))
+    return sorted(found, key=lambda item: (item.rule, -item.size, item.place))
+
+
+def kernel_lines(tree: ast.Module) -> set[int]:
+    """The lines on which the `def` of functions that numba compiles stands."""
+    return {
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        and any(
+            _last_name(item) in ("kernel", "njit", "jit", "vectorize", "guvectorize") for item in node.decorator_list
+        )
+    }
+
+
+@dataclass(frozen=True)
+class Call:
+    """A public function that was called, and the module that called it (empty: from outside of the package)."""
+
+    caller: str
+    module: str
+    function: str
+
+
+def calls_of(run: Callable[[], object], package: Path, utilities: Iterable[str] = (), method: str = "") -> list[Call]:
+    """The calls of the package's public functions as `run` makes them, those of `utilities` and of `method` left out.
+
+    A utility is passed over: what it calls counts as called by its caller. What the method calls is no longer part of
+    the walk. A generator counts once, where its first value is asked for.
+    """
+    names = {str(module.path): name for name, module in modules_of(package).items()}
+    passed = set(utilities)
+    generators: set[FrameType] = set()
+    found: list[Call] = []
+
+    def record(frame: FrameType, event: str, _: object) -> None:
+        code = frame.f_code
+        module = names.get(code.co_filename)
+        if event != "call" or module is None or module in passed or not _is_public(code.co_qualname):
+            return
+        # Neither the body of a class, nor a compiled loop: it has no caller here, and belongs to whoever calls it.
+        if not code.co_flags & CO_OPTIMIZED or frame.f_back is None:
+            return
+        if code.co_flags & CO_GENERATOR:
+            if frame.f_lasti < 0 or frame in generators:
+                return
+            generators.add(frame)
+        caller, back = "", frame.f_back
+        while back is not None:
+            name = names.get(back.f_code.co_filename, "")
+            if method and _is_below(name, method):
+                return
+            caller = caller or ("" if name in passed else name)
+            back = back.f_back
+        if not (method and _is_below(module, method)):
+            found.append(Call(caller, module, code.co_qualname))
+
+    sys.setprofile(record)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+    return found
+
+
+def _is_public(qualname: str) -> bool:
+    """No part of the name is private or local; `__init__` and its kin are public."""
+    return all(
+        part.isidentifier() and (not part.startswith("_") or (part.startswith("__") and part.endswith("__")))
+        for part in qualname.split(".")
+    )
+
+
+def _is_below(name: str, package: str) -> bool:
+    return name == package or name.startswith(f"{package}.")
+
+
+def room_of(module: str, formats: str = FORMATS) -> str:
+    """The module, or the package of one format that it belongs to."""
+    return ".".join(module.split(".")[: formats.count(".") + 2]) if _is_below(module, formats) else module
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The stays of a walk, one behind the other: a module and what was called in it, each function once."""
+
+    stays: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @classmethod
+    def of(cls, calls: Iterable[Call], room: Callable[[str], str]) -> Walk:
+        """The calls that enter a room from another one."""
+        entered = [
+            (room(call.module), call.function)
+            for call in calls
+            if not call.caller or room(call.caller) != room(call.module)
+        ]
+        grouped = groupby(entered, key=lambda step: step[0])
+        return cls(tuple((name, tuple(dict.fromkeys(step[1] for step in steps))) for name, steps in grouped))
+
+    @property
+    def rooms(self) -> int:
+        return len({name for name, _ in self.stays})
+
+    @property
+    def returns(self) -> int:
+        return len(self.stays) - self.rooms
+
+
+_MACHINE = """\
+[machine]
+type = "linear_axis"
+name = "axis"
+motor_inertia = 0.001
+load_mass = 620
+transmission_ratio = 0.001333
+viscous_friction = 0.0003
+coulomb_friction = 0.0
+
+[channels]
+time = { column = "time", unit = "s" }
+torque = { column = "i_motor", unit = "A", scale = 0.56 }
+speed = { column = "n_motor", unit = "rpm" }
+force = { column = "load_cell", unit = "kN" }
+
+[channels.mcap]
+torque = { topic = "/drive", field = "effort[0]", unit = "A", scale = 0.56 }
+speed = { topic = "/drive", field = "velocity[0]", unit = "rpm" }
+force = { topic = "/load_cell", field = "wrench.force.x", unit = "kN" }
+"""
+_HEADER = "std_msgs/Header header\n"
+_HEADER_TYPE = (
+    f"{'=' * 80}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    f"{'=' * 80}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+_JOINT_STATE = f"{_HEADER}string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{_HEADER_TYPE}"
+_VECTOR = f"{'=' * 80}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+_WRENCH = f"{'=' * 80}\nMSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque\n"
+_WRENCH_STAMPED = f"{_HEADER}geometry_msgs/Wrench wrench\n{_HEADER_TYPE}{_WRENCH}{_VECTOR}"
+
+
+def write_logs(folder: Path) -> dict[str, Path]:
+    """A machine file and one log in CSV and in MCAP: a drive at 1 kHz with a gap, a load cell on a clock of its own."""
+    from mcap_ros2.writer import Writer
+
+    rng = np.random.default_rng(0)
+    number = np.arange(3000)
+    drive = 1e-3 * number[(number < 1500) | (number > 1600)]
+    cell = 0.0004 + 1.003e-3 * np.arange(len(drive))
+    current = 1.0 + rng.normal(0.0, 0.01, len(drive))
+    speed = 500.0 * np.sin(drive) + rng.normal(0.0, 1.0, len(drive))
+    force = rng.normal(0.0, 1e-3, len(drive))
+    (folder / "machine.toml").write_text(_MACHINE, encoding="utf-8")
+    rows = np.column_stack((drive, current, speed, cell, force))
+    head = "time1 [s],i_motor [A],n_motor [rpm],time2 [s],load_cell [kN]"
+    np.savetxt(folder / "log.csv", rows, "%.6f", ",", header=head, comments="")
+    stamp = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    with (folder / "log.mcap").open("wb") as file:
+        writer = Writer(file)
+        kinds = {
+            "/drive": writer.register_msgdef("sensor_msgs/msg/JointState", _JOINT_STATE),
+            "/load_cell": writer.register_msgdef("geometry_msgs/msg/WrenchStamped", _WRENCH_STAMPED),
+        }
+        messages: list[tuple[float, str, dict[str, Any]]] = []
+        for drive_time, amperes, rpm, cell_time, kilonewtons in rows.tolist():
+            joint = {"header": stamp, "name": ["axis"], "position": [0.0], "velocity": [rpm], "effort": [amperes]}
+            vectors = {"force": {"x": kilonewtons, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": 0.0}}
+            messages.append((drive_time, "/drive", joint))
+            messages.append((cell_time, "/load_cell", {"header": stamp, "wrench": vectors}))
+        for time, topic, message in sorted(messages, key=lambda item: item[0]):
+            nanoseconds = 1_700_000_000 * 10**9 + round(1e9 * time)
+            writer.write_message(topic, kinds[topic], message, nanoseconds, nanoseconds)
+        writer.finish()
+    return {"CSV": folder / "log.csv", "MCAP": folder / "log.mcap"}
+
+
+def recorded() -> dict[str, list[Call]]:
+    """The calls with which each log is read, by its kind; modules and kernels are loaded before."""
+    import cdtool
+    from cdtool.machine_file import read_machine_file
+
+    if not Path(cdtool.__file__).samefile(PACKAGE / "__init__.py"):
+        raise SystemExit(f"cdtool is imported from {cdtool.__file__}, not from this checkout; pip install -e .")
+    read = cdtool.read
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for kind, log in write_logs(Path(folder)).items():
+            machine = read_machine_file(log.parent / "machine.toml")
+            read(log, machine)  # loads its modules and compiles its kernels
+            found[kind] = calls_of(lambda log=log, machine=machine: read(log, machine), PACKAGE, UTILITIES, METHOD)
+    return found
+
+
+def measure(show: bool) -> bool:
+    """Print all of it; returns whether every target is met."""
+    modules = modules_of(PACKAGE)
+    imports = imports_of(modules)
+    rows: list[tuple[str, object, object, str]] = []
+    met: list[bool] = []
+
+    def add(name: str, value: int, most: int | None = None) -> None:
+        met.append(most is None or value <= most)
+        rows.append((name, f"{value:,}", "" if most is None else f"<= {most:,}", "ok" if met[-1] else "FAIL"))
+
+    lists: dict[str, list[str]] = {}
+    for kind, calls in recorded().items():
+        walk, fine = Walk.of(calls, room_of), Walk.of(calls, str)
+        add(f"{kind} log: stays", len(walk.stays), MOST_STAYS)
+        add(f"{kind} log: returns", walk.returns, MOST_RETURNS)
+        add(f"{kind} log: modules", walk.rooms)
+        add("  every module counted: stays", len(fine.stays))
+        add("  every module counted: returns", fine.returns)
+        add("  every module counted: modules", fine.rooms)
+        lists[f"Walk of the {kind} log ({len(walk.stays)} stays, {walk.returns} returns)"] = _shown(walk)
+    groups, more = cycles(imports), cycles(imports, ("module", "types", "function"))
+    add("import cycles, type checking included", len(groups), 0)
+    add("  modules in them", sum(map(len, groups)))
+    add("import cycles with imports in functions", len(more))
+    add("  modules in them", sum(map(len, more)))
+    lists["Import cycles, type checking included"] = [", ".join(group) for group in groups]
+    lists["Import cycles with imports in functions"] = [", ".join(group) for group in more]
+    single = single_callers(modules, imports)
+    add("single-caller modules", len(single), MOST_SINGLE_CALLERS)
+    add("  code lines in them", sum(code_lines(modules[name]) for _, name in single))
+    lists["Single callers (caller -> module, code lines)"] = [
+        f"{caller} -> {name}, {code_lines(modules[name])}" for caller, name in single
+    ]
+    if find_spec("ruff") is None:
+        rows.append(("functions above ruff's limits", "skipped: ruff is not installed", "", ""))
+    else:
+        found = excesses(PACKAGE)
+        by_rule = Counter(item.rule for item in found)
+        add(f"functions above C901 {MOST_COMPLEX}", by_rule["C901"], 0)
+        add("  the largest", max((item.size for item in found if item.rule == "C901"), default=0))
+        add(f"functions above PLR0913 {MOST_ARGUMENTS}", by_rule["PLR0913"], 0)
+        add("  the largest", max((item.size for item in found if item.rule == "PLR0913"), default=0))
+        add("  of them in cli/", sum("/cli/" in item.place for item in found if item.rule == "PLR0913"))
+        lists["Functions above the limits"] = [f"{item.rule} {item.size:3} {item.place}" for item in found]
+    rooms = lines_by_room(modules)
+    add("code lines", sum(lines for _, lines in rooms.values()), MOST_LINES)
+    add("files", sum(files for files, _ in rooms.values()))
+    table(("measure", "now", "target", ""), [row if row[2] else (*row[:3], "") for row in rows])
+    print()
+    table(("folder", "files", "code lines"), [(name, *counts) for name, counts in rooms.items()])
+    if show:
+        for title, lines in lists.items():
+            print(f"\n== {title}")
+            print("\n".join(lines) or "none")
+        print("\n== Utilities that a walk passes over")
+        print("\n".join(f"{name}: {reason}" for name, reason in UTILITIES.items()))
+    return all(met)
+
+
+def _shown(walk: Walk) -> list[str]:
+    seen: set[str] = set()
+    lines = []
+    for number, (name, functions) in enumerate(walk.stays, 1):
+        mark = "<-" if name in seen else "  "
+        seen.add(name)
+        lines.append(f"{number:3} {mark} {name}: {', '.join(functions)}")
+    return lines
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--show", action="store_true", help="print the walks and the lists, too")
+    return 0 if measure(parser.parse_args().show) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
