@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from cdtool.workflows.comparing import compare
     from cdtool.workflows.converting import convert
     from cdtool.workflows.detection import detect
-    from cdtool.workflows.drafting import init
     from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
+    from cdtool.workflows.init.drafting import init
     from cdtool.workflows.learning import learn_signature
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
@@ -57,7 +57,7 @@ _API = {
     "benchmark": "cdtool.workflows.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.converting:convert",
-    "init": "cdtool.workflows.drafting:init",
+    "init": "cdtool.workflows.init.drafting:init",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.workflows.drafting import Drafted, init
+from cdtool.workflows.init.drafting import Drafted, init
 
 FloatArray = np.ndarray
 RPM = 60.0 / (2.0 * np.pi)

@@ -9,7 +9,7 @@ import pytest
 from mcap.writer import Writer
 
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.workflows.draft_units import is_si
+from cdtool.workflows.init.units import is_si
 from tests.cli.drafts import RPM, drafted, stroke
 
 LEAD = 1.5e-3  # m of travel per rad of the motor

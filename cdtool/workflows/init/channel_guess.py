@@ -7,12 +7,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.workflows import draft_motion as motion
-from cdtool.workflows.draft_names import label
-from cdtool.workflows.draft_others import guess_ground_truth, guess_references
-from cdtool.workflows.draft_search import BY_COURSE, best, named_for, unnamed_for
-from cdtool.workflows.draft_streams import Channels, Stream, joined
-from cdtool.workflows.draft_words import is_something_else, word_for
+from cdtool.workflows.init import motion_evidence as motion
+from cdtool.workflows.init.candidates import BY_COURSE, best, named_for, unnamed_for
+from cdtool.workflows.init.other_channels import guess_ground_truth, guess_references
+from cdtool.workflows.init.quantity_words import is_something_else, word_for
+from cdtool.workflows.init.streams import Channels, Stream, joined
+from cdtool.workflows.init.units_in_names import label
 
 # The correlation from which on one column is another's derivative.
 _FITS = 0.9

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.recording import FloatArray
-from cdtool.workflows.draft_streams import Stream
+from cdtool.workflows.init.streams import Stream
 
 _WINDOWS = 400
 _SURE = 0.9

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.units import find_unit
-from cdtool.workflows import draft_motion as motion
-from cdtool.workflows.draft_clock import TableClock, seconds
-from cdtool.workflows.draft_names import label, own_name, unit_in_name
-from cdtool.workflows.draft_streams import Channels, Stream
-from cdtool.workflows.draft_words import motion_of, words
+from cdtool.workflows.init import motion_evidence as motion
+from cdtool.workflows.init.quantity_words import motion_of, words
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.table_clock import TableClock, seconds
+from cdtool.workflows.init.units_in_names import label, own_name, unit_in_name
 
 # Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
 _PAIRS = (

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.units import find_unit
-from cdtool.workflows.draft_names import label
-from cdtool.workflows.draft_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
-from cdtool.workflows.draft_side import Side
-from cdtool.workflows.draft_streams import Channels, Stream
-from cdtool.workflows.draft_words import words
+from cdtool.workflows.init.machine_side import Side
+from cdtool.workflows.init.quantity_words import words
+from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.units_in_names import label
 
 _RAW = ("A", "V", "1", "count")
 # Types of messages whose numbers are in SI units by the convention of ROS (REP 103).

@@ -13,15 +13,15 @@ from cdtool.formats.element_names import element_names
 from cdtool.formats.reading import choose_format, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import CHANNELS, Finding
-from cdtool.workflows.draft_clock import TableClock, seconds, table_clock
-from cdtool.workflows.draft_guess import guess_channels
-from cdtool.workflows.draft_names import unit_in_name
-from cdtool.workflows.draft_ratio import Ratio, ratio_of
-from cdtool.workflows.draft_side import side_of
-from cdtool.workflows.draft_streams import Channels, streams_of
-from cdtool.workflows.draft_text import Clock, Draft, draft_text
-from cdtool.workflows.draft_units import Evidence, fits_as_well, is_si
 from cdtool.workflows.information import info
+from cdtool.workflows.init.channel_guess import guess_channels
+from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
+from cdtool.workflows.init.machine_side import side_of
+from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
+from cdtool.workflows.init.streams import Channels, streams_of
+from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
+from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
+from cdtool.workflows.init.units_in_names import unit_in_name
 
 _CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
 # What accelerometer_check says of a sensor that is mounted the other way round.

@@ -11,8 +11,8 @@ from cdtool.formats.source import Column, Source
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.clock_guess import GuessedClock, guess_clock
-from cdtool.workflows.draft_names import unit_in_name
-from cdtool.workflows.draft_words import is_clock, is_counter, word_for
+from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
+from cdtool.workflows.init.units_in_names import unit_in_name
 
 _UNITS = ("s", "ms", "us", "ns", "min")
 # Sampling rates [Hz] that logs of a machine have, and those that a log may have.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.workflows import draft_motion as motion
-from cdtool.workflows.draft_names import label, may_be
-from cdtool.workflows.draft_search import BY_COURSE, best, is_other, named_for, unnamed_for
-from cdtool.workflows.draft_streams import Channels, Found, Stream
-from cdtool.workflows.draft_words import is_actual, is_load_cell, is_reference, is_something_else, word_for
+from cdtool.workflows.init import motion_evidence as motion
+from cdtool.workflows.init.candidates import BY_COURSE, best, is_other, named_for, unnamed_for
+from cdtool.workflows.init.quantity_words import is_actual, is_load_cell, is_reference, is_something_else, word_for
+from cdtool.workflows.init.streams import Channels, Found, Stream
+from cdtool.workflows.init.units_in_names import label, may_be
 
 # Correlations from which on one stream follows another as a set value, and where a name tells of set values too.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from cdtool.formats.source import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.draft_streams import Stream
-from cdtool.workflows.draft_words import is_clock, motion_of, word_for, words
+from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
+from cdtool.workflows.init.streams import Stream
 
 _QUANTITIES = (*MEASURED, "force")
 # What can be logged for a quantity, whatever the machine: SI units, and those that a scale makes one of these.

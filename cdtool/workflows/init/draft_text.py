@@ -10,9 +10,9 @@ from textwrap import wrap
 import numpy as np
 
 from cdtool.recording import UNITLESS
-from cdtool.workflows.draft_side import Side
-from cdtool.workflows.draft_streams import Channels, Stream
-from cdtool.workflows.draft_units import Evidence, Logged
+from cdtool.workflows.init.machine_side import Side
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.units import Evidence, Logged
 
 _WIDEST = 100
 _MOST_LISTED = 60

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.units import find_unit
-from cdtool.workflows.draft_clock import TableClock
-from cdtool.workflows.draft_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
-from cdtool.workflows.draft_streams import Channels
-from cdtool.workflows.draft_words import words
+from cdtool.workflows.init.quantity_words import words
+from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.streams import Channels
+from cdtool.workflows.init.table_clock import TableClock
 
 # Above this a rotation [rad, rad/s] is a motor's, not a load's.
 _MOTOR_RANGE = 20.0

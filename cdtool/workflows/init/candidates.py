@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from cdtool.recording import MEASURED
-from cdtool.workflows.draft_names import label, may_be
-from cdtool.workflows.draft_streams import Channels, Stream
-from cdtool.workflows.draft_words import is_load_cell, is_reference, is_something_else, word_for
+from cdtool.workflows.init.quantity_words import is_load_cell, is_reference, is_something_else, word_for
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.units_in_names import label, may_be
 
 BY_COURSE = "its course alone tells it"
 # A name of one letter speaks for a quantity less than this.
