@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
-    from cdtool.workflows.study import study_sensors
+    from cdtool.workflows.study.study import study_sensors
     from cdtool.workflows.upkeep import check_signature
     from cdtool.workflows.upkeep import update_with_runs as update_signature
 
@@ -62,7 +62,7 @@ _API = {
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
-    "study_sensors": "cdtool.workflows.study:study_sensors",
+    "study_sensors": "cdtool.workflows.study.study:study_sensors",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }

@@ -19,9 +19,9 @@ from cdtool.impact.sensors import Sensor
 from cdtool.impact.transmission import ElasticTransmission
 from cdtool.machine_file import MachineFile
 from cdtool.tables import Table, read_toml
-from cdtool.workflows.study_joint import StudiedJoint, studied_joint
-from cdtool.workflows.study_reader import StudyReader
-from cdtool.workflows.study_sensors import studied_sensors
+from cdtool.workflows.study.joint import StudiedJoint, studied_joint
+from cdtool.workflows.study.number_reader import StudyReader
+from cdtool.workflows.study.sensors import studied_sensors
 
 _DRIVE_FREQUENCY = 10.0
 _LOOP_FREQUENCY = 2.0

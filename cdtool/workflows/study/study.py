@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.impact.sensor_ranking import Ranking, rank_sensors
 from cdtool.impact.waves import WaveCheck, check_waves
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.study_file import read_study
+from cdtool.workflows.study.study_file import read_study
 
 
 @dataclass(frozen=True)

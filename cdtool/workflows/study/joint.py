@@ -10,7 +10,7 @@ from cdtool.machine_file import MachineFile
 from cdtool.machines.axis import Axis
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
-from cdtool.workflows.study_reader import StudyReader
+from cdtool.workflows.study.number_reader import StudyReader
 
 
 @dataclass(frozen=True)

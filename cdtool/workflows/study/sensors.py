@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from cdtool.impact.sensors import Sensor
-from cdtool.workflows.study_joint import StudiedJoint
-from cdtool.workflows.study_reader import StudyReader
+from cdtool.workflows.study.joint import StudiedJoint
+from cdtool.workflows.study.number_reader import StudyReader
 
 _GRAVITY = 9.80665
 
