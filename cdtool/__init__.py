@@ -37,21 +37,21 @@ if TYPE_CHECKING:
     from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
     from cdtool.workflows.init.drafting import init
-    from cdtool.workflows.learning import learn_signature
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
+    from cdtool.workflows.signature.learning import learn_signature
+    from cdtool.workflows.signature.upkeep import check_signature
+    from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
     from cdtool.workflows.study.study import study_sensors
-    from cdtool.workflows.upkeep import check_signature
-    from cdtool.workflows.upkeep import update_with_runs as update_signature
 
 _API = {
     "__version__": "cdtool.version:__version__",
     "read": "cdtool.workflows.runs:read_log",
-    "learn_signature": "cdtool.workflows.learning:learn_signature",
-    "check_signature": "cdtool.workflows.upkeep:check_signature",
-    "update_signature": "cdtool.workflows.upkeep:update_with_runs",
+    "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
+    "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
+    "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "detect": "cdtool.workflows.detection:detect",
     "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark:benchmark",

@@ -34,10 +34,10 @@ from cdtool.workflows.benchmark_file import (
 )
 from cdtool.workflows.calibration import learn_thresholds, that_can_run
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.normal_runs import normal_motions
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
 from cdtool.workflows.scoring import Scored, detect_with, score_log
-from cdtool.workflows.threshold_settings import set_by_hand
+from cdtool.workflows.signature.normal_runs import normal_motions
+from cdtool.workflows.signature.threshold_settings import set_by_hand
 
 
 @dataclass(frozen=True)

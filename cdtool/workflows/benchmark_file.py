@@ -32,7 +32,7 @@ from cdtool.workflows.benchmark_sections import (
 )
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
 from cdtool.workflows.scoring_rules import ScoringRules
-from cdtool.workflows.threshold_settings import read_threshold
+from cdtool.workflows.signature.threshold_settings import read_threshold
 
 HOLDOUT = "holdout"
 

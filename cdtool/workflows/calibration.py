@@ -14,8 +14,8 @@ from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of, with_left_out
 from cdtool.workflows.left_out import LeftOut
+from cdtool.workflows.signature.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of, with_left_out
 
 # Runs are judged by what the other nine tenths teach.
 FOLDS = 10

@@ -16,9 +16,9 @@ from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.calibration import learn_thresholds
-from cdtool.workflows.normal_runs import normal_motions, normals_of, notes_on
 from cdtool.workflows.runs import load_runs
 from cdtool.workflows.scoring import Detect, Scored, detect_with, score_log
+from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, notes_on
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion
-from cdtool.workflows.grouping import by_class
+from cdtool.workflows.signature.grouping import by_class
 
 
 def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:

@@ -25,10 +25,10 @@ from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.fitting import Pair, signals_of
-from cdtool.workflows.learning import learned_run
-from cdtool.workflows.normal_runs import with_operation
 from cdtool.workflows.runs import Progress, load_runs
+from cdtool.workflows.signature.fitting import Pair, signals_of
+from cdtool.workflows.signature.learning import learned_run
+from cdtool.workflows.signature.normal_runs import with_operation
 
 # The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
 TARGET, LEAST_TARGET = 1e-3, 1e-9

@@ -17,7 +17,7 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.contract import checked_fit
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.grouping import by_class
+from cdtool.workflows.signature.grouping import by_class
 
 Pair = tuple[Operation, Signal]
 
