@@ -20,7 +20,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
 from cdtool.workflows.signature.fitting import fit_operations
 
 IMPACTS = ("stiff", "soft")

@@ -54,7 +54,7 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.whitening import Whitening
-from cdtool.workflows.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.signature.fitting import Fit, Pair, fitting
 
 SEED, FAULTS, SIGNIFICANT = 1501, 10, 0.05

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.version import __version__
-    from cdtool.workflows.benchmark import benchmark
+    from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
     from cdtool.workflows.converting import convert
     from cdtool.workflows.detection import detect
@@ -54,7 +54,7 @@ _API = {
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "detect": "cdtool.workflows.detection:detect",
     "explain": "cdtool.workflows.explaining:explain",
-    "benchmark": "cdtool.workflows.benchmark:benchmark",
+    "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.converting:convert",
     "init": "cdtool.workflows.init.drafting:init",

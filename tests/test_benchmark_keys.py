@@ -12,8 +12,8 @@ import cdtool
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.results_file import read_results, to_json
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.benchmark import benchmark
-from cdtool.workflows.prepared_benchmark import prepare_benchmark
+from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["feekf", "gm"]\n'
 LEARN = '[learn]\nlogs = ["free/*.csv"]\n'
@@ -179,7 +179,8 @@ def read_back(folder: Path, results):
 
 
 def test_each_run_of_a_budget_is_judged_by_what_others_teach(gate, monkeypatch):
-    from cdtool.workflows import calibration, fitting
+    from cdtool.workflows.benchmark import calibration
+    from cdtool.workflows.signature import fitting
 
     taught: list[tuple[set[str], set[str]]] = []
     judge = calibration.judge

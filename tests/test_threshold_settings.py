@@ -15,7 +15,7 @@ from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.test_workflows import MACHINE, write_log
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'

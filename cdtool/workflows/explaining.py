@@ -11,9 +11,9 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.detection import Detected, detect
 from cdtool.workflows.detector_inputs import inputs_of
-from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.scoring_rules import ScoringRules
 
 

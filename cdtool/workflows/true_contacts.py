@@ -10,7 +10,7 @@ from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
-from cdtool.workflows.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.impact_free import contacts_shown
 from cdtool.workflows.runs import DAMAGED, absent_truth, lost
 from cdtool.workflows.scoring_rules import ScoringRules

@@ -13,7 +13,7 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.value_words import value_in_words
-from cdtool.workflows.benchmark_sections import read_signature
+from cdtool.workflows.benchmark.file_sections import read_signature
 
 _DEFAULT = "signature"
 

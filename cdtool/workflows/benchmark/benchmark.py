@@ -24,7 +24,7 @@ from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
-from cdtool.workflows.benchmark_file import (
+from cdtool.workflows.benchmark.benchmark_file import (
     HOLDOUT,
     BenchmarkFile,
     read_benchmark_file,
@@ -32,10 +32,10 @@ from cdtool.workflows.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.workflows.calibration import learn_thresholds, that_can_run
+from cdtool.workflows.benchmark.calibration import learn_thresholds, that_can_run
+from cdtool.workflows.benchmark.scoring import Scored, detect_with, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
-from cdtool.workflows.scoring import Scored, detect_with, score_log
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 

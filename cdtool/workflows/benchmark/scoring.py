@@ -19,11 +19,11 @@ from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, Finding, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
-from cdtool.workflows.force_rows import force_rows
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.force_rows import force_rows
+from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.impact_free import without_contacts
 from cdtool.workflows.judged import Judged, not_assessable
-from cdtool.workflows.left_out import LeftOut
 from cdtool.workflows.log_findings import log_warnings
 from cdtool.workflows.matched_log import MatchedLog, match_log
 from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread

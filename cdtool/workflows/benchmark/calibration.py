@@ -13,8 +13,8 @@ from cdtool.evaluation.results import CalibrationResult, Skipped
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.left_out import LeftOut
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.signature.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of, with_left_out
 
 # Runs are judged by what the other nine tenths teach.

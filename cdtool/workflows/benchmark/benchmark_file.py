@@ -22,7 +22,7 @@ from cdtool.operations import HOW_TO_CUT
 from cdtool.plain_text import counted
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark_sections import (
+from cdtool.workflows.benchmark.file_sections import (
     migrated_onset,
     read_activation,
     read_budget,
