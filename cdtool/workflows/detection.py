@@ -25,11 +25,11 @@ from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
-from cdtool.workflows.matched_log import match_log
+from cdtool.workflows.contacts.matched_log import match_log
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
-from cdtool.workflows.scoring_rules import ScoringRules
 from cdtool.workflows.signature.normal_runs import normals_of, notes_on
-from cdtool.workflows.true_contacts import any_contacts
 
 
 @dataclass(frozen=True)

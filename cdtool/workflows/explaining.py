@@ -12,9 +12,9 @@ from cdtool.evaluation.explanation.explanation import Explanation, explain_opera
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
 from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.detection import Detected, detect
 from cdtool.workflows.detector_inputs import inputs_of
-from cdtool.workflows.scoring_rules import ScoringRules
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
 from cdtool.workflows.benchmark.scoring import Scored
+from cdtool.workflows.contacts.impact_free import unchecked
+from cdtool.workflows.contacts.judged import Judged
 from cdtool.workflows.detector_inputs import inputs_of
-from cdtool.workflows.impact_free import unchecked
-from cdtool.workflows.judged import Judged
 
 
 class Gathering:

@@ -30,8 +30,8 @@ from cdtool.workflows.benchmark.file_sections import (
     read_signature,
     read_watched,
 )
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
-from cdtool.workflows.scoring_rules import ScoringRules
 from cdtool.workflows.signature.threshold_settings import read_threshold
 
 HOLDOUT = "holdout"

@@ -22,12 +22,12 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows
 from cdtool.workflows.benchmark.left_out import LeftOut
-from cdtool.workflows.impact_free import without_contacts
-from cdtool.workflows.judged import Judged, not_assessable
+from cdtool.workflows.contacts.impact_free import without_contacts
+from cdtool.workflows.contacts.judged import Judged, not_assessable
+from cdtool.workflows.contacts.matched_log import MatchedLog, match_log
+from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_findings import log_warnings
-from cdtool.workflows.matched_log import MatchedLog, match_log
 from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
-from cdtool.workflows.true_contacts import any_contacts, true_contacts, unwanted_contacts
 
 
 @dataclass

@@ -11,9 +11,9 @@ from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
-from cdtool.workflows.impact_free import contacts_shown
+from cdtool.workflows.contacts.impact_free import contacts_shown
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.runs import DAMAGED, absent_truth, lost
-from cdtool.workflows.scoring_rules import ScoringRules
 
 # A load cell that ends earlier than this [s] before its log has not seen all of it.
 _TAIL = 0.1

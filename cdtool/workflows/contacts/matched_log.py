@@ -13,11 +13,11 @@ from cdtool.evaluation.truth.matching import match
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
-from cdtool.workflows.judged import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.contacts.judged import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.uncut_log import uncut_log
 from cdtool.workflows.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.runs import DAMAGED
-from cdtool.workflows.scoring_rules import ScoringRules
-from cdtool.workflows.uncut_log import uncut_log
 
 
 @dataclass(frozen=True)
