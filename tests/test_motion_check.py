@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.recording import Recording, Series
-from cdtool.workflows.motion_check import motion_findings
+from cdtool.workflows.log_checks.motion_check import motion_findings
 
 TIME = np.arange(0.0, 10.0, 2e-3)
 JOINTS = ("shoulder", "elbow", "wrist")

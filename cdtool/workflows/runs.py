@@ -19,7 +19,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
-from cdtool.workflows.log_findings import log_warnings
+from cdtool.workflows.log_checks.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

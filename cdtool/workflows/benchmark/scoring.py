@@ -26,7 +26,7 @@ from cdtool.workflows.contacts.impact_free import without_contacts
 from cdtool.workflows.contacts.judged import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
-from cdtool.workflows.log_findings import log_warnings
+from cdtool.workflows.log_checks.log_findings import log_warnings
 from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
 
 

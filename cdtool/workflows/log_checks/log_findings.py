@@ -8,8 +8,8 @@ from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.recording import Contact, Finding, Recording, worst_first
-from cdtool.workflows.accelerometer_check import accelerometer_findings
-from cdtool.workflows.motion_check import motion_findings
+from cdtool.workflows.log_checks.accelerometer_check import accelerometer_findings
+from cdtool.workflows.log_checks.motion_check import motion_findings
 
 # Of a contact without an onset; where contacts are scored it is named as left out.
 IN_PROGRESS = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"
