@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cdtool.version import __version__
     from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
-    from cdtool.workflows.converting import convert
+    from cdtool.workflows.convert.converting import convert
     from cdtool.workflows.detection import detect
     from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
@@ -56,7 +56,7 @@ _API = {
     "explain": "cdtool.workflows.explaining:explain",
     "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
-    "convert": "cdtool.workflows.converting:convert",
+    "convert": "cdtool.workflows.convert.converting:convert",
     "init": "cdtool.workflows.init.drafting:init",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",

@@ -12,7 +12,7 @@ from cdtool.errors import OutputError, RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.formats.reading import survey
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.converting import _WRITERS, convert
+from cdtool.workflows.convert.converting import _WRITERS, convert
 from cdtool.workflows.runs import read_log
 from tests.command import cdtool
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks

@@ -14,7 +14,7 @@ from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.formats.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 from tests.command import cdtool as command
 from tests.formats.containers import assert_same, logged
 from tests.test_converting import KINDS, SEVERAL_CLOCKS, needs

@@ -10,7 +10,7 @@ import pytest
 from cdtool.formats import time_order
 from cdtool.formats.csv import text
 from cdtool.formats.reading import survey
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 from tests.test_converting import SEVERAL_CLOCKS, needs, table
 
 

@@ -13,7 +13,7 @@ import pytest
 from cdtool.errors import OutputError, RecordingError
 from cdtool.files import replaced
 from cdtool.formats.groups import Part
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.test_converting import KINDS, needs, table
 

@@ -9,7 +9,7 @@ import pytest
 
 import cdtool
 from cdtool.formats.reading import survey
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
 from tests.test_converting import KINDS, needs

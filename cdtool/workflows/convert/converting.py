@@ -19,7 +19,7 @@ from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import Finding
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
-from cdtool.workflows.converted_machine import converted_machine
+from cdtool.workflows.convert.converted_machine import converted_machine
 from cdtool.workflows.log_rows import LogRows
 
 if TYPE_CHECKING:
