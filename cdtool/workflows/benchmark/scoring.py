@@ -117,7 +117,7 @@ def score_log(
     try:
         recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
         if group:
-            contacts = true_contacts(recording, setup, path) if group != HOLDOUT else []
+            contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
         else:
             contacts = any_contacts(recording, rules)
     except CdtoolError as fault:
@@ -128,7 +128,7 @@ def score_log(
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.skipped += lost(recording)
     if group == HOLDOUT:
-        unwanted = unwanted_contacts(recording, setup)
+        unwanted = unwanted_contacts(recording, rules)
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]

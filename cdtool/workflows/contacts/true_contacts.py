@@ -1,4 +1,4 @@
-"""The true contacts of a benchmark's logs: of an impact log at least one, of the hold-out none."""
+"""The true contacts of a log: at least one of an impact log, none of an impact-free one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
-from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.runs import DAMAGED, absent_truth, lost
@@ -19,11 +18,11 @@ from cdtool.workflows.runs import DAMAGED, absent_truth, lost
 _TAIL = 0.1
 
 
-def unwanted_contacts(recording: Recording, setup: BenchmarkFile) -> tuple[Contact, ...]:
-    """The contacts of a log of the hold-out, which should have none; a label file that names it is believed."""
-    labels = setup.labels
+def unwanted_contacts(recording: Recording, rules: ScoringRules) -> tuple[Contact, ...]:
+    """Return the contacts of a log of the hold-out, which should have none; a label file that names it is believed."""
+    labels = rules.labels
     name = labels.name_of(recording.name) if labels else None
-    return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, setup.onset)
+    return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, rules.onset)
 
 
 def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
@@ -38,12 +37,12 @@ def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
         return []  # without ground truth there are alarms, but no latency
 
 
-def true_contacts(recording: Recording, setup: BenchmarkFile, path: Path) -> list[Contact]:
-    """The contacts of an impact log: those of a label file that names it, else the load cell's, a label's or events'.
+def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list[Contact]:
+    """Return an impact log's contacts: those of a label file that names it, else the load cell's, a label's or events'.
 
     Raises RecordingError where there is none, or nothing that tells.
     """
-    labels = setup.labels
+    labels = rules.labels
     name = labels.name_of(recording.name) if labels else None
     if labels and name is not None:
         labels.check(recording.name, recording.start, recording.end)
@@ -56,14 +55,14 @@ def true_contacts(recording: Recording, setup: BenchmarkFile, path: Path) -> lis
     for item in absent_truth(recording):
         if not any(channel in recording for channel in GROUND_TRUTH):
             raise RecordingError(f"{path}: no ground truth: {item}", "an impact log needs it, or a label file")
-    contacts = find_contacts(recording, setup.onset)
+    contacts = find_contacts(recording, rules.onset)
     if not contacts and (missing := _missing(recording)):
         raise RecordingError(
-            f"{path}: no contact found ({setup.onset.described}), and {missing}", "copy the log again, or leave it out"
+            f"{path}: no contact found ({rules.onset.described}), and {missing}", "copy the log again, or leave it out"
         )
     if not contacts:
         raise RecordingError(
-            f"{path}: no contact found ({setup.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
+            f"{path}: no contact found ({rules.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
         )
     return contacts
 
