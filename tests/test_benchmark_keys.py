@@ -179,8 +179,7 @@ def read_back(folder: Path, results):
 
 
 def test_each_run_of_a_budget_is_judged_by_what_others_teach(gate, monkeypatch):
-    from cdtool.workflows.benchmark import calibration
-    from cdtool.workflows.signature import fitting
+    from cdtool.workflows.signature import calibration, fitting
 
     taught: list[tuple[set[str], set[str]]] = []
     judge = calibration.judge

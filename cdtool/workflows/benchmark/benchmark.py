@@ -32,7 +32,7 @@ from cdtool.workflows.benchmark.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.workflows.benchmark.calibration import learn_thresholds, that_can_run
+from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.scoring import Scored, detect_with, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path

@@ -15,7 +15,7 @@ from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
-from cdtool.workflows.benchmark.calibration import learn_thresholds
+from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
 from cdtool.workflows.runs import load_runs
 from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, notes_on

@@ -17,8 +17,8 @@ from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.runs import Progress, check_joints, load_runs
+from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand

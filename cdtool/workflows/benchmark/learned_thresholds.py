@@ -1,4 +1,4 @@
-"""Thresholds of a benchmark: learned from impact-free runs, and set for a false-alarm budget by cross-validation."""
+"""The thresholds of a benchmark: of each detector, learned from its impact-free runs."""
 
 from __future__ import annotations
 
@@ -6,19 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdtool.activation import Activation
-from cdtool.errors import CdtoolError, NothingValidError, SignatureError, UsageError
-from cdtool.evaluation.false_alarm_budget import Budget, Calibrated, set_factor
+from cdtool.errors import CdtoolError, NothingValidError, SignatureError
 from cdtool.evaluation.results import CalibrationResult, Skipped
 from cdtool.operations import Operation
-from cdtool.pipeline import Detection, judge, run_detector
+from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.left_out import LeftOut
-from cdtool.workflows.signature.fitting import Fit, NoUsableRunError, Pair, fitting, signals_of, with_left_out
-
-# Runs are judged by what the other nine tenths teach.
-FOLDS = 10
+from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
+from cdtool.workflows.signature.fitting import NoUsableRunError, fitting, signals_of, with_left_out
 
 
 @dataclass(frozen=True)
@@ -90,47 +86,6 @@ def _none_usable(lacking: Mapping[str, str], known: bool) -> SignatureError:
     fault = NoUsableRunError(name if len(lacking) == 1 else f"any of {', '.join(lacking)}", reason)
     others = f"take {', '.join(lacking)} out of `detectors`, or map what they need"
     return SignatureError(fault.message, others if known else fault.hint)
-
-
-def in_fixed_order(pairs: Sequence[Pair]) -> list[Pair]:
-    """The runs in an order that is not that of their files: which runs judge which must not hang on it."""
-    return sorted(pairs, key=lambda pair: (pair[0].recording.digest, pair[0].number, pair[0].name))
-
-
-def kept(pairs: Sequence[Pair], skipped: Sequence[Skipped]) -> list[Pair]:
-    """The runs that were not left out."""
-    names = {item.recording for item in skipped}
-    return [pair for pair in pairs if pair[0].name not in names]
-
-
-def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, activation: Activation) -> Calibrated:
-    """The safety factor for a budget, set on every run, each judged by thresholds learned from runs of other folds.
-
-    Raises UsageError where the runs are too few for the budget, or nine tenths of them to learn from.
-    """
-    if budget.per == "operation":
-        budget.check(len(pairs), detector)
-    detections: list[Detection] = []
-    for fold in range(FOLDS):
-        others = [pair for i, pair in enumerate(pairs) if i % FOLDS != fold]
-        try:
-            fitted = fit(others)
-        except SignatureError as fault:
-            raise _too_few(budget, detector, fault.message) from fault
-        if fitted.skipped:
-            raise _too_few(budget, detector, fitted.skipped[0].reason)
-        held_out = [pair for i, pair in enumerate(pairs) if i % FOLDS == fold]
-        detections += [
-            judge(operation, detector, signal, fitted.thresholds, activation) for operation, signal in held_out
-        ]
-    return set_factor(budget, detector, detections, activation)
-
-
-def _too_few(budget: Budget, detector: str, why: str) -> UsageError:
-    return UsageError(
-        f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {why}",
-        "add runs (of each class of motion), or do without a budget",
-    )
 
 
 def that_can_run(
