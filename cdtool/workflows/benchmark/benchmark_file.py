@@ -27,12 +27,11 @@ from cdtool.workflows.benchmark.file_sections import (
     read_activation,
     read_budget,
     read_onset,
-    read_signature,
     read_watched,
 )
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
-from cdtool.workflows.signature.threshold_settings import read_threshold
+from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
 
 HOLDOUT = "holdout"
 

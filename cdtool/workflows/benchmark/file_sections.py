@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from cdtool.activation import Activation
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
-from cdtool.motion.progress import ALIGNMENTS
 from cdtool.tables import Table
-from cdtool.thresholds.fitted_signature import RULES, SIDES
-from cdtool.thresholds.signature import Signature
 
 
 def read_budget(table: Table) -> Budget | None:
@@ -33,24 +29,6 @@ def read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
         if joint not in joints:
             raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
     return watched
-
-
-def read_signature(table: Table, default_sides: str) -> Signature:
-    """[signature]: the rule."""
-    if "debounce" in table:
-        raise table.fault("debounce", "belongs to another table", "write it in [activation]")
-    settings: dict[str, Any] = {
-        "rule": table.choice("rule", RULES, "pooled"),
-        "sides": table.choice("sides", SIDES, default_sides),
-        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
-        "position_step": table.number("position_step", Signature.position_step, above=0.0),
-        "position_window": table.number("position_window", Signature.position_window, above=0.0),
-        "force": table.flag("force", False),
-    }
-    if "safety_factor" in table:
-        settings["safety_factor"] = table.number("safety_factor", above=0.0)
-    table.finish()
-    return Signature(**settings)
 
 
 def read_activation(table: Table) -> Activation:

@@ -1,4 +1,4 @@
-"""`threshold` of a benchmark file: a rule's name, or a table [threshold] with its name and its own settings."""
+"""A threshold rule and its settings, from the tables [threshold] and [signature] or from the command line."""
 
 from __future__ import annotations
 
@@ -8,14 +8,33 @@ from typing import Any
 
 from cdtool.bounded_loading import ContentError, parse_toml
 from cdtool.errors import UsageError, nearest
+from cdtool.motion.progress import ALIGNMENTS
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.value_words import value_in_words
-from cdtool.workflows.benchmark.file_sections import read_signature
 
 _DEFAULT = "signature"
+
+
+def read_signature(table: Table, default_sides: str) -> Signature:
+    """Return the signature rule that the table [signature] describes."""
+    if "debounce" in table:
+        raise table.fault("debounce", "belongs to another table", "write it in [activation]")
+    settings: dict[str, Any] = {
+        "rule": table.choice("rule", RULES, "pooled"),
+        "sides": table.choice("sides", SIDES, default_sides),
+        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
+        "position_step": table.number("position_step", Signature.position_step, above=0.0),
+        "position_window": table.number("position_window", Signature.position_window, above=0.0),
+        "force": table.flag("force", False),
+    }
+    if "safety_factor" in table:
+        settings["safety_factor"] = table.number("safety_factor", above=0.0)
+    table.finish()
+    return Signature(**settings)
 
 
 def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
