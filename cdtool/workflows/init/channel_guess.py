@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from cdtool.recording import MEASURED
 from cdtool.workflows.init import motion_evidence as motion
-from cdtool.workflows.init.candidates import BY_COURSE, best, named_for, unnamed_for
-from cdtool.workflows.init.other_channels import guess_ground_truth, guess_references
-from cdtool.workflows.init.quantity_words import is_something_else, word_for
-from cdtool.workflows.init.streams import Channels, Stream, joined
-from cdtool.workflows.init.units_in_names import label
+from cdtool.workflows.init.quantity_words import is_actual, is_load_cell, is_reference, is_something_else, word_for
+from cdtool.workflows.init.streams import Channels, Found, Stream, joined
+from cdtool.workflows.init.units_in_names import label, may_be
 
 # The correlation from which on one column is another's derivative.
 _FITS = 0.9
 # Share of a column's variance that inertia and friction must explain for it to be the drive's.
 _DRIVES = 0.6
 _MOST_UNNAMED = 48
+# Correlations from which on one stream follows another as a set value, and where a name tells of set values too.
+_FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
+_BY_COURSE = "its course alone tells it"
+# A name of one letter speaks for a quantity less than this.
+_SPEAKS = 2.0
 
 
 def guess_channels(streams: list[Stream], topics: bool) -> Channels:
@@ -33,8 +37,8 @@ def guess_channels(streams: list[Stream], topics: bool) -> Channels:
         _motion_by_name(channels)
     _drive(channels)
     _acceleration(channels)
-    guess_references(channels)
-    guess_ground_truth(channels)
+    _references(channels)
+    _ground_truth(channels)
     return channels
 
 
@@ -78,9 +82,9 @@ def _by_place(channels: Channels) -> None:
         share = motion.drive_fit(drive, channels.found["speed"].stream)
         text = f"its place behind the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
         if motion.rests_and_peaks(drive):
-            channels.take("force", drive, "it rests at one level and has short, high peaks", BY_COURSE)
+            channels.take("force", drive, "it rests at one level and has short, high peaks", _BY_COURSE)
         else:
-            channels.take("torque", drive, text, BY_COURSE)
+            channels.take("torque", drive, text, _BY_COURSE)
         channels.free = []  # further columns without names would be pure guesswork
 
 
@@ -89,7 +93,7 @@ def _places(streams: list[Stream]) -> str:
 
 
 def _motion_by_name(channels: Channels) -> None:
-    named = {q: named_for(channels, q) for q in ("position", "speed")}
+    named = {q: _named_for(channels, q) for q in ("position", "speed")}
     pairs = [
         (p[0] + s[0] + ((fit := motion.integral_fit(p[2], s[2])).correlation > _FITS) * 3.0, -i - k, p, s, fit)
         for i, p in enumerate(named["position"])
@@ -114,29 +118,29 @@ def _partner(channels: Channels, stream: Stream, other: str) -> None:
         pair = (stream, candidate) if other == "speed" else (candidate, stream)
         return motion.integral_fit(*pair).correlation
 
-    found = best(unnamed_for(channels, other), fit)
+    found = _best(_unnamed_for(channels, other), fit)
     if found is not None and found[0] > _FITS:
         relation = "integral" if other == "speed" else "derivative"
-        channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", BY_COURSE)
+        channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", _BY_COURSE)
 
 
 def _drive(channels: Channels) -> None:
     if "torque" in channels.found:
         return
-    named = named_for(channels, "torque")
+    named = _named_for(channels, "torque")
     speed = channels.found.get("speed")
     if named:
         channels.take("torque", named[0][2], f"name ({named[0][1]})")
     elif moving := speed or channels.found.get("position"):
         rate = moving.stream if speed else _derived(moving.stream)
-        found = best(unnamed_for(channels, "torque"), lambda stream: motion.drive_fit(stream, rate))
+        found = _best(_unnamed_for(channels, "torque"), lambda stream: motion.drive_fit(stream, rate))
         if found is not None and found[0] > _DRIVES:
             text = f"it moves as a drive's effort does: inertia and friction explain {100 * found[0]:.0f} % of it"
-            channels.take("torque", found[1], text, BY_COURSE)
+            channels.take("torque", found[1], text, _BY_COURSE)
 
 
 def _acceleration(channels: Channels) -> None:
-    named = [item for item in named_for(channels, "acceleration") if item[2].moves]
+    named = [item for item in _named_for(channels, "acceleration") if item[2].moves]
     if not named:
         return
     speed = channels.found.get("speed")
@@ -153,3 +157,118 @@ def _acceleration(channels: Channels) -> None:
 def _derived(position: Stream) -> Stream:
     rate = np.gradient(np.nan_to_num(position.values), position.time, axis=0)
     return Stream(position.name, position.columns, None, position.time, rate)
+
+
+def _references(channels: Channels) -> None:
+    """Set values, by their names, else the one that a measured channel follows."""
+    for quantity in ("position", "speed", "torque"):
+        name = f"reference_{quantity}"
+        named = [item for item in _named_for(channels, quantity, reference=True) if item[2].moves]
+        measured = channels.found.get(quantity)
+        if named:
+            if measured is not None:
+                alike = {id(item[2]): motion.likeness(measured.stream, item[2]) for item in named}
+                named.sort(key=lambda item: -(item[0] + 3.0 * alike[id(item[2])]))
+            channels.take(name, named[0][2], f"name ({named[0][1]}, of a set value)")
+        elif measured is not None and measured.stream.moves:
+            _follower(channels, name, quantity, measured)
+
+
+def _ground_truth(channels: Channels) -> None:
+    """The load cell, labels and triggers; a load cell's name weighs more than one that tells of any force."""
+    singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
+    named = [(*word_for("force", _full(stream)), stream) for stream in singles if not is_something_else(stream.name)]
+    named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
+    if named:
+        chosen = max(
+            named,
+            key=lambda item: (item[0] + is_load_cell(_full(item[2])), float(np.ptp(np.nan_to_num(item[2].values)))),
+        )
+        channels.take("force", chosen[2], f"name ({chosen[1]})")
+    elif "force" not in channels.found:
+        for stream in singles:
+            if not _is_other("force", stream) and motion.rests_and_peaks(stream):
+                channels.take("force", stream, "it rests at one level and has short, high peaks", _BY_COURSE)
+                break
+    for quantity in ("label", "trigger"):
+        for stream in channels.free:
+            seen = stream.values[np.isfinite(stream.values)]
+            if stream.width == 1 and word_for(quantity, stream.name)[0] and np.isin(seen, (0.0, 1.0)).all():
+                channels.take(quantity, stream, f"name ({word_for(quantity, stream.name)[1]}), 0 and 1 only")
+                break
+
+
+def _full(stream: Stream) -> str:
+    """A topic's name tells of a load cell, too."""
+    return f"{stream.topic} {label(stream)}"
+
+
+def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> None:
+    """A stream that the measured one follows; what its name calls measured (`Drehzahl Ist`) is no set value.
+
+    Of two that bear the quantity's name the smoother one is the set value; a stream without its name displaces none.
+    """
+    stream = measured.stream
+    candidates = [other for other in _unnamed_for(channels, quantity) if not is_actual(other.name)]
+    found = _best(candidates, lambda other: motion.likeness(stream, other))
+    if found is None:
+        return
+    correlation, other = found
+    if correlation < (_FOLLOWS_BY_NAME if is_reference(other.name) else _FOLLOWS):
+        return
+    if motion.roughness(other) < motion.roughness(stream):
+        check = "" if is_reference(other.name) else _BY_COURSE
+        channels.take(name, other, f"follows '{stream.name}' with r = {correlation:.3f} and is smoother", check)
+    elif (
+        correlation > _FOLLOWS
+        and quantity != "torque"
+        and not is_reference(stream.name)
+        and not is_actual(stream.name)
+        and word_for(quantity, label(other))[0] >= word_for(quantity, label(stream))[0] > 0.0
+    ):
+        text = f"rougher than '{stream.name}', which it follows with r = {correlation:.3f}"
+        channels.take(quantity, other, text, _BY_COURSE)
+        channels.found[name] = Found(stream, f"{measured.why}; smoother than '{other.name}'", _BY_COURSE)
+
+
+def _named_for(channels: Channels, quantity: str, reference: bool = False) -> list[tuple[float, str, Stream]]:
+    """(strength, word, stream) of the free streams whose name speaks for a quantity most, the strongest first."""
+    found = []
+    for stream in channels.of_joints():
+        name = label(stream)
+        if is_reference(stream.name) != reference or is_something_else(stream.name) or _is_sensor_of_force(stream):
+            continue
+        if not may_be(quantity, stream):
+            continue
+        strength, word = word_for(quantity, name)
+        if strength and strength >= max(word_for(other, name)[0] for other in MEASURED if may_be(other, stream)):
+            found.append((strength, word, stream))
+    return sorted(found, key=lambda item: -item[0])
+
+
+def _unnamed_for(channels: Channels, quantity: str) -> list[Stream]:
+    """The free streams that a quantity may be by their course: no name or unit tells of another, or of a force.
+
+    A load cell is ground truth: nothing makes an input of it.
+    """
+    return [stream for stream in channels.of_joints() if may_be(quantity, stream) and not _is_other(quantity, stream)]
+
+
+def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[float, Stream] | None:
+    """The highest score and the stream that has it; None of none."""
+    return max(((score(stream), stream) for stream in streams), key=lambda item: item[0], default=None)
+
+
+def _is_other(quantity: str, stream: Stream) -> bool:
+    """True for a stream whose name tells of another quantity, or of a load cell."""
+    name = label(stream)
+    if is_something_else(stream.name) or _is_sensor_of_force(stream):
+        return True
+    if quantity != "force" and word_for("force", name)[0]:
+        return True
+    own = word_for(quantity, name)[0]
+    return any(word_for(other, name)[0] >= max(_SPEAKS, own) for other in MEASURED if other != quantity)
+
+
+def _is_sensor_of_force(stream: Stream) -> bool:
+    return is_load_cell(label(stream)) or is_load_cell(stream.topic)

@@ -24,7 +24,7 @@ from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
-# What accelerometer_check says of a sensor that is mounted the other way round.
+# What log_checks.accelerometer_check says of a sensor that is mounted the other way round.
 _TURNED = "opposite sign"
 
 
