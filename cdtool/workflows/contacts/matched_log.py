@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse, force_course
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
 from cdtool.evaluation.truth.matching import match
-from cdtool.operations import Operation
+from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection
+from cdtool.plain_text import counted
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.judged import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.contacts.uncut_log import uncut_log
 from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.runs import DAMAGED
+
+# A stroke counts as judged where at least this share of its samples is.
+_JUDGED = 0.5
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ def match_log(
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
         (*_not_scored(recording, contacts, inside, cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *uncut_log(recording, found, cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+        (*warned, *_uncut_log(recording, found, cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
     )
 
 
@@ -170,3 +175,43 @@ def _courses(
         except CdtoolError as fault:
             missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
     return found, missing
+
+
+def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Skipped]:
+    """A warning where the first stroke of a log was judged and a later one was not, since the log is not cut.
+
+    `found` are the detections of its operations, `cut_by` is how it was cut into them.
+    """
+    detections = [item for of_operation in found for item in of_operation]
+    if cut_by != "whole" or all(np.all(item.statistic.valid) for item in detections):
+        return []
+    strokes = _strokes(recording)
+    blind = [
+        number
+        for number, stroke in enumerate(strokes[1:], 2)
+        if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
+    ]
+    if not blind:
+        return []
+    which = f"stroke {blind[0]} was" if len(blind) == 1 else f"{len(blind)} of them were"
+    text = (
+        f"holds {counted(len(strokes), 'stroke')} in one operation, and {which} not judged: cut it with "
+        'operations = "motion" in the benchmark file, or --operations motion'
+    )
+    return [Skipped(recording.name, text)]
+
+
+def _strokes(recording: Recording) -> list[Operation]:
+    if "speed" not in recording and "reference_speed" not in recording:
+        return []
+    try:
+        return operations_of(recording, "motion")
+    except CdtoolError:
+        return []
+
+
+def _mostly_judged(detection: Detection, stroke: Operation) -> bool:
+    statistic = detection.statistic
+    inside = (statistic.time >= stroke.recording.start) & (statistic.time <= stroke.recording.end)
+    valid = np.any(statistic.valid[inside], axis=1)
+    return bool(len(valid)) and float(np.mean(valid)) >= _JUDGED
