@@ -22,7 +22,7 @@ from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
 from cdtool.workflows.benchmark.scoring import Scored
 from cdtool.workflows.contacts.impact_free import unchecked
-from cdtool.workflows.contacts.judged import Judged
+from cdtool.workflows.contacts.judged_operation import Judged
 from cdtool.workflows.detector_inputs import inputs_of
 
 

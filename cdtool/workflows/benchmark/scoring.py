@@ -23,7 +23,7 @@ from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows
 from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.contacts.impact_free import without_contacts
-from cdtool.workflows.contacts.judged import Judged, not_assessable
+from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings

@@ -16,7 +16,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import Contact, Recording
-from cdtool.workflows.contacts.judged import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.runs import DAMAGED
