@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.units import find_unit
-from tests.cli.drafts import RPM, drafted, drafted_columns, stroke, write
 from tests.data_folder import data, needs_data
+from tests.workflows.init.drafts import RPM, drafted, drafted_columns, stroke, write
 
 LEAD = 1.5e-3  # m of travel per rad of the motor
 

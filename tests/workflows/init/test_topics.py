@@ -10,7 +10,7 @@ from mcap.writer import Writer
 
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.workflows.init.units import is_si
-from tests.cli.drafts import RPM, drafted, stroke
+from tests.workflows.init.drafts import RPM, drafted, stroke
 
 LEAD = 1.5e-3  # m of travel per rad of the motor
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.cli.drafts import drafted, drafted_columns, stroke
 from tests.data_folder import data, needs_data
+from tests.workflows.init.drafts import drafted, drafted_columns, stroke
 
 
 def column(draft, channel):

@@ -17,7 +17,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.workflows.convert.converting import convert
 from tests.command import cdtool as command
 from tests.formats.containers import assert_same, logged
-from tests.test_converting import KINDS, SEVERAL_CLOCKS, needs
+from tests.workflows.convert.test_converting import KINDS, SEVERAL_CLOCKS, needs
 
 START_NS = 1_700_000_000 * 10**9
 MACHINE = """[machine]

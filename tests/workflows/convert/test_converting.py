@@ -123,7 +123,7 @@ def test_the_machine_file_beside_it_holds_all_but_the_channels_word_for_word(tmp
 
 def test_a_robots_urdf_is_found_from_another_folder(tmp_path):
     pytest.importorskip("pinocchio")
-    examples = Path(__file__).parents[1] / "docs" / "examples"
+    examples = Path(__file__).parents[3] / "docs" / "examples"
     names = ["z", "q1", "q2", "vz", "w1", "w2", "i_z", "i_1", "i_2", "cell"]
     rows = np.random.default_rng(1).normal(size=(50, len(names)))
     text = "\n".join(",".join(map(repr, [k / 100, *row.tolist()])) for k, row in enumerate(rows))
