@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import Detected
 
 
-def detect(
+def detect(  # noqa: C901  the whole command, from its options to its exit status
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     machine: MachineUnlessBenchmarkOption = None,
     benchmark: BenchmarkOption = None,

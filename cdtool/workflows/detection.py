@@ -66,7 +66,7 @@ class Detected:
         return self.detections[0].statistic.joints if self.detections else self.recording.joints
 
 
-def detect(
+def detect(  # noqa: PLR0913  keyword options of the Python API
     log: str | Path,
     machine: str | Path | MachineFile | None = None,
     *,

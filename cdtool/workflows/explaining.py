@@ -31,7 +31,7 @@ class Explained:
         return [(detection, item) for detection, items in pairs for item in items]
 
 
-def explain(
+def explain(  # noqa: PLR0913  keyword options of the Python API
     log: str | Path,
     machine: str | Path | MachineFile | None = None,
     *,

@@ -111,7 +111,7 @@ def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
     return logged
 
 
-def load_runs(
+def load_runs(  # noqa: PLR0913  keyword options on how to read, cut and report
     paths: Sequence[Path],
     machine_file: MachineFile,
     how: str,

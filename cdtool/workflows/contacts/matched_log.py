@@ -42,7 +42,7 @@ class MatchedLog:
     warnings: tuple[Skipped, ...]
 
 
-def match_log(
+def match_log(  # noqa: PLR0913  a log, its contacts, its detections and the rules to match them by
     recording: Recording,
     operations: Sequence[Operation],
     contacts: Sequence[Contact],

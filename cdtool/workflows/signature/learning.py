@@ -34,7 +34,7 @@ class Learned:
     findings: tuple[Skipped, ...]
 
 
-def learn_signature(
+def learn_signature(  # noqa: PLR0913  keyword options of the Python API
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
     detector: str,

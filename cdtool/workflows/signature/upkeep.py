@@ -89,7 +89,7 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
     return tuple(pairs)
 
 
-def check_signature(
+def check_signature(  # noqa: PLR0913  keyword options of the Python API
     path: str | Path,
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
@@ -169,7 +169,7 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
         return None
 
 
-def update_with_runs(
+def update_with_runs(  # noqa: PLR0913  keyword options of the Python API
     path: str | Path,
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
