@@ -7,7 +7,7 @@ import pytest
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.tables import Table
-from cdtool.workflows.benchmark.file_sections import migrated_onset, read_onset
+from cdtool.workflows.benchmark.benchmark_file import migrated_onset, read_onset
 
 
 def read(**values: object) -> OnsetRule:
