@@ -20,8 +20,8 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
-from cdtool.workflows.fitting import fit_operations
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.signature.fitting import fit_operations
 
 IMPACTS = ("stiff", "soft")
 HEADS = ("missed", "false", "reference", "worst seed")

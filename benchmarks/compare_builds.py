@@ -26,7 +26,7 @@ from timing import environment
 from cdtool import benchmark, compare, simulate_gate
 from cdtool.activation import Activation
 from cdtool.evaluation.results import Results
-from cdtool.workflows.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 
 SEEDS = (901, 902, 903, 904, 905)
 IMPACTS = 30

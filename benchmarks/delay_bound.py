@@ -26,7 +26,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
 from cdtool.recording import FloatArray
 from cdtool.thresholds.cusum import Cusum
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 
 # Bounds [ms] by machine and group over all channels with a VAR(80) noise model, at 1 false alarm in 1000 operations:
 # quoted from the specification (quickest_detection.md), not measured here.

@@ -50,7 +50,7 @@ from cdtool.simulation.arm_parameters import ArmParameters
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion, levels
-from cdtool.workflows.fitting import fit_operations
+from cdtool.workflows.signature.fitting import fit_operations
 
 SEEDS = (911, 912)
 ALARMS = 100

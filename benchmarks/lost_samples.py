@@ -54,8 +54,8 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.whitening import Whitening
-from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.fitting import Fit, Pair, fitting
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.signature.fitting import Fit, Pair, fitting
 
 SEED, FAULTS, SIGNIFICANT = 1501, 10, 0.05
 MACHINES: Mapping[str, tuple[Any, Any]] = {

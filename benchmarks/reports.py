@@ -22,7 +22,7 @@ from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
 from cdtool.evaluation.traces.choice import MOST_KEPT
 from cdtool.report.outputs import Report, write_outputs
-from cdtool.workflows.benchmark import Benchmark, benchmark
+from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
 
 DETECTORS = ("pure_inertia", "friction_ekf", "momentum", "inertial_momentum", "pure_torque")
 GROUPS = ("stiff", "soft", "holdout")

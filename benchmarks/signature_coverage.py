@@ -31,8 +31,8 @@ from cdtool.pipeline import judge, run_detector
 from cdtool.recording import Recording
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark_file import BenchmarkFile
-from cdtool.workflows.fitting import Pair
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.signature.fitting import Pair
 
 SEEDS = (701, 702, 703, 704)
 LEARNED, OTHERS = 200, 200

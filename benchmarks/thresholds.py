@@ -40,8 +40,8 @@ from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
-from cdtool.workflows.calibration import learn_thresholds
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
 
 SEED = 901
 COUNTS = {"free": 1000, HOLDOUT: 300, "stiff": 100, "soft": 100}

@@ -17,7 +17,7 @@ from timing import environment, table
 
 from cdtool.report.outputs import Report, write_outputs
 from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark import Benchmark, benchmark
+from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
 
 COUNTS = {"free": 14, "holdout": 40, "stiff": 30, "soft": 30}
 SEED = 1

@@ -24,7 +24,7 @@ from cdtool.evaluation.results import Results
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_model import GateParameters
 from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark import benchmark
+from cdtool.workflows.benchmark.benchmark import benchmark
 
 DETECTORS = ("pi", "feekf", "gm", "igm", "pt", "vo", "eo", "dd", "kmo")
 EARLY = (0.05, 0.1, 0.15, 0.2, 0.3)

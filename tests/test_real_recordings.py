@@ -15,7 +15,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.fitting import fit_operations
+from cdtool.workflows.signature.fitting import fit_operations
 from tests.command import cdtool as run
 from tests.data_folder import DATA, needs_data
 

@@ -10,7 +10,7 @@ import cdtool
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_model import GateParameters
 from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark import benchmark
+from cdtool.workflows.benchmark.benchmark import benchmark
 from tests.command import cdtool as command
 
 DETECTORS = ["igm", "gm"]

@@ -159,7 +159,7 @@ def _run_app(came: list[int]) -> Any:
         raise
 
 
-def _main(came: list[int]) -> None:
+def _main(came: list[int]) -> None:  # noqa: C901  one branch for each way to end
     open_standard_streams()
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)

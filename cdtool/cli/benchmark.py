@@ -36,7 +36,7 @@ def benchmark(
     """
     from cdtool.evaluation.results_file import to_json
     from cdtool.report.outputs import Report, check_outputs, write_outputs
-    from cdtool.workflows.benchmark import benchmark as run
+    from cdtool.workflows.benchmark.benchmark import benchmark as run
 
     targets = output or []
     check_outputs(targets, force=force)

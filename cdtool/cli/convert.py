@@ -31,7 +31,7 @@ def convert(
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
-    from cdtool.workflows.converting import convert as write
+    from cdtool.workflows.convert.converting import convert as write
 
     with late_progress("converting") as advance:
         done = write(source, output, machine=machine, force=force, progress=advance)

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import Detected
 
 
-def detect(
+def detect(  # noqa: C901  the whole command, from its options to its exit status
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     machine: MachineUnlessBenchmarkOption = None,
     benchmark: BenchmarkOption = None,
@@ -87,9 +87,9 @@ def detect(
     """
     from cdtool.files import made_folder
     from cdtool.machine_file import read_machine_file
+    from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
     from cdtool.workflows.detection import detect as run
-    from cdtool.workflows.prepared_benchmark import prepare_benchmark
     from cdtool.workflows.runs import absent_truth, lost
 
     limits = limits_of(limit)

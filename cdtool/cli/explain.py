@@ -78,8 +78,8 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
+    from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
     from cdtool.workflows.explaining import explain as run
-    from cdtool.workflows.prepared_benchmark import prepare_benchmark
     from cdtool.workflows.runs import lost
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)

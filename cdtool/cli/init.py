@@ -24,7 +24,7 @@ def init(
 
     Example: cdtool init sample_logs/gate/stiff/03.csv -o machine.toml
     """
-    from cdtool.workflows.drafting import init as draft
+    from cdtool.workflows.init.drafting import init as draft
 
     with late_progress("looking at the log"):
         drafted = draft(log, output, force=force)

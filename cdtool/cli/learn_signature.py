@@ -23,7 +23,7 @@ from cdtool.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from cdtool.workflows.learning import Learned
+    from cdtool.workflows.signature.learning import Learned
 
 
 def learn_signature(
@@ -84,8 +84,8 @@ def learn_signature(
     from cdtool.plain_text import counted
     from cdtool.signature_store import SIGNATURE, check_name, write_signature
     from cdtool.thresholds.signature import ENOUGH_RUNS
-    from cdtool.workflows.learning import learn_signature as learn
-    from cdtool.workflows.threshold_settings import rule_of
+    from cdtool.workflows.signature.learning import learn_signature as learn
+    from cdtool.workflows.signature.threshold_settings import rule_of
 
     check_name(output)
     resolved(output)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cdtool.errors import UsageError
 
 if TYPE_CHECKING:
-    from cdtool.workflows.scoring_rules import ScoringRules
+    from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
 
 def rules_of(
@@ -26,7 +26,7 @@ def rules_of(
     """The rules that the options give; None: the default. Raises UsageError for a value outside its range."""
     from cdtool.evaluation.truth.labels import read_labels
     from cdtool.evaluation.truth.onset import OnsetRule
-    from cdtool.workflows.scoring_rules import ScoringRules
+    from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
     onset = {"above": above, "back_to": back_to, "hold": hold, "sigmas": sigmas, "separation": separation}
     rules = {"window": window, "synchronisation": synchronisation, "mass_before_cell": mass_before_cell}

@@ -16,7 +16,7 @@ from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
-    from cdtool.workflows.upkeep import Checked
+    from cdtool.workflows.signature.upkeep import Checked
 
 signature = typer.Typer(
     help="Look at a signature, check it against runs, add runs to it.",
@@ -44,8 +44,8 @@ def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False
     Example: cdtool signature show gate.feekf.json --plot signature.png
     """
     from cdtool.signature_store import read_signature
-    from cdtool.workflows.normal_runs import notes_on
-    from cdtool.workflows.upkeep import signatures_in
+    from cdtool.workflows.signature.normal_runs import notes_on
+    from cdtool.workflows.signature.upkeep import signatures_in
 
     drawn = figure_name(plot, force=force) if plot else None
     stored = read_signature(file)
@@ -94,8 +94,8 @@ def check(
     Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
-    from cdtool.workflows.normal_runs import notes_on
-    from cdtool.workflows.upkeep import check_signature
+    from cdtool.workflows.signature.normal_runs import notes_on
+    from cdtool.workflows.signature.upkeep import check_signature
 
     if plot is not None and not plot.is_dir():
         figure_name(plot, force=force)
@@ -152,8 +152,8 @@ def update(
     """
     from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.thresholds.guarded_update import CAP, RESERVE
-    from cdtool.workflows.normal_runs import notes_on
-    from cdtool.workflows.upkeep import update_with_runs
+    from cdtool.workflows.signature.normal_runs import notes_on
+    from cdtool.workflows.signature.upkeep import update_with_runs
 
     with progress("reading runs") as advance:
         done = update_with_runs(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.coverage import Coverage
     from cdtool.evaluation.upkeep.summary import JointSummary, SignatureSummary
     from cdtool.signature_file import SignatureFile
-    from cdtool.workflows.upkeep import Checked, CheckedClass
+    from cdtool.workflows.signature.upkeep import Checked, CheckedClass
 
 # Rows of a table, and sections, that are shown; --json has all.
 _SHOWN = 12

@@ -13,7 +13,7 @@ from cdtool.errors import UsageError
 from cdtool.exit_status import statuses_words
 
 if TYPE_CHECKING:
-    from cdtool.workflows.study import SensorStudy
+    from cdtool.workflows.study.study import SensorStudy
 
 study = typer.Typer(
     help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode="markdown"
@@ -51,7 +51,7 @@ def sensors(
 
     Example: cdtool study sensors -m sample_logs/gate/machine.toml --speed 0.2 --stiffness 5e5
     """
-    from cdtool.workflows.study import study_sensors
+    from cdtool.workflows.study.study import study_sensors
 
     if output:
         from cdtool.foreign_files import refuse_foreign_figure

@@ -199,7 +199,7 @@ def observe_momentum(
     "void(Array(float64, 1, 'C', readonly=True), float64[::1], float64[::1], b1[::1], b1[::1], b1, "
     "float64, float64, float64[:], uint8[:])"
 )
-def _observe(
+def _observe(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     time: FloatArray,
     net_force: FloatArray,
     momentum: FloatArray,

@@ -104,7 +104,7 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, {_READ_BOOL}, int64[::1], float64, float64, float64[:], float64[:])")
-def _low_pass(
+def _low_pass(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     time: FloatArray,
     values: FloatArray,
     missing: BoolArray,
@@ -146,7 +146,7 @@ def _low_pass(
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, float64[:, ::1], float64[:], float64[:])")
-def _polynomial_rates(
+def _polynomial_rates(  # noqa: C901  a kernel is one loop
     time: FloatArray, values: FloatArray, samples: int, matrix: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
     """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.

@@ -124,7 +124,7 @@ def _longest_line(time: FloatArray) -> FloatArray:
     f"Array(b1, 1, 'C', readonly=True), Array(b1, 1, 'C', readonly=True), {READ_ONLY}, "
     "float64, float64, float64, float64, float64, float64, float64[::1])"
 )
-def _fuse(
+def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,
     speed: FloatArray,
     acceleration: FloatArray,

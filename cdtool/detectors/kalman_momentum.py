@@ -114,7 +114,7 @@ def _process_noise(drift: float, torque: float, step: float) -> FloatArray:
     f"void({READ_ONLY}, float64[::1], float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, "
     "float64, float64[:], uint8[:])"
 )
-def _filter(
+def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     time: FloatArray,
     usual: FloatArray,
     net_force: FloatArray,

@@ -65,7 +65,7 @@ class Motion:
     contacts: tuple[Contact, ...]
 
 
-def simulate_impact(
+def simulate_impact(  # noqa: PLR0913  every part of the simulated impact
     transmission: Transmission,
     drive: Drive,
     law: ContactLaw,

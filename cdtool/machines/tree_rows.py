@@ -139,7 +139,7 @@ def take_column(
 
 
 @kernel(f"void({ROW}, int64, int64, {TABLE}, int64, int64, int64, {ROW})")
-def give_column(
+def give_column(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     slots: FloatArray, own: int, row: int, values: FloatArray, column: int, begin: int, count: int, fault: FloatArray
 ) -> None:
     """A row into one column of a result, NaN where the sample has a fault."""

@@ -122,7 +122,7 @@ def _on_clock(
 @kernel(
     f"void({READ_ONLY}, b1[:,::1], b1[:,::1], b1[::1], b1[::1], float64[::1], b1[:,::1], float64, b1[:,::1], b1[:,::1])"
 )
-def _judge(
+def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,
     begun: BoolArray,
     fits: BoolArray,

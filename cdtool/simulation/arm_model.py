@@ -86,7 +86,7 @@ def simulate_arm_run(
     return _measure(parameters, time, reference, truth, noise, first_contact)
 
 
-def integrate_arm(
+def integrate_arm(  # noqa: PLR0913  every part of the simulated arm
     parameters: ArmParameters,
     initial_state: Array,
     reference: tuple[Array, Array],

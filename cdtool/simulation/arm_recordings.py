@@ -75,7 +75,7 @@ def as_recording(run: ArmRun, name: str) -> Recording:
     return Recording(name, name, _JOINTS, channels)
 
 
-def write_arm_recordings(
+def write_arm_recordings(  # noqa: PLR0913  keyword options of the Python API
     folder: Path,
     counts: Mapping[str, int],
     seed: int,

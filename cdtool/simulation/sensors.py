@@ -92,7 +92,7 @@ def measured_torque(torque: Array, white: Array, noise: float, time_constant: fl
     return low_pass(torque + noise * white, time_constant, period)
 
 
-def accelerometer(
+def accelerometer(  # noqa: PLR0913  every property of the sensor
     acceleration: Array,
     vibration: Array,
     white: Array,

@@ -159,7 +159,7 @@ def _unbroken(deviation: Signal, j: int, period: float) -> list[FloatArray]:
 
 
 @kernel(f"void({READ_ONLY}, int64[::1], {READ_ONLY}, float64, float64[:, ::1], float64[:, ::1], float64[::1])")
-def _whiten(
+def _whiten(  # noqa: C901  a kernel is one loop
     values: FloatArray,
     slots: npt.NDArray[np.int64],
     coefficients: FloatArray,

@@ -1,1 +1,1 @@
-"""What a command does, as plain functions: info, learn_signature, detect, benchmark. They print nothing."""
+"""What a command does, as plain functions that print nothing: a folder or a module for each, and what they share."""

@@ -24,12 +24,12 @@ from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.matched_log import match_log
-from cdtool.workflows.normal_runs import normals_of, notes_on
-from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.contacts.matched_log import match_log
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
-from cdtool.workflows.scoring_rules import ScoringRules
-from cdtool.workflows.true_contacts import any_contacts
+from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Detected:
         return self.detections[0].statistic.joints if self.detections else self.recording.joints
 
 
-def detect(
+def detect(  # noqa: PLR0913  keyword options of the Python API
     log: str | Path,
     machine: str | Path | MachineFile | None = None,
     *,

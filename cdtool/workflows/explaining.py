@@ -11,10 +11,10 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.detection import Detected, detect
 from cdtool.workflows.detector_inputs import inputs_of
-from cdtool.workflows.prepared_benchmark import PreparedBenchmark, prepare_benchmark
-from cdtool.workflows.scoring_rules import ScoringRules
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Explained:
         return [(detection, item) for detection, items in pairs for item in items]
 
 
-def explain(
+def explain(  # noqa: PLR0913  keyword options of the Python API
     log: str | Path,
     machine: str | Path | MachineFile | None = None,
     *,

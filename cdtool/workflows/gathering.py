@@ -17,13 +17,13 @@ from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import Finding, FloatArray
-from cdtool.workflows.benchmark_file import HOLDOUT, BenchmarkFile
-from cdtool.workflows.counting import Exposure, SweepRows
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.counting import Exposure, SweepRows
+from cdtool.workflows.benchmark.force_rows import point_rows
+from cdtool.workflows.benchmark.scoring import Scored
+from cdtool.workflows.contacts.impact_free import unchecked
+from cdtool.workflows.contacts.judged_operation import Judged
 from cdtool.workflows.detector_inputs import inputs_of
-from cdtool.workflows.force_rows import point_rows
-from cdtool.workflows.impact_free import unchecked
-from cdtool.workflows.judged import Judged
-from cdtool.workflows.scoring import Scored
 
 
 class Gathering:

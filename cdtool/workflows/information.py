@@ -14,10 +14,10 @@ import numpy as np
 from cdtool.clock.stamps import missing_findings
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Finding, Recording, Series, worst_first
-from cdtool.workflows.log_findings import IN_PROGRESS, log_findings
-from cdtool.workflows.motion_check import bandwidth_findings
-from cdtool.workflows.scoring_rules import ScoringRules
-from cdtool.workflows.true_contacts import any_contacts
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.true_contacts import any_contacts
+from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
+from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
     from cdtool.formats.source import Column

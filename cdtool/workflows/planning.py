@@ -60,7 +60,7 @@ class Plan:
     measured: Measured | None = None
 
 
-def plan(
+def plan(  # noqa: PLR0913  keyword options of the Python API
     *,
     difference_ms: float | None = None,
     std_ms: float | Measured | None = None,

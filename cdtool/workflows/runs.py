@@ -18,8 +18,8 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
-from cdtool.workflows.impact_free import contacts_shown, unchecked, without_contacts
-from cdtool.workflows.log_findings import log_warnings
+from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
+from cdtool.workflows.log_checks.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -111,7 +111,7 @@ def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
     return logged
 
 
-def load_runs(
+def load_runs(  # noqa: PLR0913  keyword options on how to read, cut and report
     paths: Sequence[Path],
     machine_file: MachineFile,
     how: str,

@@ -21,10 +21,10 @@ from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.version import __version__
-from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.scoring import Scored, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, shown_path
-from cdtool.workflows.scoring import Scored, score_log
 
 # A trigger counts as held for this long [s], and another within it as the same.
 _HELD = 0.5

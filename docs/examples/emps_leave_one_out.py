@@ -20,7 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.fitting import fit_operations
+from cdtool.workflows.signature.fitting import fit_operations
 
 DETECTORS = ("gm", "pt")
 RULE = Signature(force=True)

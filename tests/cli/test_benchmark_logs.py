@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.errors import ConfigurationError
-from cdtool.workflows.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from tests.command import cdtool
 
 PROFILE = '[force]\nprofile = "en_12453_reducing_gap"\n'

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import cdtool as api
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.recording import Recording, Series
-from cdtool.workflows.impact_free import contacts_shown
+from cdtool.workflows.contacts.impact_free import contacts_shown
 from tests.command import cdtool
 
 SHOWN = "the load cell shows a contact of "

@@ -12,8 +12,8 @@ import pytest
 
 from cdtool.errors import RecordingError, UsageError
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.drafting import init
 from cdtool.workflows.information import info
+from cdtool.workflows.init.drafting import init
 from tests.command import cdtool
 from tests.data_folder import data, needs_data
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from cdtool.evaluation.results import Skipped
-from cdtool.workflows.left_out import LeftOut
+from cdtool.workflows.benchmark.left_out import LeftOut
 from tests.cli.damaged_copies import damaged
 from tests.command import cdtool
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from cdtool.cli.console import number
-from cdtool.workflows import prepared_benchmark
+from cdtool.workflows.benchmark import prepared_detector
 from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
@@ -43,7 +43,7 @@ mass_before_cell_kg = {mass}
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
     """Each command learns the threshold anew; here it is learned once for a file and a detector."""
-    monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", cache(prepared_benchmark.prepare_benchmark))
+    monkeypatch.setattr(prepared_detector, "prepare_benchmark", cache(prepared_detector.prepare_benchmark))
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:

@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.formats import hdf5_writing
 from cdtool.formats.held_signals import held_signals
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -19,7 +19,7 @@ from cdtool.formats.pieces import Piece, Pieces, Run, as_pieces, joined, read_pi
 from cdtool.formats.reading import choose_format
 from cdtool.formats.source import Column, Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.workflows.converting import convert
+from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_figures import LogFigures
 from tests.formats.containers import two_clocks
 

@@ -12,7 +12,7 @@ from cdtool.motion.motion_class import MotionClass
 from cdtool.operations import Operation, operations_of
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
-from cdtool.workflows.grouping import by_class
+from cdtool.workflows.signature.grouping import by_class
 from tests.motion.test_applicable import log
 
 

@@ -83,7 +83,7 @@ class Cause:
         return found.channel if found else ""
 
 
-def likely_cause(
+def likely_cause(  # noqa: PLR0913  the recording, and what is known of the alarm
     recording: Recording,
     tracks: Sequence[Track],
     leading: str,

@@ -126,7 +126,7 @@ def explain_operation(
     return tuple(sorted(found, key=_order))
 
 
-def explain_alarm(
+def explain_alarm(  # noqa: PLR0913  an alarm, and optional context
     detection: Detection,
     alarm: Alarm,
     activation: Activation,

@@ -69,7 +69,7 @@ class SideTable:
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
             self._write(axes, i, cell, "axes fraction", 1.0, lift, "center", _SIZE, bold, _INDENT if i == 0 else 0.0)
 
-    def _write(
+    def _write(  # noqa: PLR0913  a cell's text, position and style
         self,
         axes: Axes,
         number: int,

@@ -22,8 +22,8 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import judge, run_detector
 from cdtool.recording import Recording
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.normal_runs import normal_motions
 from cdtool.workflows.runs import load_runs
+from cdtool.workflows.signature.normal_runs import normal_motions
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
 NINE = Activation(9)

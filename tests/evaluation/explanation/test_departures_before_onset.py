@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
 from cdtool.workflows.explaining import explain
-from cdtool.workflows.prepared_benchmark import prepare_benchmark
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
 

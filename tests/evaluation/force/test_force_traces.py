@@ -18,7 +18,7 @@ from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.operations import operations_of
 from cdtool.recording import Contact, Recording
-from cdtool.workflows.force_rows import force_rows
+from cdtool.workflows.benchmark.force_rows import force_rows
 
 STEPS = (ForceStep(0.0, 400.0, "dynamic"), ForceStep(0.5, 150.0, "static"), ForceStep(60.0, 25.0, "residual"))
 PROFILE = ForceProfile("gap", "A gap", "a standard", False, STEPS)

@@ -14,7 +14,7 @@ from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.outputs import Report
 from cdtool.report.plots.folder_figures import most_telling, write_figures
-from cdtool.workflows.force_rows import force_rows
+from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept
 from tests.report.conftest import Bench, contact
 from tests.report.hostile import HOSTILE

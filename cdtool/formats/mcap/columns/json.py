@@ -51,7 +51,7 @@ class JsonDecoder:
             self._fields.update(dict.fromkeys(names))
         return list(self._fields)
 
-    def gather(
+    def gather(  # noqa: C901  one pass over the groups, one over the messages outside them
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> Gathered:
         """The wanted fields of all messages."""

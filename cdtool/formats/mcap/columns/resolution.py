@@ -11,7 +11,7 @@ from cdtool.formats.mcap.layouts.layout import Layout, Member, Message, Schema, 
 _NO_MEMBERS = Layout("", ())  # of a number or text
 
 
-def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
+def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:  # noqa: C901  one check for each kind of schema member
     """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
     layout = schema.root
     place: Place = ()

@@ -63,7 +63,7 @@ class UniformTaker:
         self._in_vain = max(0, self._in_vain + (1 if taken is None else -1))
         return taken
 
-    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:
+    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:  # noqa: C901  one check for each reason to read the chunk otherwise
         first, limits = np.zeros(len(tables.bound), np.uint64), np.zeros(len(tables.bound), np.uint64)
         for slot, (channel, bound) in enumerate(tables.bound.items()):
             if bound is not None and channel in rows:

@@ -1,0 +1,169 @@
+"""Many recordings, many detectors: learn, detect, match, count."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from cdtool.detectors import DETECTORS
+from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.results import Results, Skipped
+from cdtool.evaluation.sweep import MULTIPLES
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.kernel_warm_up import compile_loaded
+from cdtool.operations import Operation
+from cdtool.registry import plugin_packages
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.version import __version__
+from cdtool.workflows.benchmark.benchmark_file import (
+    HOLDOUT,
+    BenchmarkFile,
+    read_benchmark_file,
+    refuse_limits_by_hand,
+    with_detectors,
+    with_only,
+)
+from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
+from cdtool.workflows.benchmark.scoring import Scored, detect_with, score_log
+from cdtool.workflows.gathering import Gathering
+from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
+from cdtool.workflows.signature.normal_runs import normal_motions
+from cdtool.workflows.signature.threshold_settings import set_by_hand
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """The results with their statistics, the traces kept for figures, where the time went [s], and what was read."""
+
+    evaluated: Evaluated
+    traces: tuple[Trace, ...]
+    seconds: Mapping[str, float]
+    inputs: tuple[Path, ...] = ()
+
+    @property
+    def results(self) -> Results:
+        """Every verdict with raw figures and provenance."""
+        return self.evaluated.results
+
+
+def benchmark(
+    file: str | Path | BenchmarkFile,
+    *,
+    detectors: Sequence[str] = (),
+    false_alarm_budget: str | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Benchmark:
+    """Learn every detector's threshold, run them over all groups, match alarms with contacts.
+
+    `detectors`: others than the file's; "all" alone stands for every one that is registered and can learn from these
+    logs, the others are named in `results.findings`. `false_alarm_budget`, as 1/1000op or 0.1/h, sets each detector's
+    safety factor on the runs learned from, instead of the file's.
+
+    A log that cannot be read or scored is left out and named in `results.skipped`; so is a detector that lacks a
+    channel, and none of its contacts is assessable. Raises ConfigurationError for a wrong file, SignatureError where
+    nothing can be learned, RecordingError where nothing could be scored, UsageError where the runs learned from are too
+    few for the budget.
+    """
+    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
+    limits = len(setup.limits)
+    setup = with_detectors(setup, detectors) if detectors else setup
+    setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup
+    refuse_limits_by_hand(setup)
+    machine_file = setup.machine_file
+    used = [machine_file.detector(name) for name in setup.detectors]
+    compile_loaded()
+    begin = perf_counter()
+    base = setup.path.parent
+    learn = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=base)
+    seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
+    left_out: list[Skipped] = []
+    if list(detectors) == ["all"]:
+        used, left_out = that_can_run(used, learn.operations, machine_file.machine)
+        left_out += [Skipped(name, f"left out: {fault}") for name, fault in DETECTORS.broken_plugins().items()]
+        setup = with_only(setup, [detector.name for detector in used])
+    if len(setup.limits) < limits:
+        words = f"{limits - len(setup.limits)} of {limits} limits are on detectors that were not run: not checked"
+        left_out.append(Skipped(str(setup.path), words))
+    learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
+    seconds["detecting"] = perf_counter() - begin - seconds["reading"]
+    detect = detect_with(setup, used, learned.thresholds, learned.lacking)
+    factors = _factors(setup, learned.thresholds)
+    gathered = Gathering(
+        setup,
+        setup.detectors,
+        factors,
+        {op.recording.digest: op.recording.name for op in learn.operations},
+        NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS),
+    )
+    gathered.skipped += [*learn.skipped, *learned.skipped]
+    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.lacking.items()]
+    gathered.findings += [*learn.findings, *left_out, *learned.blind]
+    work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+
+    def score(item: tuple[str, Path]) -> Scored:
+        return score_log(setup, item[0], item[1], detect, factors, learn.ranges)
+
+    for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
+        gathered.add(group, scored)
+        seconds["reading"] += scored.reading
+        seconds["detecting"] += scored.detecting
+    provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
+    provenance["units"] |= gathered.units
+    results = gathered.results(provenance, learned.calibration)
+    return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds, setup.inputs)
+
+
+def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, np.ndarray]:
+    """The safety factors of the sweep by detector; none without an impact-free group to count false alarms in."""
+    if HOLDOUT not in setup.impacts:
+        return {}
+    return {name: items[0].safety_factor * MULTIPLES for name, items in thresholds.items() if items}
+
+
+def _provenance(
+    setup: BenchmarkFile,
+    detectors: Sequence[Any],
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    learned: Sequence[Operation],
+) -> dict[str, Any]:
+    base = setup.path.parent
+    digests = {shown_path(Path(item.recording.source), base): item.recording.digest for item in learned}
+    return {
+        "tool": "cdtool",
+        "tool_version": __version__,
+        "benchmark_sha256": setup.digest,
+        "machine": setup.machine_file.machine.name,
+        "machine_sha256": setup.machine_file.digest,
+        "gains": {detector.name: asdict(detector) for detector in detectors},
+        "threshold": setup.threshold,
+        "threshold_rule": asdict(setup.rule),
+        "signature_rule": {
+            **asdict(setup.signature),
+            "safety_factor": None if setup.budget else setup.signature.factor,
+        },
+        "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
+        "learned_runs": [operation.name for operation in learned],
+        "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
+        **setup.activation.described,
+        **setup.scoring,
+        "false_alarm_budget": str(setup.budget) if setup.budget else None,
+        "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
+        "short_names": {detector.name: detector.short_name for detector in detectors},
+        "learned_sha256": dict(sorted(digests.items())),
+        "plugins": plugin_packages(),
+    }
+
+
+def _digest(thresholds: Sequence[FittedThreshold]) -> str:
+    text = json.dumps([item.to_dict() for item in thresholds], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

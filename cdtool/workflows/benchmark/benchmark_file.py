@@ -1,0 +1,358 @@
+"""benchmark.toml: which logs to learn from, which to score, with which detectors. Paths are relative to the file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from cdtool.activation import Activation
+from cdtool.bounded_loading import read_bytes
+from cdtool.detectors import DETECTORS
+from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
+from cdtool.evaluation.limits import ALL, LimitRule, read_limits
+from cdtool.evaluation.truth.labels import LABEL_FILE, Labels
+from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import HOW_TO_CUT
+from cdtool.plain_text import counted
+from cdtool.tables import Table, read_toml
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
+from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
+
+HOLDOUT = "holdout"
+
+
+@dataclass(frozen=True)
+class Group:
+    """One group of logs of impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
+
+    logs: tuple[Path, ...]
+    window: float
+    force: ForceProfile | None = None
+
+
+@dataclass(frozen=True)
+class BenchmarkFile:
+    """A validated benchmark file with its globs resolved; `impacts` are the groups that are scored, hold-out last.
+
+    `rule` is the threshold's, with its settings.
+    `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg]. `window` [s] is that of a
+    log of no group. `migrated` says how keys of earlier versions were read.
+    """
+
+    path: Path
+    machine_file: MachineFile
+    detectors: tuple[str, ...]
+    watched: tuple[str, ...]
+    operations: str
+    threshold: str
+    budget: Budget | None
+    signature: Signature
+    rule: Any
+    activation: Activation
+    onset: OnsetRule
+    labels: Labels | None
+    synchronisation: float
+    mass_before_cell: float
+    learn: tuple[Path, ...]
+    impacts: Mapping[str, Group]
+    campaigns: Mapping[Path, str]
+    points: Mapping[Path, str]
+    limits: tuple[LimitRule, ...]
+    digest: str
+    window: float = 1.0
+    migrated: tuple[str, ...] = ()
+
+    @property
+    def limits_by_hand(self) -> tuple[float, ...]:
+        """Limits of the signal that were set by hand; empty where they are learned."""
+        return tuple(getattr(self.rule, "limits", ()))
+
+    @property
+    def scoring(self) -> dict[str, Any]:
+        """How figures come about, for provenance: results can be compared only where all this is the same."""
+        return {
+            "onset": self.onset.described + (f"{LABEL_FILE}{Path(self.labels.source).name}" if self.labels else ""),
+            "separation_s": self.onset.separation,
+            "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
+            "operations": self.operations,
+            "watched_joints": ", ".join(self.watched) or None,
+            "label_file": self.labels.source if self.labels else None,
+            "synchronisation_s": self.synchronisation,
+            "mass_before_cell_kg": self.mass_before_cell,
+            "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
+        }
+
+    def rules_of(self, group: str) -> ScoringRules:
+        """The settings that make the figures of a log of that group, or of a log of none."""
+        window = self.impacts[group].window if group in self.impacts else self.window
+        return ScoringRules(self.onset, window, self.labels, self.synchronisation, self.mass_before_cell)
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Every file that is read for it: none of them may be written to."""
+        logs = (path for group in self.impacts.values() for path in group.logs)
+        labels = (Path(self.labels.source),) if self.labels else ()
+        return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The impact groups, then the hold-out."""
+        return tuple(self.impacts)
+
+
+def read_benchmark_file(
+    path: str | Path, learning: bool = True, also_known: Sequence[str] = (), detectors: Sequence[str] = ()
+) -> BenchmarkFile:
+    """Read and check a benchmark file; raises ConfigurationError naming the key.
+
+    `detectors` stand for the file's own where it names none; `all` for every one that is registered.
+    Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from, and
+    [limits] may be on the detectors `also_known`.
+    """
+    file = Path(path)
+    root = Table(read_toml(file), str(file))
+    if isinstance(root.raw("machine"), dict):
+        text = f"{file}: is a machine file, not a benchmark file"
+        raise ConfigurationError(text, f'a benchmark file names it: machine = "{file.name}"')
+    base = file.parent
+    machine_file = read_machine_file(base / root.text("machine"))
+    wanted = root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+    names = tuple(machine_file.detector(name).name for name in wanted)
+    if len(set(names)) < len(names):
+        raise root.fault("detectors", "names a detector twice", "name each once")
+    signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
+    threshold, rule = read_threshold(root, signature)
+    learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    force = root.table("force")
+    mass_before_cell = _mass_before_cell(force)
+    window = root.number("window_s", 1.0, above=0.0)
+    impacts = _groups(root, base, window, force)
+    onset = root.table("onset")
+    migrated = migrated_onset(onset)
+    benchmark = BenchmarkFile(
+        path=file,
+        machine_file=machine_file,
+        detectors=names,
+        watched=_read_watched(root, machine_file.machine.joints),
+        operations=root.choice("operations", HOW_TO_CUT, "whole"),
+        threshold=threshold,
+        budget=_read_budget(root),
+        signature=signature,
+        rule=rule,
+        activation=_read_activation(root.table("activation")),
+        labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
+        synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
+        onset=read_onset(onset),
+        mass_before_cell=mass_before_cell,
+        learn=learn,
+        impacts=impacts,
+        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
+        points=named_logs(root.table("points"), base, _scored(impacts)),
+        limits=read_limits(
+            root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
+        ),
+        digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
+        window=window,
+        migrated=migrated,
+    )
+    root.finish()
+    if benchmark.points and not any(group.force for group in impacts.values()):
+        raise root.fault("points", "there is no force profile that they are held against", "set [force] profile")
+    refuse_limits_by_hand(benchmark)
+    _refuse_overlap(benchmark)
+    return benchmark
+
+
+def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
+    """Raise ConfigurationError where limits set by hand stand beside a budget, or beside more than one detector."""
+    if setup.limits_by_hand and (setup.budget or len(setup.detectors) > 1):
+        what = "a false-alarm budget" if setup.budget else f"{counted(len(setup.detectors), 'detector')}"
+        raise ConfigurationError(
+            f"{setup.path}: threshold.limits: are set by hand beside {what}", "they belong to one detector alone"
+        )
+
+
+def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
+    """The same with other detectors, each named once, or with all that are registered where `all` is named.
+
+    Raises ConfigurationError for an unknown name, UsageError for one that is named twice.
+    """
+    chosen = tuple(setup.machine_file.detector(name).name for name in _all_or(names))
+    if len(set(chosen)) < len(chosen):
+        raise UsageError(f"detectors {', '.join(names)} name one twice", "name each once")
+    return with_only(setup, chosen)
+
+
+def _all_or(names: Sequence[str]) -> Sequence[str]:
+    return DETECTORS.usable_names() if list(names) == ["all"] else names
+
+
+def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
+    """The same with these detectors, and with the limits that are on them or on every one."""
+    limits = tuple(rule for rule in setup.limits if rule.detector in (ALL, *detectors))
+    return replace(setup, detectors=tuple(detectors), limits=limits)
+
+
+def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, Group]:
+    """The groups of impacts, then the hold-out."""
+    tables = root.table("impacts")
+    if HOLDOUT in tables.values:
+        raise tables.fault(HOLDOUT, "is the name of the impact-free group", "choose another name for the impacts")
+    profiles = read_force_limits(base / force.text("limits") if "limits" in force else None)
+    profile = force.text("profile", "")
+    if profile:
+        _profile(profiles, force, "profile", force)
+    groups = {}
+    for name in tables.values:
+        if name.strip() in ("", ALL):
+            raise tables.fault(name, "is no name of a group", f"a name is needed; {ALL} stands for every group")
+        table = tables.table(name)
+        limits = _profile(profiles, table, "force_profile", force) if "force_profile" in table else None
+        if profile and "force_profile" not in table:
+            limits = profiles[profile]
+        own = table.number("window_s", window, above=0.0)
+        groups[name] = Group(logs_of(table, base), own, limits)
+    if HOLDOUT in root:
+        groups[HOLDOUT] = Group(logs_of(root.table(HOLDOUT), base), window)
+    if "limits" in force and not any(group.force for group in groups.values()):
+        raise force.fault("limits", "holds limits, but no profile is chosen", f"profile = one of {', '.join(profiles)}")
+    if not groups:
+        raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
+    return groups
+
+
+def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
+    """The force profile that a key names, None for an empty text; raises ConfigurationError naming key and file."""
+    if not (name := table.text(key)):
+        return None
+    try:
+        return profile_of(profiles, name)
+    except UsageError as fault:
+        where = f" in {force.text('limits')}" if "limits" in force else ": [force] limits names no file of your own"
+        raise table.fault(key, f"{fault.message}{where}", fault.hint) from fault
+
+
+def _mass_before_cell(force: Table) -> float:
+    """The mass before the cell [kg]; every key of [force] is asked for, so that an unknown one is named first."""
+    mass = force.number("mass_before_cell_kg", 0.0, minimum=0.0)
+    for name in ("limits", "profile"):
+        force.raw(name)
+    force.finish()
+    return mass
+
+
+def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:
+    """The logs of all groups of impacts, and of the hold-out where it is among `more`."""
+    return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
+
+
+def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, machine_file.detector(name).short_name) for name in detectors]
+
+
+def _refuse_overlap(benchmark: BenchmarkFile) -> None:
+    learned = {path.resolve() for path in benchmark.learn}
+    scored: dict[Path, str] = {}
+    for name, path in ((name, path) for name, group in benchmark.impacts.items() for path in group.logs):
+        true = path.resolve()
+        if true in learned:
+            raise ConfigurationError(
+                f"{benchmark.path}: {path} is learned from and scored",
+                "a recording may be in [learn] or scored, not both",
+            )
+        if true in scored:
+            where = f"in {scored[true]} and in {name}" if scored[true] != name else f"twice in {name}"
+            raise ConfigurationError(
+                f"{benchmark.path}: {path} is scored {where}", "a recording belongs to one group, under one path"
+            )
+        scored[true] = name
+
+
+def _read_budget(table: Table) -> Budget | None:
+    """`false_alarm_budget`; None where the file has none."""
+    if "false_alarm_budget" not in table:
+        return None
+    text = table.text("false_alarm_budget")
+    try:
+        return Budget.parse(text)
+    except UsageError as fault:
+        raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
+
+
+def _read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
+    """`joints`: those to watch; empty: all of them."""
+    watched = table.texts("joints", ())
+    for joint in watched:
+        if joint not in joints:
+            raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
+    return watched
+
+
+def _read_activation(table: Table) -> Activation:
+    """[activation]: how an exit from the band becomes an alarm."""
+    activation = Activation(
+        debounce=table.whole("debounce", 1, minimum=1) if "debounce" in table else None,
+        rearm=table.number("rearm_s", Activation.rearm, minimum=0.0),
+        hysteresis=_share(table, "hysteresis", Activation.hysteresis),
+        latch=table.flag("latch", Activation.latch),
+    )
+    table.finish()
+    return activation
+
+
+def _share(table: Table, name: str, default: float) -> float:
+    value = table.number(name, default, minimum=0.0)
+    if value >= 1.0:
+        raise table.fault(name, f"is {value:g}", "a number from 0 to below 1 is needed")
+    return value
+
+
+def migrated_onset(table: Table) -> tuple[str, ...]:
+    """How a setting of an earlier version is read; nothing where there is none."""
+    if "samples" not in table:
+        return ()
+    return (f"{table.key('samples')}: read as hold_s = {_hold(table):g} (samples of 1 kHz): write that instead",)
+
+
+def _hold(table: Table) -> float:
+    """`hold_s`, or `samples` of an earlier version: those of a load cell of 1 kHz, whatever this one's rate is."""
+    if "samples" not in table:
+        hold = table.number("hold_s", OnsetRule.hold, minimum=0.0)
+        if hold > LONGEST_HOLD:
+            raise table.fault("hold_s", f"is {hold:g}", f"at most {LONGEST_HOLD:g} s")
+        return hold
+    samples = table.whole("samples", 3, minimum=1)
+    if "hold_s" in table:
+        raise table.fault(
+            "samples", "is given together with hold_s", "leave samples out: the onset rule counts in seconds"
+        )
+    if samples * SAMPLE > LONGEST_HOLD:
+        raise table.fault(
+            "samples", f"is {samples}: the onset rule counts in seconds now", f"write hold_s, at most {LONGEST_HOLD:g}"
+        )
+    return samples * SAMPLE
+
+
+def read_onset(table: Table) -> OnsetRule:
+    """[onset]: when a contact begins."""
+    above = table.number("above_n", above=0.0) if "above_n" in table else None
+    back_to = table.number("back_to_n", above=0.0) if "back_to_n" in table else None
+    if above is not None and back_to is not None and back_to > above:
+        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "at most above_n")
+    rule = OnsetRule(
+        above=above,
+        back_to=back_to,
+        hold=_hold(table),
+        sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
+        separation=table.number("separation_s", OnsetRule.separation, above=0.0),
+    )
+    table.finish()
+    return rule

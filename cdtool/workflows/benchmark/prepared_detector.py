@@ -1,0 +1,125 @@
+"""One detector of a benchmark file, ready for single logs: with its threshold, and every setting that makes figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdtool.detection import WHOLE_MACHINE
+from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.results import Skipped
+from cdtool.plain_text import counted
+from cdtool.plausible import PlausibleRanges
+from cdtool.signature_store import read_signature
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
+from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
+from cdtool.workflows.runs import load_runs
+from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, notes_on
+
+
+@dataclass(frozen=True)
+class PreparedBenchmark:
+    """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
+
+    `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
+    `normals` what they look like; `skipped` names the runs that were left out in learning, and why. `notes` are about a
+    signature file of an earlier version.
+    """
+
+    setup: BenchmarkFile
+    detector: str
+    described: str
+    learned: Mapping[str, str]
+    run: Detect
+    ranges: PlausibleRanges | None
+    normals: NormalMotions
+    notes: tuple[Skipped, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
+
+    def score(self, log: Path) -> Scored:
+        """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
+        group, path = self._listed(log)
+        return score_log(self.setup, group, path, self.run, {}, self.ranges)
+
+    def window(self, log: Path) -> float:
+        """How long after its onset a contact of the log may be detected [s]."""
+        return self.setup.rules_of(self._listed(log)[0]).window
+
+    def _listed(self, log: Path) -> tuple[str, Path]:
+        """The log's group and its path as the file names it; no group where it is in none."""
+        for name, group in self.setup.impacts.items():
+            for path in group.logs:
+                if path.resolve() == log.resolve():
+                    return name, path
+        return "", log
+
+
+def prepare_benchmark(
+    file: str | Path,
+    *,
+    detector: str | None = None,
+    signature: str | Path | None = None,
+    jobs: int = 1,
+) -> PreparedBenchmark:
+    """Read a benchmark file and learn the threshold of one of its detectors, or take that of a signature file.
+
+    `detector` may be left out where the file names one alone, or a signature is given. Raises ConfigurationError for a
+    wrong file, SignatureError where nothing can be learned or the signature does not belong, UsageError for a detector
+    that is not clear.
+    """
+    setup = read_benchmark_file(file, detectors=(detector,) if detector else ())
+    machine_file = setup.machine_file
+    if signature is not None:
+        stored = read_signature(signature)
+        instance = machine_file.detector(detector or stored.detector)
+        stored.check(machine_file.machine, instance)
+        # A file that names no joints watches all of the machine's; a signal of the whole machine has one column.
+        everything = (tuple(machine_file.machine.joints), WHOLE_MACHINE)
+        if stored.joints != setup.watched and (setup.watched or stored.joints not in everything):
+            names = [", ".join(joints) or "all joints" for joints in (stored.joints, setup.watched)]
+            raise UsageError(f"the signature watches {names[0]}, {file} {names[1]}", "learn one for the same joints")
+        thresholds: Mapping[str, Any] = {instance.name: stored.current}
+        learned = {run.sha256: "" for run in stored.runs}
+        run = detect_with(setup, [instance], thresholds, {})
+        return PreparedBenchmark(
+            setup,
+            instance.name,
+            stored.described,
+            learned,
+            run,
+            stored.plausible,
+            normals_of(stored),
+            tuple(notes_on(stored)),
+        )
+    setup = with_detectors(setup, [_chosen(setup, detector)])
+    instance = machine_file.detector(setup.detectors[0])
+    runs = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=setup.path.parent)
+    fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
+    used = fitted.learned_from(runs.operations)
+    many = counted(len(used), "impact-free run")
+    classes = len(fitted.thresholds[instance.name])
+    many += f" of {classes} classes of motion" if classes > 1 else ""
+    described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {many}"
+    hashes = {operation.recording.digest: operation.recording.name for operation in used}
+    run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
+    normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
+    left_out = (*runs.skipped, *fitted.skipped)
+    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)
+
+
+def _chosen(setup: BenchmarkFile, detector: str | None) -> str:
+    if detector is None and len(setup.detectors) == 1:
+        return setup.detectors[0]
+    if detector is None:
+        raise UsageError(
+            f"{setup.path} names {len(setup.detectors)} detectors",
+            f"give --detector, one of {', '.join(setup.detectors)}",
+        )
+    name: str = setup.machine_file.detector(detector).name
+    if name not in setup.detectors:
+        raise UsageError(f"{setup.path} does not name detector '{detector}'", nearest(name, setup.detectors))
+    return name

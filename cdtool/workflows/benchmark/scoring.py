@@ -1,0 +1,195 @@
+"""One log of a benchmark: read, cut, detected by every detector, matched with its contacts; the rows that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from cdtool.errors import CdtoolError
+from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.verdict import ForceVerdict, judge
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
+from cdtool.evaluation.sweep import sweep
+from cdtool.motion.applicable import HOLD
+from cdtool.operations import Operation
+from cdtool.pipeline import Detection, detect_operations
+from cdtool.plausible import PlausibleRanges
+from cdtool.recording import Contact, Finding, FloatArray, Recording
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.force_rows import force_rows
+from cdtool.workflows.benchmark.left_out import LeftOut
+from cdtool.workflows.contacts.impact_free import without_contacts
+from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
+from cdtool.workflows.contacts.matched_log import MatchedLog, match_log
+from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
+from cdtool.workflows.log_checks.log_findings import log_warnings
+from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
+
+
+@dataclass
+class Scored:
+    """What one log gave."""
+
+    recording: RecordingResult | None = None
+    judged: list[Judged] = field(default_factory=list)
+    contacts: list[ContactResult] = field(default_factory=list)
+    false_alarms: list[FalseAlarmResult] = field(default_factory=list)
+    forces: list[ForceResult] = field(default_factory=list)
+    verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
+    skipped: list[Skipped] = field(default_factory=list)
+    findings: list[Skipped] = field(default_factory=list)
+    # Names of logs taken as free of impacts, with what would tell and is not in them.
+    unchecked: list[tuple[str, Finding]] = field(default_factory=list)
+    source: str = ""
+    # The recording itself, its contacts and what they were matched with, for a command that shows more than rows.
+    log: Recording | None = None
+    truth: tuple[Contact, ...] = ()
+    matched: MatchedLog | None = None
+    reading: float = 0.0
+    detecting: float = 0.0
+
+
+# What gives the detections of each operation of a log; it names what failed in the log's `Scored`.
+Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
+
+
+def detect_with(
+    setup: BenchmarkFile,
+    detectors: Sequence[Any],
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    lacking: Mapping[str, str],
+) -> Detect:
+    """Detectors with their thresholds; one that fails on a log is left out there and named.
+
+    Those that are `lacking` what they need, for the reason given, can judge nothing. A class of motion is held for
+    the longest matching window.
+    """
+    hold = max(HOLD, *(group.window for group in setup.impacts.values()))
+    machine = setup.machine_file.machine
+
+    def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
+        found: list[list[Detection]] = [[] for _ in operations]
+        left_out = LeftOut()
+        for detector in detectors:
+            failed: list[Skipped] = []
+            if detector.name in lacking:
+                unit, why = detector.unit(machine), lacking[detector.name]
+                made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
+            else:
+                known = thresholds[detector.name]
+                try:
+                    made = detect_operations(
+                        operations, machine, detector, known, setup.activation, setup.watched, hold
+                    )
+                except CdtoolError as fault:
+                    failed = [Skipped(item.name, str(fault)) for item in operations]
+                    made = []
+            left_out.add(detector.name, failed)
+            for of_operation, detection in zip(found, made, strict=not failed):
+                of_operation.append(detection)
+        scored.skipped += left_out.said_once()
+        return found
+
+    return detect
+
+
+def score_log(
+    setup: BenchmarkFile,
+    group: str,
+    path: Path,
+    detect: Detect,
+    factors: Mapping[str, FloatArray],
+    ranges: PlausibleRanges | None = None,
+) -> Scored:
+    """A log's rows; `factors`: the safety factors of the sweep by detector; outside of `ranges` values are masked.
+
+    `group` is empty of a log of no group.
+
+    A log or detector that fails is left out and named, and nothing is raised.
+    """
+    scored = Scored()
+    rules = setup.rules_of(group)
+    begin = perf_counter()
+    try:
+        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
+        if group:
+            contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
+        else:
+            contacts = any_contacts(recording, rules)
+    except CdtoolError as fault:
+        scored.skipped.append(unread(path, setup.path.parent, fault))
+        scored.reading = perf_counter() - begin
+        return scored
+    scored.reading = perf_counter() - begin
+    scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
+    scored.skipped += lost(recording)
+    if group == HOLDOUT:
+        unwanted = unwanted_contacts(recording, rules)
+        operations, touched = without_contacts(operations, unwanted)
+        scored.skipped += touched
+        scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
+        if not operations:
+            scored.findings = log_warnings(recording, unwanted, setup.onset)
+            return scored
+    scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
+    found = detect(operations, scored)
+    matched = match_log(recording, operations, contacts, found, group, rules, setup.activation.wait, setup.operations)
+    scored.skipped += matched.not_scored
+    scored.findings += matched.warnings
+    scored.matched, courses = matched, matched.courses
+    profile = setup.impacts[group].force if group in setup.impacts else None
+    if profile:
+        scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
+        scored.forces = force_rows(scored.recording, scored.verdicts, courses)
+        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, courses)
+        numbered = enumerate(contacts, 1)
+        unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
+        if unseen:
+            text = f"{', '.join(unseen)}: no load-cell force to hold against {profile.name}"
+            scored.skipped.append(Skipped(recording.name, text))
+    scored.judged = [_swept(item, setup, rules.window, factors) for item in matched.judged]
+    scored.contacts = [row for rows in matched.contacts for row in rows]
+    scored.false_alarms = list(matched.false_alarms)
+    scored.detecting = perf_counter() - begin - scored.reading
+    return scored
+
+
+def _force_not_seen(
+    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+) -> list[Skipped]:
+    """The contacts that a force profile could not judge because load-cell samples are missing: a loss of data."""
+    lost = [
+        f"contact {number} is not assessable by {profile}: {verdict.reason}"
+        for number, verdict in verdicts.items()
+        if verdict.outcome == "not_assessable" and courses[number].lacks_samples
+    ]
+    return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
+
+
+def _recording_result(
+    recording: Recording, group: str, path: Path, operations: int, contacts: int, setup: BenchmarkFile
+) -> RecordingResult:
+    return RecordingResult(
+        recording=recording.name,
+        group=group,
+        sha256=recording.digest,
+        seconds=recording.duration,
+        operations=operations,
+        contacts=contacts,
+        campaign=setup.campaigns.get(path),
+        point=setup.points.get(path),
+    )
+
+
+def _swept(judged: Judged, setup: BenchmarkFile, window: float, factors: Mapping[str, FloatArray]) -> Judged:
+    sweeps = tuple(
+        sweep(item, judged.contacts, setup.activation, window, factors[item.detector])
+        if item.detector in factors
+        else None
+        for item in judged.detections
+    )
+    return replace(judged, sweeps=sweeps)

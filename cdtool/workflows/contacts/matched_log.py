@@ -1,0 +1,217 @@
+"""A log's contacts held against what detectors say of its operations: the one way, whatever command asks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.detection import Alarm
+from cdtool.errors import CdtoolError
+from cdtool.evaluation.force.course import ForceCourse, force_course
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.truth.matching import match
+from cdtool.operations import Operation, operations_of
+from cdtool.pipeline import Detection
+from cdtool.plain_text import counted
+from cdtool.recording import Contact, Recording
+from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
+from cdtool.workflows.runs import DAMAGED
+
+# A stroke counts as judged where at least this share of its samples is.
+_JUDGED = 0.5
+
+
+@dataclass(frozen=True)
+class MatchedLog:
+    """What became of a log's contacts and alarms.
+
+    `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
+    number; `not_scored` names contacts that have no onset, lie in no operation or began where load-cell samples are
+    missing, `warnings` are about the log itself.
+    """
+
+    judged: tuple[Judged, ...]
+    contacts: tuple[tuple[ContactResult, ...], ...]
+    false_alarms: tuple[FalseAlarmResult, ...]
+    courses: dict[int, ForceCourse]
+    not_scored: tuple[Skipped, ...]
+    warnings: tuple[Skipped, ...]
+
+
+def match_log(  # noqa: PLR0913  a log, its contacts, its detections and the rules to match them by
+    recording: Recording,
+    operations: Sequence[Operation],
+    contacts: Sequence[Contact],
+    found: Sequence[Sequence[Detection]],
+    group: str,
+    rules: ScoringRules,
+    rearm: float,
+    cut_by: str,
+) -> MatchedLog:
+    """Match the detections of each operation with the log's contacts.
+
+    `rearm` [s] is the activation's; `cut_by` says how the log was cut into its operations.
+    """
+    inside = _by_operation(operations, contacts)
+    courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
+    warned = log_warnings(recording, contacts, rules.onset)
+    crossings = _pooled(found)
+    judged = []
+    for operation, own, detections in zip(operations, inside, found, strict=True):
+        matchings = tuple(
+            match(
+                item.verdict,
+                own,
+                item.statistic,
+                rules.window,
+                of_log=contacts,
+                crossings=crossings[item.detector],
+                rearm=rearm,
+            )
+            for item in detections
+        )
+        judged.append(Judged(group, operation, own, tuple(detections), matchings))
+    return MatchedLog(
+        tuple(judged),
+        tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
+        tuple(row for item in judged for row in false_alarm_rows(item)),
+        courses,
+        (*_not_scored(recording, contacts, inside, cut_by), *_unseen_onsets(recording, contacts, rules.window)),
+        (*warned, *_uncut_log(recording, found, cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+    )
+
+
+def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+    """The contacts whose onset lies in an operation, and one that is in progress when it begins."""
+    part = operation.recording
+    return tuple(
+        contact
+        for contact in contacts
+        if part.start <= contact.start <= part.end
+        or (contact.in_progress and contact.start <= part.end and contact.end >= part.start)
+    )
+
+
+def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
+    """The contacts of each operation; one on the edge of two belongs to the earlier."""
+    taken: set[Contact] = set()
+    found = []
+    for operation in operations:
+        own = tuple(contact for contact in contacts_of(operation, contacts) if contact not in taken)
+        taken.update(own)
+        found.append(own)
+    return found
+
+
+def _not_scored(
+    recording: Recording, contacts: Sequence[Contact], inside: Sequence[Sequence[Contact]], cut_by: str
+) -> list[Skipped]:
+    found = []
+    for contact in contacts:
+        if contact.in_progress:
+            found.append(Skipped(recording.name, f"{IN_PROGRESS.format(end=contact.end)}, it is not scored"))
+        elif not any(contact in own for own in inside):
+            text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
+            found.append(Skipped(recording.name, text))
+    return found
+
+
+def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: float) -> list[Skipped]:
+    """A line on each contact that began where load-cell samples are missing: a loss, for its latency is not known."""
+    found = []
+    for number, contact in enumerate(contacts, 1):
+        if contact.hole and not contact.in_progress:
+            later = 1e3 * contact.uncertainty
+            what = f"its latency may be up to {later:.0f} ms longer"
+            what = "its latency is not known" if contact.uncertainty >= window else what
+            text = (
+                f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
+            )
+            found.append(Skipped(recording.name, f"{DAMAGED}{text} {contact.start:.3f} s, may have begun: {what}"))
+    return found
+
+
+def _unseen_forces(
+    recording: Recording, contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]
+) -> list[Skipped]:
+    """A warning for each contact whose onset was seen, but not all of its force."""
+    found = []
+    for number, course in courses.items():
+        contact = contacts[number - 1]
+        hole = course.longest_hole(contact.end - contact.start)
+        if hole and not contact.hole:
+            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms while contact {number} presses"
+            found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
+    return found
+
+
+def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
+    """Every detector's crossings in all operations of a log, in order of time."""
+    pooled: dict[str, list[Alarm]] = {}
+    for detections in found:
+        for detection in detections:
+            pooled.setdefault(detection.detector, []).extend(detection.verdict.crossings)
+    return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
+
+
+def _courses(
+    recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
+) -> tuple[dict[int, ForceCourse], list[Skipped]]:
+    """The force over each contact that has an onset, by its number; one without a force is named."""
+    found: dict[int, ForceCourse] = {}
+    missing: list[Skipped] = []
+    if "force" not in recording:
+        return found, missing
+    ends = [*(contact.start for contact in contacts[1:]), float("inf")]
+    for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
+        if contact.in_progress:
+            continue
+        try:
+            found[number] = force_course(recording, contact, mass_before_cell, until)
+        except CdtoolError as fault:
+            missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
+    return found, missing
+
+
+def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Skipped]:
+    """A warning where the first stroke of a log was judged and a later one was not, since the log is not cut.
+
+    `found` are the detections of its operations, `cut_by` is how it was cut into them.
+    """
+    detections = [item for of_operation in found for item in of_operation]
+    if cut_by != "whole" or all(np.all(item.statistic.valid) for item in detections):
+        return []
+    strokes = _strokes(recording)
+    blind = [
+        number
+        for number, stroke in enumerate(strokes[1:], 2)
+        if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
+    ]
+    if not blind:
+        return []
+    which = f"stroke {blind[0]} was" if len(blind) == 1 else f"{len(blind)} of them were"
+    text = (
+        f"holds {counted(len(strokes), 'stroke')} in one operation, and {which} not judged: cut it with "
+        'operations = "motion" in the benchmark file, or --operations motion'
+    )
+    return [Skipped(recording.name, text)]
+
+
+def _strokes(recording: Recording) -> list[Operation]:
+    if "speed" not in recording and "reference_speed" not in recording:
+        return []
+    try:
+        return operations_of(recording, "motion")
+    except CdtoolError:
+        return []
+
+
+def _mostly_judged(detection: Detection, stroke: Operation) -> bool:
+    statistic = detection.statistic
+    inside = (statistic.time >= stroke.recording.start) & (statistic.time <= stroke.recording.end)
+    valid = np.any(statistic.valid[inside], axis=1)
+    return bool(len(valid)) and float(np.mean(valid)) >= _JUDGED

@@ -1,0 +1,86 @@
+"""The true contacts of a log: at least one of an impact log, none of an impact-free one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.missing_samples import longest_step
+from cdtool.evaluation.truth.onset import find_contacts
+from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.workflows.contacts.impact_free import contacts_shown
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.runs import DAMAGED, absent_truth, lost
+
+# A load cell that ends earlier than this [s] before its log has not seen all of it.
+_TAIL = 0.1
+
+
+def unwanted_contacts(recording: Recording, rules: ScoringRules) -> tuple[Contact, ...]:
+    """Return the contacts of a log of the hold-out, which should have none; a label file that names it is believed."""
+    labels = rules.labels
+    name = labels.name_of(recording.name) if labels else None
+    return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, rules.onset)
+
+
+def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
+    """The contacts that a log shows, by a label file that names it or by its channels; none without ground truth."""
+    name = rules.labels.name_of(recording.name) if rules.labels else None
+    if rules.labels and name is not None:
+        rules.labels.check(recording.name, recording.start, recording.end)
+        return list(rules.labels.contacts[name])
+    try:
+        return find_contacts(recording, rules.onset)
+    except RecordingError:
+        return []  # without ground truth there are alarms, but no latency
+
+
+def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list[Contact]:
+    """Return an impact log's contacts: those of a label file that names it, else the load cell's, a label's or events'.
+
+    Raises RecordingError where there is none, or nothing that tells.
+    """
+    labels = rules.labels
+    name = labels.name_of(recording.name) if labels else None
+    if labels and name is not None:
+        labels.check(recording.name, recording.start, recording.end)
+        if not labels.contacts[name]:
+            raise RecordingError(
+                f"{path}: no contact found ({labels.lines[name][0]} names none)",
+                "write its start_s and end_s there, or move the log to [holdout]",
+            )
+        return list(labels.contacts[name])
+    for item in absent_truth(recording):
+        if not any(channel in recording for channel in GROUND_TRUTH):
+            raise RecordingError(f"{path}: no ground truth: {item}", "an impact log needs it, or a label file")
+    contacts = find_contacts(recording, rules.onset)
+    if not contacts and (missing := _missing(recording)):
+        raise RecordingError(
+            f"{path}: no contact found ({rules.onset.described}), and {missing}", "copy the log again, or leave it out"
+        )
+    if not contacts:
+        raise RecordingError(
+            f"{path}: no contact found ({rules.onset.described})", "lower [onset] above_n, or move the log to [holdout]"
+        )
+    return contacts
+
+
+def _missing(recording: Recording) -> str:
+    """What a log lacks that may have held the contact; nothing where it is whole."""
+    if damage := lost(recording):
+        return f"part of the log is lost: {damage[0].reason.removeprefix(DAMAGED)}"
+    if "force" not in recording:
+        return ""
+    cell = recording["force"]
+    present = cell.time[np.isfinite(cell.values[:, 0])]
+    if len(present) and present[-1] > recording.end - _TAIL:
+        marks = np.concatenate(([recording.start], present))
+        steps = np.diff(marks)
+        k = int(np.argmax(steps))
+        if steps[k] <= longest_step(present):
+            return ""
+        return f"load-cell samples are missing from {marks[k]:.3f} to {marks[k + 1]:.3f} s"
+    last = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
+    return f"the load cell {last}, the log at {recording.end:.3f} s"

@@ -1,0 +1,1 @@
+"""`cdtool convert`: a log into another container."""

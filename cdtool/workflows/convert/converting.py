@@ -1,0 +1,170 @@
+"""`cdtool convert`: a log's channels, or all its columns, into another container, to the bit and with provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdtool.errors import RecordingError, UsageError, nearest
+from cdtool.files import replaced
+from cdtool.formats.channel_assembly import file_digest
+from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
+from cdtool.formats.part_pieces import FoundParts
+from cdtool.formats.parts import joined_digest
+from cdtool.formats.reading import log_parts
+from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
+from cdtool.recording import Finding
+from cdtool.version import __version__
+from cdtool.workflows.channel_rows import channel_rows
+from cdtool.workflows.convert.converted_machine import converted_machine
+from cdtool.workflows.log_rows import LogRows
+
+if TYPE_CHECKING:
+    from cdtool.workflows.runs import Progress
+
+_WRITERS = {
+    ".csv": "cdtool.formats.csv_writing:write_csv_table",
+    ".mcap": "cdtool.formats.mcap_writing:write_mcap_topics",
+    ".parquet": "cdtool.formats.parquet_writing:write_parquet",
+    ".feather": "cdtool.formats.parquet_writing:write_feather",
+    ".h5": "cdtool.formats.hdf5_writing:write_hdf5",
+    ".hdf5": "cdtool.formats.hdf5_writing:write_hdf5",
+    ".mf4": "cdtool.formats.mdf:write_mdf",
+    ".tdms": "cdtool.formats.tdms:write_tdms",
+}
+_ONE_CLOCK = (".csv",)
+
+
+@dataclass(frozen=True)
+class Converted:
+    """The files that were written, the machine files that read them, how much there is, and what is odd."""
+
+    source: str
+    files: tuple[str, ...]
+    machine_files: tuple[str, ...]
+    columns: int
+    clocks: int
+    findings: tuple[Finding, ...]
+
+
+def convert(
+    source: str | Path,
+    output: str | Path,
+    *,
+    machine: str | Path | MachineFile | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Converted:
+    """Write a log's mapped channels (as logged, SI), or without a machine file all its numeric columns, to `output`.
+
+    A folder of parts, as rosbag2 makes it, is one log. Nothing is resampled: each channel keeps its own clock. A CSV
+    table has but one: of several clocks each gets a file of its own, `output` with `.1`, `.2` before the suffix. Values
+    are float64 to the bit. With a machine file another one is written beside each file, which reads it. Raises
+    UsageError for an unknown suffix and where a file is there.
+    """
+    log, target = Path(source), Path(output)
+    writer = _writer(target)
+    parts = log_parts(log)
+    _check_apart(target, log, parts)
+    machine_file = (
+        None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    )
+    rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
+    if not rows.groups:
+        raise RecordingError(f"{log}: holds none of the mapped channels", "see cdtool info for what it holds")
+    pieces = _pieces(target, rows.groups)
+    names = [path for path, _ in pieces]
+    companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
+    _check_free([*names, *companions], parts, force)
+    provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
+    course = _Course(log, sum(group.rows for group in rows.groups), progress)
+    with replaced(*names, *companions) as temporary:  # all of them or none
+        for i, (path, part) in enumerate(pieces):
+            written = writer(temporary[i], part, course.of(rows.parts(part)), provenance)
+            if machine_file is not None:
+                text = converted_machine(machine_file, path, part, written, companions[i])
+                temporary[len(names) + i].write_text(text, encoding="utf-8")
+    width = sum(len(parts) for group in rows.groups for parts in group.flat)
+    made = tuple(map(str, names)), tuple(map(str, companions))
+    return Converted(str(log), *made, width, len(rows.groups), tuple(rows.findings))
+
+
+@dataclass
+class _Course:
+    """The rows of a log on their way to the writer, counted: `rows` of them in all."""
+
+    log: Path
+    rows: int
+    progress: Progress | None
+    _done: int = 0
+
+    def of(self, parts: Parts) -> Parts:
+        """The parts as they come; what goes wrong as they are read is no fault of the file that is written."""
+        try:
+            for ready in parts:
+                yield ready
+                self._done += sum(len(part) for part in ready if part is not None)
+                if self.progress:
+                    self.progress(self._done, self.rows)
+        except OSError as fault:
+            text = f"{self.log}: cannot be read: {fault.strerror or fault}"
+            raise RecordingError(text, "check the disk it is on") from fault
+
+
+def _writer(target: Path) -> Writer:
+    place = _WRITERS.get(target.suffix.lower())
+    if place is None:
+        raise UsageError(f"{target}: '{target.suffix}' cannot be written", nearest(target.suffix, _WRITERS))
+    module, _, name = place.partition(":")
+    writer: Writer = getattr(import_module(module), name)
+    return writer
+
+
+def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
+    """A file of the parts' kind in their folder would be one of them from then on."""
+    alike = target.suffix.lower() == parts[0].suffix.lower()
+    if log.is_dir() and alike and target.parent.is_dir() and target.parent.samefile(log):
+        raise UsageError(f"{target}: would be a part of the log", "write it to another folder")
+
+
+def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> None:
+    for path in paths:
+        if path.exists() and any(path.samefile(part) for part in parts):
+            raise UsageError(f"{path}: is the log itself", "choose another name")
+        if path.exists() and not force:
+            raise UsageError(f"{path}: already exists", "choose another name, or overwrite it with --force")
+
+
+def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[Group]]]:
+    """Which groups go into which file."""
+    if target.suffix.lower() in _ONE_CLOCK and len(groups) > 1:
+        names = [target.with_name(f"{target.stem}.{i}{target.suffix}") for i in range(1, len(groups) + 1)]
+        return [(name, [group]) for name, group in zip(names, groups, strict=True)]
+    return [(target, groups)]
+
+
+def _provenance(
+    log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
+) -> Mapping[str, str]:
+    """Of a log in parts each part's name and SHA-256, too; `sha256` is then that of these digests."""
+    if log.is_dir():
+        parts = FoundParts.of(log).every  # in the order of time
+    digests = {part.name: file_digest(part) for part in parts}
+    told = {
+        "source": log.name or log.resolve().name,
+        "sha256": joined_digest(list(digests.values())),
+        "version": __version__,
+        "origin_s": repr(origin),
+    }
+    if log.is_dir():
+        told["parts"] = "; ".join(f"{name} {digest}" for name, digest in digests.items())
+    if lost := [str(finding) for finding in findings if finding.severity == "loss"]:
+        told["lost"] = "; ".join(lost)
+    if unverified := [finding.message for finding in findings if finding.message.endswith(": unverified")]:
+        told[UNVERIFIED] = "; ".join(unverified)
+    if machine_file is not None:
+        told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}
+    return told

@@ -1,0 +1,209 @@
+"""A draft of a machine file: TOML in which every guess says why, and every placeholder asks to be checked."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+
+import numpy as np
+
+from cdtool.recording import UNITLESS
+from cdtool.workflows.init.machine_side import Side
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.units import Evidence, Logged
+
+_WIDEST = 100
+_MOST_LISTED = 60
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How the draft takes the time: a column with its unit or the rate [Hz] of its counts, or a rate alone."""
+
+    column: str | int | None = None
+    unit: str = "s"
+    why: str = ""
+    check: str = ""
+    rate: float | None = None
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What is written: the machine's kind, its joints, the clock and the channels with their units."""
+
+    name: str
+    log: str
+    side: Side
+    joints: tuple[str, ...]
+    joints_why: str
+    clock: Clock
+    channels: Channels
+    topics: bool
+    evidence: Evidence
+
+    @property
+    def units(self) -> dict[str, Logged]:
+        """Unit and scale of each channel that has one."""
+        return {name: self.evidence.logged(name) for name in self.channels.found if name not in UNITLESS}
+
+
+def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False) -> str:
+    """The machine file; the channels in `left_out` stand there as comments. `turned`: the accelerometer's sign."""
+    side = draft.side
+    lines = [
+        f"# Draft by cdtool init from {_plain(draft.log)}: guesses, not measurements.",
+        '# "guessed" says why; "CHECK" marks what cdtool cannot know: delete the mark once it is checked.',
+        "",
+        "[machine]",
+        *_commented(f"type = {_text(side.type)}", _marked(f"guessed: {side.why}", side.check)),
+        f"name = {_text(draft.name)}",
+        *_commented(f"joints = {_list([_text(joint) for joint in draft.joints])}", draft.joints_why),
+        *_commented(f"coordinates = {_text(side.coordinates)}", _coordinates_why(side)),
+        *_placeholders(side, len(draft.joints)),
+        "",
+        "[channels.mcap]" if draft.topics else "[channels]",
+        *([] if draft.topics else _time(draft.clock)),
+    ]
+    units = draft.units
+    for name in draft.channels.found:
+        made = _mapped(draft, name, units.get(name), -1.0 if turned and name == "acceleration" else 1.0)
+        lines += [f"# {text}" if text and name in left_out else text for text in made]
+    if not draft.channels.found:
+        lines += _columns(draft)
+    elif absent := [name for name in ("torque", "speed", "position") if name not in draft.channels.found]:
+        lines.append(f"# CHECK: found no {', no '.join(absent)}: see cdtool info for what the log has")
+    return "\n".join(lines) + "\n"
+
+
+def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list[str]:
+    """One channel's line, and the comment that says why and what is to be checked."""
+    found = draft.channels.found[name]
+    why, checks = f"guessed: {found.why}", [found.check]
+    if logged is not None:
+        why += f"; unit: {logged.why}" if logged.why else ""
+        checks.append(logged.check)
+    if sign < 0.0:
+        why += "; its sign is the other one of the speed's derivative: turned"
+    if name == "force":
+        checks.append("ground truth only: is it the load cell of the test?")
+    line = f"{name} = {_channel(draft, name, logged, sign)}"
+    return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
+
+
+def _columns(draft: Draft) -> list[str]:
+    """The columns or fields of a log that tells of no channel, as comments."""
+    streams = [stream for stream in draft.channels.free if stream.width == 1 or stream.topic]
+    made = _wrapped(
+        "CHECK: no name and no course tells of a torque, speed or position. Write the channels here, with the unit "
+        'that the log holds, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V. '
+        "The log has, with the smallest and the largest value:"
+    )
+    for stream in streams[:_MOST_LISTED]:
+        if not np.isfinite(stream.values).any():
+            continue
+        low, high = float(np.nanmin(stream.values)), float(np.nanmax(stream.values))
+        made.append(f"#   {_plain(_place(draft, stream))}: {low:.4g} to {high:.4g}")
+    if len(streams) > _MOST_LISTED:
+        made.append(f"#   and {len(streams) - _MOST_LISTED} more: see cdtool info")
+    return made
+
+
+def _place(draft: Draft, stream: Stream) -> str:
+    if draft.topics:
+        return f"topic = {_text(stream.topic)}, field = {_text(stream.field)}"
+    return f"column = {_column(stream.columns[0])}"
+
+
+def _coordinates_why(side: Side) -> str:
+    if side.coordinates == "motor":
+        return "guessed: the log holds the motor's torque or speed" + ("" if side.gear else ". CHECK: or the load's")
+    return 'guessed: the log holds the load\'s own force, speed and position. CHECK: "motor" if a gear is between'
+
+
+def _placeholders(side: Side, joints: int) -> list[str]:
+    """Inertia 0: a detector with a model refuses it, so that a placeholder can never pass for a value."""
+
+    def each(value: str) -> str:
+        return value if joints == 1 else _list([value] * joints)
+
+    key, unit = ("load_mass", "kg") if side.type == "linear_axis" else ("load_inertia", "kg m2")
+    ratio = "m/rad" if side.type == "linear_axis" else "rad/rad"
+    refused = "0 is a placeholder: detectors with a model refuse it"
+    made = _commented(f"{key} = {each('0.0')}", f"CHECK: {unit}, not in the log; {refused}")
+    if side.coordinates == "motor":
+        made += _commented(f"motor_inertia = {each('0.0')}", "CHECK: kg m2, not in the log; 0 is a placeholder")
+        text = f"CHECK: {ratio}, load travel per motor angle; "
+        if side.gear is not None:
+            why = f"guessed: {side.gear.why}, {side.gear.position} over {side.gear.speed}"
+            made += _commented(f"transmission_ratio = {side.gear.ratio:.4g}", f"{why}. {text}right if both units are")
+        else:
+            text += "1 is a placeholder: figures of the load are wrong until then"
+            made += _commented(f"transmission_ratio = {each('1.0')}", text)
+    return made
+
+
+def _time(clock: Clock) -> list[str]:
+    if clock.column is None:
+        return _commented("time = { rate_hz = 1000.0 }", f"CHECK: a placeholder: {clock.why}")
+    column = clock.column if isinstance(clock.column, int) else _text(clock.column)
+    scale = f"unit = {_text(clock.unit)}" if clock.rate is None else f"rate_hz = {clock.rate:.5g}"
+    return _commented(f"time = {{ column = {column}, {scale} }}", _marked(f"guessed: {clock.why}", clock.check))
+
+
+def _channel(draft: Draft, name: str, logged: Logged | None, sign: float) -> str:
+    stream = draft.channels.found[name].stream
+    if draft.topics:
+        parts = [_place(draft, stream)]
+    elif len(stream.columns) == 1:
+        parts = [f"column = {_column(stream.columns[0])}"]
+    else:
+        parts = [f"columns = {_list([_column(column) for column in stream.columns])}"]
+    if logged is None:
+        return f"{{ {', '.join(parts)} }}"
+    if logged.unit:
+        parts.append(f"unit = {_text(logged.unit)}")
+    if logged.scale is not None or sign < 0.0:
+        scale = [sign * value for value in logged.scale or (1.0,)]
+        shown = [f"{value!r}" for value in scale]
+        parts.append(f"scale = {shown[0] if len(set(shown)) == 1 else _list(shown)}")
+    return f"{{ {', '.join(parts)} }}"
+
+
+def _column(name: str) -> str:
+    """A column of a table without a header is named by its number."""
+    return str(int(name)) if name.isdigit() else _text(name)
+
+
+def _commented(line: str, why: str) -> list[str]:
+    """A line with its comment behind it, or before it where both are too long for one."""
+    why = _plain(why)
+    if not why:
+        return [line]
+    joined = f"{line}  # {why}"
+    if len(joined) <= _WIDEST:
+        return [joined]
+    return [*_wrapped(why), line]
+
+
+def _wrapped(text: str) -> list[str]:
+    return [f"# {part}" for part in wrap(text, _WIDEST - 4, break_long_words=False, break_on_hyphens=False)]
+
+
+def _marked(why: str, check: str) -> str:
+    return f"{why}. CHECK: {check}" if check else why
+
+
+def _list(items: Sequence[str]) -> str:
+    return f"[{', '.join(items)}]"
+
+
+def _text(value: str) -> str:
+    """A TOML string: JSON's escapes are TOML's, but DEL."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _plain(text: str) -> str:
+    """Without characters that would end a comment or are refused in one."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)

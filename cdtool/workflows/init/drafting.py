@@ -1,0 +1,161 @@
+"""`cdtool init`: a look at a log becomes a draft of a machine file, with every guess marked."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from cdtool.errors import CdtoolError, RecordingError, UsageError
+from cdtool.files import write_text
+from cdtool.formats.element_names import element_names
+from cdtool.formats.reading import choose_format, has_topics, log_parts
+from cdtool.machine_file import read_machine_file
+from cdtool.recording import CHANNELS, Finding
+from cdtool.workflows.information import info
+from cdtool.workflows.init.channel_guess import guess_channels
+from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
+from cdtool.workflows.init.machine_side import side_of
+from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
+from cdtool.workflows.init.streams import Channels, streams_of
+from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
+from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
+from cdtool.workflows.init.units_in_names import unit_in_name
+
+_CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
+# What log_checks.accelerometer_check says of a sensor that is mounted the other way round.
+_TURNED = "opposite sign"
+
+
+@dataclass(frozen=True)
+class Drafted:
+    """The draft's text, the channels that it maps, those that stand in it as comments, and what is odd."""
+
+    path: str
+    text: str
+    channels: tuple[str, ...]
+    left_out: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
+    """Write a draft of a machine file for a log; `cdtool info` runs with it. Raises CdtoolError.
+
+    A channel whose guess the log contradicts is left in the file as a comment; where nothing tells of a channel, all
+    columns are. An existing file is not overwritten without `force`.
+    """
+    target = Path(output)
+    if target.exists() and not force:
+        raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
+    drafted = replace(_settled(Path(log), _drafted(Path(log))), path=str(target))
+    write_text(target, drafted.text)
+    return drafted
+
+
+def _settled(log: Path, draft: Draft) -> Drafted:
+    """The draft with which `cdtool info` reads the log: what the log contradicts is taken back, one after another."""
+    left_out: list[str] = []
+    turned = False
+    if not draft.channels.found:
+        return Drafted("", draft_text(draft), (), (), ())
+    with TemporaryDirectory() as folder:
+        trial = Path(folder) / "draft.toml"
+        while True:
+            text = draft_text(draft, left_out, turned)
+            trial.write_text(text, encoding="utf-8")
+            mapped = tuple(name for name in draft.channels.found if name not in left_out)
+            try:
+                findings = info(log, machine=read_machine_file(trial)).findings
+            except CdtoolError as fault:
+                bad = _blamed(fault, mapped)
+                if bad is None:
+                    raise
+                left_out.append(bad)
+                continue
+            if turned or not any(_TURNED in found.message for found in findings if found.channel == "acceleration"):
+                return Drafted("", text, mapped, tuple(left_out), findings)
+            turned = True
+
+
+def _drafted(log: Path) -> Draft:
+    path = log_parts(log)[0]
+    found = choose_format(path)
+    source = found.columns(path)
+    topics = has_topics(found)
+    clock, times = (None if topics else table_clock(source)) or (None, None)
+    streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
+    if not streams:
+        raise RecordingError(f"{log}: holds no column of numbers beside a clock", "see cdtool info for what it holds")
+    channels = guess_channels(streams, topics)
+    own = any(column.time is not None for column in source.columns.values()) and not topics
+    clock = None if own else clock
+    types = {topic: text.split(",")[0] for topic, text in source.details.items()} if topics else {}
+    motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
+    messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
+    ratio = ratio_of(channels, clock, messages_si)
+    unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
+    side = side_of(channels, ratio, clock, messages_si)
+    joints, why = _joints(path, channels, topics)
+    doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
+    time = Clock("time", "s", "the file's own clock") if own else _clock(clock, ratio, doubt)
+    evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence)
+
+
+def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
+    if channels.joints == 1:
+        return ("axis",), ""
+    if topics:
+        for found in channels.found.values():
+            names = element_names(path, found.stream.topic) if found.stream.field.endswith("[:]") else ()
+            if len(names) == channels.joints and len(set(names)) == len(names):
+                return names, f"as the messages of {found.stream.topic} name them"
+    return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
+
+
+def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
+    """What is odd about a clock's unit that its name alone tells: only another one fits the ratio."""
+    if clock is None or not clock.told.endswith("name") or ratio is None or ratio.fitting:
+        return ""
+    other = ratio_of(channels, replace(clock, told=""), messages_si=False)
+    if other is None or not other.fitting or other.tick:
+        return ""
+    first = other.fitting[0]
+    return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
+
+
+def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
+    if clock is None:
+        return Clock(why="no column looks like a clock: give the rate, or the column and its unit")
+    name: str | int = int(clock.column) if clock.column.isdigit() else clock.column
+    if clock.told:
+        return Clock(name, clock.unit, clock.told, check)
+    why = "its name or its steps"
+    if (named := unit_in_name("time", clock.column)) and not clock.counts:
+        why += f", though its name ends with {named}"
+    if ratio is not None and ratio.fitting:
+        first = ratio.fitting[0]
+        pair = f"{first.position} and {first.speed}"
+        if ratio.tick:
+            text = f"counts, not a time: the rate is right if position and speed are in {pair}"
+            return Clock(name, why=f"{why}; rate: with {pair}", check=text, rate=1.0 / ratio.tick)
+        also = (
+            f"; {fits_as_well(ratio, clock_told=False)} as well" if ratio.fitting[1:] else "; no other fits the ratio"
+        )
+        why += f"; unit: steps of {clock.step:.4g} {first.clock}, with {pair}"
+        return Clock(name, first.clock, why, f"the unit is not told{also}")
+    if clock.counts:
+        text = "counts, not a time: 1000 steps a second are a placeholder; give their rate"
+        return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
+    rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
+    return Clock(name, clock.unit, why, f"the unit is not told: steps of {clock.step:.4g} are {rates}")
+
+
+def _blamed(fault: CdtoolError, mapped: tuple[str, ...]) -> str | None:
+    """The channel that an error names, if the draft can do without it."""
+    for match in _CHANNEL.finditer(fault.message):
+        name = match[1] or match[2]
+        if name in CHANNELS and name in mapped and len(mapped) > 1:
+            return name
+    return None

@@ -1,0 +1,138 @@
+"""Which kind of machine does a log tell of, and of its motor or of its load? Units first, then names and ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.units import find_unit
+from cdtool.workflows.init.quantity_words import words
+from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.streams import Channels
+from cdtool.workflows.init.table_clock import TableClock
+
+# Above this a rotation [rad, rad/s] is a motor's, not a load's.
+_MOTOR_RANGE = 20.0
+# Travel per motor angle [m/rad] of spindles, belts and pinions: which unit of length goes with a ratio.
+_GEARS = (2e-4, 0.2)
+_LENGTHS = ("mm", "m", "um")
+_MOTOR_OF_LOAD = "linear_axis with coordinates motor where this is the motor of a slide"
+_MOTOR_OF_SLIDE = "rotary_axis for a hinged door or a turntable"
+
+
+@dataclass(frozen=True)
+class Gear:
+    """Position and speed on two sides of a gear: units of both, m of travel per rad of the motor, and why."""
+
+    position: str
+    speed: str
+    ratio: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Side:
+    """The kind of machine and the side that its log tells of, why, and what else it may be (empty: it is known)."""
+
+    type: str
+    coordinates: str
+    why: str
+    check: str = ""
+    gear: Gear | None = None
+
+    def accepted(self, channel: str) -> tuple[str, ...]:
+        """SI units that this kind of machine takes for a channel, as cdtool.machines has them."""
+        quantity = channel.removeprefix("reference_")
+        if quantity == "force":
+            return ("N",)
+        linear = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
+        rotary = {"torque": "N m", "speed": "rad/s", "position": "rad", "acceleration": "rad/s2"}
+        load = (linear if self.type == "linear_axis" else rotary)[quantity]
+        if self.coordinates == "load" or quantity == "acceleration" or load == rotary[quantity]:
+            return (load,)
+        return rotary[quantity], load
+
+
+def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, messages_si: bool) -> Side:
+    """Linear or rotary, motor or load: from the units told, from names and from how far and how fast it turns."""
+    told = {name: stated(name, found.stream).si for name, found in channels.found.items()}
+    lengths = told.get("position") == "m" or told.get("speed") == "m/s"
+    motor, why = _is_motor(channels, ratio, messages_si)
+    if channels.joints > 1:
+        text = f"{channels.joints} joints of which no model is known; {why}"
+        kind = "linear_axis" if lengths else "rotary_axis"
+        other = "planar_arm or urdf for joints that are coupled"
+        turns = told.get("torque") == "N m" if lengths else motor
+        return Side(kind, "motor" if turns else "load", text, other)
+    if (gear := _gear(channels, ratio, clock)) is not None:
+        return Side("linear_axis", "motor", "a travel is logged, and a speed of rotation", "", gear)
+    if lengths and told.get("torque") == "N m":
+        return Side("linear_axis", "motor", "a travel is logged, and a torque")
+    if lengths:
+        return Side("linear_axis", "load", "one joint, position or speed in a unit of length")
+    if motor:
+        return Side("linear_axis", "motor", f"one joint; {why}", _MOTOR_OF_SLIDE)
+    if told.get("torque") == "N" and "angle" in _kinds(channels):
+        return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
+    if "angle" in _kinds(channels):
+        return Side("rotary_axis", "load", "one joint, and it tells of angles", _MOTOR_OF_LOAD)
+    if messages_si:
+        return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a joint that slides")
+    return Side("linear_axis", "load", "one joint", "rotary_axis for one that turns")
+
+
+def _gear(channels: Channels, ratio: Ratio | None, clock: TableClock | None) -> Gear | None:
+    """A travel and a rotation, as units or names tell, whose ratio is that of a gear."""
+    if ratio is None or ratio.fitting:
+        return None
+    position, speed = (channels.found[name].stream for name in ("position", "speed"))
+    units = stated("position", position), stated("speed", speed)
+    slope = ratio.per_second(clock.unit if clock is not None else "")
+    correlation = f"as the position's derivative over the speed has it, r = {ratio.correlation:.3f}"
+    if units[0].si == "rad" and units[1].si == "m/s":
+        travel = _factor(units[1].unit) / (slope * _factor(units[0].unit))
+        return Gear(units[0].unit, units[1].unit, travel, correlation)
+    turning = units[1].unit if units[1].si == "rad/s" else rotation_unit(speed) if not units[1].si else ""
+    if not turning:
+        return None
+    if units[0].si == "m":
+        return Gear(units[0].unit, turning, slope * _factor(units[0].unit) / _factor(turning), correlation)
+    if units[0].si or motion_kind("position", channels) == "angle" or whole_numbers(position):
+        return None
+    for unit in _LENGTHS:
+        travel = slope * _factor(unit) / _factor(turning)
+        if _GEARS[0] <= abs(travel) <= _GEARS[1]:
+            return Gear(unit, turning, travel, correlation)
+    return None
+
+
+def _is_motor(channels: Channels, ratio: Ratio | None, messages_si: bool) -> tuple[bool, str]:
+    for name in ("position", "speed", "torque"):
+        if name in channels.found and any("motor" in word for word in words(channels.found[name].stream.name)):
+            return True, f"'{channels.found[name].stream.name}' tells of a motor"
+    speed = channels.found["speed"].stream if "speed" in channels.found else None
+    if speed is not None and "rpm" in (stated("speed", speed).unit, rotation_unit(speed)):
+        return True, f"'{speed.name}' is a speed of rotation, as motors have"
+    fitting = ratio.fitting[0] if ratio is not None and ratio.fitting else None
+    for name in ("position", "speed"):
+        if name not in channels.found:
+            continue
+        stream = channels.found[name].stream
+        usual = "rad" if messages_si else getattr(fitting, name) if fitting is not None else "1"
+        known = find_unit(stated(name, stream).unit or usual)
+        if known is None or known.si not in ("rad", "rad/s"):
+            continue
+        if known.factor * float(np.nanmax(np.abs(stream.values))) > _MOTOR_RANGE:
+            limit = f"{_MOTOR_RANGE:g} {'rad' if messages_si else known.si}"
+            return True, f"'{stream.name}' goes beyond {limit}, as only a motor does"
+    return False, "nothing tells of a motor"
+
+
+def _kinds(channels: Channels) -> set[str]:
+    return {motion_kind(name, channels) for name in ("position", "speed")}
+
+
+def _factor(unit: str) -> float:
+    known = find_unit(unit)
+    return known.factor if known is not None else 1.0

@@ -1,0 +1,144 @@
+"""Evidence from the numbers: whose derivative fits whom, what moves as a drive does. Offline: for drafts only.
+
+Increments over some hundred windows are compared, so that neither noise nor a resolution of the encoder decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.recording import FloatArray
+from cdtool.workflows.init.streams import Stream
+
+_WINDOWS = 400
+_SURE = 0.9
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well one stream follows another: correlation and slope, medians of the joints that move.
+
+    The slope is that of joints which follow surely; NaN where none does.
+    """
+
+    correlation: float
+    slope: float
+
+
+_NONE = Fit(0.0, float("nan"))
+
+
+def integral_fit(position: Stream, speed: Stream) -> Fit:
+    """Increments of the position against those of the integrated speed."""
+    if position.width != speed.width or len(speed.time) < 3:
+        return _NONE
+    steps = np.diff(speed.time)[:, np.newaxis]
+    filled = np.nan_to_num(speed.values)
+    path = np.vstack((np.zeros((1, speed.width)), np.cumsum(0.5 * steps * (filled[1:] + filled[:-1]), axis=0)))
+    return _fit(_at(speed.time, path, position.time), position.values)
+
+
+def derivative_fit(acceleration: Stream, speed: Stream) -> Fit:
+    """The integrated acceleration against increments of the speed; a negative correlation: the other sign."""
+    return integral_fit(speed, acceleration)
+
+
+def likeness(one: Stream, other: Stream) -> float:
+    """Correlation of two streams as they stand, the median of the joints that move: of a set value and what follows."""
+    if one.width != other.width:
+        return 0.0
+    first, second = np.nan_to_num(_at(one.time, one.values, other.time)), np.nan_to_num(other.values)
+    known = [j for j in range(one.width) if np.ptp(first[:, j]) and np.ptp(second[:, j])]
+    found = [float(np.corrcoef(first[:, j], second[:, j])[0, 1]) for j in known]
+    return float(np.median(found)) if found else 0.0
+
+
+def drive_fit(drive: Stream, speed: Stream) -> float:
+    """Share of a stream's variance that inertia and friction explain: R2 of [dv/dt, v, sign v, 1], the joints' median.
+
+    A drive's torque or current moves so; with gravity the share is smaller.
+    """
+    if drive.width != speed.width:
+        return 0.0
+    window = max(1, len(speed.time) // _WINDOWS)
+    time, velocity = speed.time[::window], _averaged(np.nan_to_num(speed.values), window)
+    effort = _averaged(np.nan_to_num(_at(drive.time, drive.values, speed.time)), window)
+    if len(time) < 8:
+        return 0.0
+    shares = []
+    for j in range(drive.width):
+        v, tau = velocity[:, j], effort[:, j]
+        if not np.ptp(v) or not np.ptp(tau):
+            continue
+        moving = np.sign(np.where(np.abs(v) > 0.02 * np.max(np.abs(v)), v, 0.0))
+        known = np.column_stack((np.gradient(v, time), v, moving, np.ones_like(v)))
+        rest = tau - known @ np.linalg.lstsq(known, tau, rcond=None)[0]
+        shares.append(1.0 - float(np.var(rest) / np.var(tau)))
+    return float(np.median(shares)) if shares else 0.0
+
+
+def roughness(stream: Stream) -> float:
+    """How much a stream shakes from sample to sample, in parts of its range: a set value shakes least."""
+    values = np.nan_to_num(stream.values)
+    span = float(np.max(np.ptp(values, axis=0)))
+    return float(np.sqrt(np.mean(np.diff(values, n=2, axis=0) ** 2))) / span if span and len(values) > 2 else np.inf
+
+
+def rests_and_peaks(stream: Stream) -> bool:
+    """True for a load cell's course: at one level for most of the time, short and high peaks, no whole numbers."""
+    values = stream.values[np.isfinite(stream.values)]
+    if len(values) < 20 or not np.ptp(values) or np.array_equal(values, np.rint(values)):
+        return False
+    away = np.abs(values - np.median(values))
+    return float(np.mean(away < 0.03 * np.max(away))) > 0.8 and float(np.max(away)) > 20.0 * float(np.median(away))
+
+
+def blocks(streams: list[Stream]) -> tuple[int, int, float] | None:
+    """In columns without names: (first, J, correlation) of J positions with their J speeds right behind them."""
+    best: tuple[int, int, float] | None = None
+    for joints in range(1, len(streams) // 2 + 1):
+        for first in range(len(streams) - 2 * joints + 1):
+            pairs = [(streams[first + j], streams[first + joints + j]) for j in range(joints)]
+            fits = [integral_fit(*pair).correlation for pair in pairs if _stirs(*pair)]
+            good = len(fits) >= max(1, (joints + 1) // 2) and min(fits) > 0.9
+            if good and (best is None or joints > best[1]):
+                best = first, joints, float(np.median(fits))
+    return best
+
+
+def _stirs(position: Stream, speed: Stream) -> bool:
+    """False for a joint that stands still: what it shows is noise."""
+    way = float(np.ptp(np.nan_to_num(position.values)))
+    return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))
+
+
+def _fit(ways: FloatArray, places: FloatArray) -> Fit:
+    window = max(1, len(places) // _WINDOWS)
+    there, here = np.diff(ways[::window], axis=0), np.diff(places[::window], axis=0)
+    correlations, slopes = [], []
+    for j in range(places.shape[1]):
+        known = np.isfinite(there[:, j]) & np.isfinite(here[:, j])
+        x, y = there[known, j], here[known, j]
+        power = float(x @ x), float(y @ y)
+        if min(power) <= 0.0 or len(x) < 3:
+            continue
+        correlations.append(float(x @ y) / np.sqrt(power[0] * power[1]))
+        if abs(correlations[-1]) > _SURE:
+            slopes.append(float(x @ y) / power[0])
+    slope = float(np.median(slopes)) if slopes else float("nan")
+    return Fit(float(np.median(correlations)) if correlations else 0.0, slope)
+
+
+def _at(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
+    if len(time) == len(clock) and np.array_equal(time, clock):
+        return values
+    return np.column_stack([np.interp(clock, time, column) for column in values.T])
+
+
+def _averaged(values: FloatArray, window: int) -> FloatArray:
+    starts = np.arange(0, len(values), window)
+    counts = np.diff(np.append(starts, len(values)))[:, np.newaxis]
+    mean: FloatArray = np.add.reduceat(values, starts, axis=0) / counts
+    return mean

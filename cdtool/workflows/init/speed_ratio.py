@@ -1,0 +1,212 @@
+"""Units of clock, position and speed, weighed together: what fits the ratio of the position's derivative to the speed?
+
+With the log's own numbers x of the position and v of the speed, dx / (v dt) = f_speed f_clock / f_position, where f are
+the factors to SI: ms with m and m/s give 0.001, as do s with m and mm/s. So all combinations that fit are named.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.units import find_unit
+from cdtool.workflows.init import motion_evidence as motion
+from cdtool.workflows.init.quantity_words import motion_of, words
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.table_clock import TableClock, seconds
+from cdtool.workflows.init.units_in_names import label, own_name, unit_in_name
+
+# Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
+_PAIRS = (
+    ("rad", "rad/s"), ("m", "m/s"), ("mm", "mm/s"), ("deg", "deg/s"), ("rad", "rpm"), ("deg", "rpm"), ("rev", "rpm"),
+    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("m", "m/min"), ("rad", "deg/s"),
+)  # fmt: skip
+# A ratio fits within this; within the second it leaves no doubt.
+_NEAR, _SURE = 0.02, 0.01
+# What is so much less likely than the likeliest is not named: stamps in minutes at 17 Hz.
+_FAR = 2.5
+_RPM = ("n", "rpm", "motor")
+_RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
+
+
+@dataclass(frozen=True)
+class Stated:
+    """The unit that a log states for a channel; `by`: "log" (its header), "name", or "" where it states none."""
+
+    unit: str = ""
+    by: str = ""
+
+    @property
+    def si(self) -> str:
+        """The SI unit of its dimension, empty where none is known."""
+        known = find_unit(self.unit) if self.unit else None
+        return known.si if known is not None else ""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Units that fit together, how unlikely they are, and how far the ratio is from theirs (relative).
+
+    `named`: unit or name of the position tell of an angle or a travel as these units do. An empty clock is told.
+    """
+
+    clock: str
+    position: str
+    speed: str
+    unlikely: float
+    off: float
+    named: bool
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """What position and speed say together: `raw` is dx / (v dt) in the log's units of both and in assumed seconds.
+
+    `fitting` are the units that go with it, the likeliest first; `correlation` says how surely one follows the other.
+    `tick` [s] is the step from count to count that the likeliest units ask for; 0 where the clock is no mere counter.
+    """
+
+    raw: float
+    assumed: float
+    correlation: float
+    fitting: tuple[Combination, ...] = ()
+    tick: float = 0.0
+
+    def per_second(self, clock: str) -> float:
+        """dx / (v dt) with the time in seconds, if the clock is in this unit (empty: as assumed, or as its ticks)."""
+        if self.tick:
+            return self.raw * self.assumed / self.tick
+        return self.raw * self.assumed / seconds(clock) if clock else self.raw
+
+    @property
+    def certain(self) -> bool:
+        """True where one combination alone fits, well, and the names tell of the same.
+
+        Without the names a gear might have that ratio: 1 m a turn is that of turns and 1/min.
+        """
+        first = self.fitting[0]
+        return len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
+
+
+def stated(channel: str, stream: Stream) -> Stated:
+    """The unit in the header, else the one that the name ends with."""
+    if stream.unit and find_unit(stream.unit):
+        return Stated(stream.unit, "log")
+    unit = unit_in_name(channel.removeprefix("reference_"), own_name(stream))
+    return Stated(unit, "name" if unit else "")
+
+
+def motion_kind(channel: str, channels: Channels) -> str:
+    """ "angle" or "length", as unit or name tell; "raw" for counts, percent and volts; empty where nothing tells."""
+    if channel not in channels.found:
+        return ""
+    stream = channels.found[channel].stream
+    si = stated(channel, stream).si
+    if si:
+        return {"m": "length", "m/s": "length", "rad": "angle", "rad/s": "angle"}.get(si, "raw")
+    return motion_of(label(stream))
+
+
+def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) -> Ratio | None:
+    """Position over speed and all units that fit; None where one of the two is missing or does not follow the other.
+
+    `messages_si`: the type of the messages says that both are in SI units.
+    """
+    if not {"position", "speed"} <= channels.found.keys():
+        return None
+    position, speed = (channels.found[name].stream for name in ("position", "speed"))
+    fit = motion.integral_fit(position, speed)
+    if not math.isfinite(fit.slope) or fit.slope == 0.0:
+        return None
+    bare = Ratio(fit.slope, clock.assumed if clock is not None else 1.0, fit.correlation)
+    pairs = _pairs(channels, messages_si)
+    if clock is not None and clock.counts and not clock.told:
+        bare = replace(bare, tick=_tick(channels, bare, pairs))
+        clocks: tuple[str, ...] = ("",) if bare.tick else ()
+    else:
+        clocks = clock.units() if clock is not None else ("",)
+    found = [
+        made
+        for unit in clocks
+        for rank, pair in enumerate(pairs)
+        if (made := _combination(channels, clock, unit, pair, rank, bare)) is not None
+    ]
+    found.sort(key=lambda item: item.unlikely)
+    likely = tuple(item for item in found if item.unlikely < found[0].unlikely + _FAR)
+    return replace(bare, fitting=likely)
+
+
+def rotation_unit(stream: Stream) -> str:
+    """The unit of a speed of rotation, by its name."""
+    parts = words(label(stream))
+    if any(part in _RPM or "drehzahl" in part or "motor" in part for part in parts):
+        return "rpm"
+    return "rad/s" if any(part in _RAD_S for part in parts) else ""
+
+
+def whole_numbers(stream: Stream) -> bool:
+    """True for counts: no value lies between two whole numbers, and there are many."""
+    seen = stream.values[np.isfinite(stream.values)]
+    return bool(np.array_equal(seen, np.rint(seen))) and len(np.unique(seen)) > 50
+
+
+def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
+    """Units of position and speed that may be: the header's where it states one, a name's beside the usual ones."""
+    if messages_si:
+        return list(_PAIRS[:2])
+    position, speed = (stated(name, channels.found[name].stream) for name in ("position", "speed"))
+    known = [(position.unit if position.by == "log" else p, speed.unit if speed.by == "log" else s) for p, s in _PAIRS]
+    named = [(position.unit or p, speed.unit or s) for p, s in known]
+    kinds = {motion_kind(name, channels) for name in ("position", "speed")}
+    told = kinds & {"length", "angle"} if not {"length", "angle"} <= kinds or (position.si and speed.si) else set()
+    return [
+        pair
+        for pair in dict.fromkeys((*known, *named))
+        if _si(pair[1]) == f"{_si(pair[0])}/s" and all(_si(pair[0]) == {"length": "m", "angle": "rad"}[x] for x in told)
+    ]
+
+
+def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> float:
+    """The step [s] of a counter that makes the likeliest units fit."""
+    ticks = [bare.raw * bare.assumed * _factor(position) / _factor(speed) for position, speed in pairs]
+    made = [
+        _combination(channels, None, "", pair, rank, replace(bare, tick=tick))
+        for rank, (pair, tick) in enumerate(zip(pairs, ticks, strict=True))
+        if tick > 0.0
+    ]
+    likely = [(item.unlikely, tick) for item, tick in zip(made, ticks, strict=False) if item is not None]
+    return min(likely)[1] if likely else 0.0
+
+
+def _combination(
+    channels: Channels, clock: TableClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
+) -> Combination | None:
+    off = abs(bare.per_second(unit) * _factor(pair[0]) / _factor(pair[1]) - 1.0)
+    if off > _NEAR:
+        return None
+    unlikely = 0.05 * rank + (clock.unlikely(unit) if clock is not None and unit and not clock.told else 0.0)
+    kind = "length" if _si(pair[0]) == "m" else "angle"
+    if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
+        unlikely += 0.5  # m with mm/s
+    # Without any word one joint slides, and several turn.
+    unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 else "length"))
+    for channel, logged in zip(("position", "speed"), pair, strict=True):
+        stream = channels.found[channel].stream
+        told = stated(channel, stream)
+        if told.by == "name":
+            unlikely += 2.0 * (find_unit(told.unit) != find_unit(logged))
+        elif not told.by and channel == "speed" and (usual := rotation_unit(stream)):
+            unlikely += 1.0 * (usual != logged)
+    return Combination(unit, *pair, unlikely, off, motion_kind("position", channels) == kind)
+
+
+def _si(unit: str) -> str:
+    known = find_unit(unit)
+    return known.si if known is not None else ""
+
+
+def _factor(unit: str) -> float:
+    known = find_unit(unit)
+    return known.factor if known is not None else 1.0

@@ -1,0 +1,106 @@
+"""Which column is a table's clock, and does anything tell its unit? Else its steps and the ratio must."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.clock.plausible_unit import contradicted_by_epoch
+from cdtool.formats.source import Column, Source
+from cdtool.recording import MEASURED
+from cdtool.units import find_unit
+from cdtool.workflows.clock_guess import GuessedClock, guess_clock
+from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
+from cdtool.workflows.init.units_in_names import unit_in_name
+
+_UNITS = ("s", "ms", "us", "ns", "min")
+# Sampling rates [Hz] that logs of a machine have, and those that a log may have.
+_USUAL, _POSSIBLE = (20.0, 20e3), (0.5, 500e3)
+_RARE = 2.0  # how much less likely minutes are than a rate beyond the usual ones
+
+
+@dataclass(frozen=True)
+class TableClock:
+    """A table's clock: the median `step` of its stamps, in its own unit, and the seconds of one that were assumed.
+
+    `told` says what names the unit for sure; empty: `unit` is what the steps are likely to be in.
+    """
+
+    column: str
+    step: float
+    assumed: float
+    unit: str
+    told: str
+    counts: bool = False
+
+    def units(self) -> tuple[str, ...]:
+        """Units that its stamps may be in; none of a mere counter."""
+        if self.told:
+            return (self.unit,)
+        return () if self.counts else tuple(unit for unit in _UNITS if self.unlikely(unit) < 2 * _RARE)
+
+    def unlikely(self, unit: str) -> float:
+        """0 where the unit gives a usual sampling rate, more where not."""
+        rate = 1.0 / (self.step * seconds(unit))
+        rare = _RARE if unit == "min" else 0.0
+        if _USUAL[0] <= rate <= _USUAL[1]:
+            return rare
+        return 1.0 + rare if _POSSIBLE[0] <= rate <= _POSSIBLE[1] else 2 * _RARE
+
+
+def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
+    """The clock of a table and its times; None where no column looks like one."""
+    found = _complete(source) or guess_clock(source)
+    if found is None:
+        return None
+    column = source.columns[found.column]
+    values = column.values[np.isfinite(column.values)]
+    step = float(np.median(np.diff(values)))
+    assumed, taken_off = _assumed(column, found)
+    unit = min(_UNITS, key=lambda name: abs(np.log(assumed / seconds(name))))
+    clock = TableClock(found.column, step, assumed, unit, "", is_counter(found.column))
+    stated = find_unit(column.unit) if column.unit else None
+    against = ""
+    if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):
+        against, stated = f", against its header, which says {column.unit}", None
+    if stated is not None and stated.si == "s":
+        return replace(clock, unit=str(column.unit), told="the header, which names the unit"), found
+    if taken_off:
+        # A table's reader makes seconds of days.
+        days = assumed > 2.0 * seconds("min")
+        return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
+    named = unit_in_name("time", found.column)
+    if named and clock.unlikely(named) < 2 * _RARE:
+        return replace(clock, unit=named, told="the unit in its name"), found
+    return replace(clock, unit=min(clock.units() or (unit,), key=clock.unlikely)), found
+
+
+def seconds(unit: str) -> float:
+    """A unit of time in seconds."""
+    known = find_unit(unit)
+    return known.factor if known is not None else 1.0
+
+
+def _complete(source: Source) -> GuessedClock | None:
+    """The clock among columns without empty cells; None where these hold no column whose name tells of one."""
+    whole = {name: column for name, column in source.columns.items() if np.isfinite(column.values).all()}
+    if len(whole) == len(source.columns) or not whole:
+        return None
+    found = guess_clock(replace(source, columns=whole))
+    if found is None or not is_clock(found.column) or any(word_for(name, found.column)[0] for name in MEASURED):
+        return None
+    return found
+
+
+def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:
+    """Seconds of one unit of the stamps, as the guess took them; and whether it took the start off."""
+    known = column.values[np.isfinite(column.values)]
+    steps = np.diff(known)
+    steps = steps[steps > 0.0]  # the median of them: a wild stamp must not decide
+    factor = float(np.median(np.diff(found.time)) / np.median(steps)) if len(steps) and len(found.time) > 1 else 1.0
+    return abs(factor) or 1.0, found.time[0] == 0.0 and bool(np.median(known) > 0.0 and known[0] != 0.0)
+
+
+def _since(start: float, days: bool) -> str:
+    return f"its start, {start:.9g} days of Excel" if days else f"its start, {start:.0f} after 1970"

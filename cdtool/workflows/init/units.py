@@ -1,0 +1,210 @@
+"""In which unit is a channel logged? Header, message type, ratio of position to speed or name; else a question."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.units import find_unit
+from cdtool.workflows.init.machine_side import Side
+from cdtool.workflows.init.quantity_words import words
+from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.units_in_names import label
+
+_RAW = ("A", "V", "1", "count")
+# Types of messages whose numbers are in SI units by the convention of ROS (REP 103).
+_SI_PACKAGES = ("sensor_msgs", "geometry_msgs", "nav_msgs", "control_msgs", "trajectory_msgs")
+_MOTION = ("position", "speed")
+
+
+@dataclass(frozen=True)
+class Logged:
+    """A unit with its scale (None: 1), why it is thought so, and what is to be checked (empty: it is known).
+
+    An empty unit is that of the messages' type, which a machine file need not name.
+    """
+
+    unit: str
+    why: str
+    scale: tuple[float, ...] | None = None
+    check: str = ""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that tells of units: the channels, the machine they are of, the ratio, the clock, types of messages."""
+
+    channels: Channels
+    side: Side
+    ratio: Ratio | None
+    clock_unit: str
+    clock_told: bool
+    message_types: dict[str, str]
+
+    def logged(self, channel: str) -> Logged:
+        """Unit and scale of one channel; a raw one's scale, and what no evidence tells, is to be checked."""
+        stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
+        quantity = channel.removeprefix("reference_")
+        told = stated(channel, stream)
+        if told.by == "log" and not (quantity == "position" and told.si == "count"):
+            return self._told(channel, told.unit, told.si, accepted)
+        if is_si(self.message_types.get(stream.topic, "")):
+            why = f"messages of type {self.message_types[stream.topic]} are in SI units"
+            return Logged("", why, check=self._contradicted(channel))
+        if channel != quantity and quantity in self.channels.found and not told.unit:
+            same = self.logged(quantity)
+            return Logged(
+                same.unit or accepted[0],
+                f"as the measured {quantity}",
+                same.scale,
+                same.check or "not told: is it logged alike?",
+            )
+        if quantity in _MOTION:
+            return self._of_motion(channel)
+        if told.unit:
+            return self._named(told.unit, told.si, accepted)
+        if quantity == "torque":
+            return _of_torque(stream, accepted, self.channels.joints)
+        largest = float(np.nanmax(np.abs(stream.values)))
+        return Logged(
+            accepted[0], "", check=f"the unit is not told; values reach {largest:.3g}: {others(accepted[0])}?"
+        )
+
+    def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
+        if si in accepted:
+            return Logged(unit, "the log says so", check=self._contradicted(channel))
+        if si in _RAW:
+            return _raw(unit, accepted[0], self.channels.joints, "the log says so")
+        return Logged(unit, "the log says so", check=f"with this type and these coordinates it is {accepted[0]}")
+
+    def _named(self, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
+        if si in _RAW:
+            return _raw(unit, accepted[0], self.channels.joints, "read off its name")
+        check = "" if si in accepted else f"with this type and these coordinates it is {accepted[0]}"
+        return Logged(unit, "read off its name", check=check or "only its name tells it")
+
+    def _of_motion(self, channel: str) -> Logged:
+        quantity = channel.removeprefix("reference_")
+        stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
+        told = stated(channel, stream)
+        if channel == quantity and self.side.gear is not None:
+            unit = self.side.gear.position if quantity == "position" else self.side.gear.speed
+            why = "read off its name" if told.unit else "" if quantity == "position" else "its name"
+            return Logged(unit, why, check=f"not told for certain: {others(unit)}? The transmission ratio hangs on it")
+        if channel == quantity and self.ratio is not None and self.ratio.fitting and told.si not in _RAW:
+            return self._fitting(quantity)
+        if quantity == "position" and (told.si == "count" or self._counts(channel)):
+            return self._counted(channel, told.unit or "count")
+        if told.unit:
+            return self._named(told.unit, told.si, accepted)
+        usual = self._usual(quantity, stream, accepted)
+        return Logged(usual, "", check=f"not told: {others(usual)}?")
+
+    def _fitting(self, quantity: str) -> Logged:
+        assert self.ratio is not None
+        first, *rest = self.ratio.fitting
+        clock = f" (clock in {first.clock})" if first.clock and not self.clock_told else ""
+        per_second = self.ratio.per_second(first.clock)
+        text = f"the position's derivative is {per_second:.4g} of the speed{clock}: {first.position} and {first.speed}"
+        agreed = all(
+            find_unit(stated(name, self.channels.found[name].stream).unit) == find_unit(unit)
+            for name, unit in (("position", first.position), ("speed", first.speed))
+        )
+        check = ""
+        if not (self.ratio.certain or (agreed and self.clock_told)):
+            check = f"not told for certain; {self._rest(len(rest) > 0)}"
+        return Logged(getattr(first, quantity), text, check=check)
+
+    def _rest(self, several: bool) -> str:
+        assert self.ratio is not None
+        if not several:
+            off = 100 * self.ratio.fitting[0].off
+            return "a gear may have this ratio, too" if off < 1.0 else f"the ratio is {off:.1f} % off"
+        return f"{fits_as_well(self.ratio, self.clock_told)} as well"
+
+    def _counts(self, channel: str) -> bool:
+        """True for a position that no unit explains: an encoder's counts."""
+        stream = self.channels.found[channel].stream
+        own = self.ratio is not None and channel == "position"
+        return not stated(channel, stream).unit and (own or whole_numbers(stream))
+
+    def _counted(self, channel: str, unit: str) -> Logged:
+        accepted, joints = self.side.accepted(channel)[0], self.channels.joints
+        if self.ratio is None:
+            return _raw(unit, accepted, joints, "whole numbers" if unit == "count" else "")
+        speed = self.logged("speed")
+        known = find_unit(speed.unit)
+        si, factor = (known.si, known.factor) if known is not None else ("rad/s", 1.0)
+        si = self.side.accepted("speed")[0] if si in _RAW else si
+        factor *= speed.scale[0] if speed.scale else 1.0
+        slope = self.ratio.per_second(self.clock_unit)
+        scale = (float(f"{factor / slope:.5g}"),) * joints
+        per = f"{si.removesuffix('/s')} per count, from the ratio {slope:.4g} to the speed in {speed.unit or si}"
+        return Logged(unit, per, scale, check="right only if the speed's unit, its scale and the clock are")
+
+    def _usual(self, quantity: str, stream: Stream, accepted: tuple[str, ...]) -> str:
+        if quantity == "speed" and "rad/s" in accepted and (usual := rotation_unit(stream)):
+            return usual
+        if quantity == "position" and len(accepted) > 1 and motion_kind("position", self.channels) == "length":
+            return accepted[1]
+        return accepted[0]
+
+    def _contradicted(self, channel: str) -> str:
+        """What is odd about units of position and speed that are told, both."""
+        if channel not in _MOTION or self.ratio is None or self.ratio.fitting or self.side.gear is not None:
+            return ""
+        streams = [self.channels.found[name].stream for name in _MOTION]
+        if all(is_si(self.message_types.get(stream.topic, "")) for stream in streams):
+            return f"the position's derivative is {self.ratio.raw:.4g} of the speed: in SI units it were 1"
+        known = [find_unit(stated(name, stream).unit) for name, stream in zip(_MOTION, streams, strict=True)]
+        factors = [unit.factor for unit in known if unit is not None and unit.si not in _RAW]
+        if len(factors) < 2:
+            return ""
+        slope = self.ratio.per_second(self.clock_unit) * factors[0] / factors[1]
+        return f"with these units the position's derivative is {slope:.4g} of the speed, not 1"
+
+
+def is_si(message_type: str) -> bool:
+    """True for a type of message whose units are SI by convention: `sensor_msgs/msg/JointState`."""
+    return message_type.split("/")[0].split(".")[0] in _SI_PACKAGES
+
+
+def fits_as_well(ratio: Ratio, clock_told: bool) -> str:
+    """The combinations that fit besides the first: "s with m, mm/s; ms with mm, mm/s fit"."""
+    texts = [
+        f"{'' if clock_told or not item.clock else f'{item.clock} with '}{item.position}, {item.speed}"
+        for item in ratio.fitting[1:]
+    ]
+    return f"{'; '.join(texts)} {'fit' if len(texts) > 1 else 'fits'}"
+
+
+def others(unit: str) -> str:
+    """A unit and those that it may be instead."""
+    alike = {
+        "N": "N or kN", "N m": "N m or mN m", "m/s2": "m/s2 or g", "rad": "rad or deg", "rad/s": "rad/s or deg/s",
+        "m": "m or mm", "mm": "mm or m", "m/s": "m/s or mm/s", "rad/s2": "rad/s2 or deg/s2", "rpm": "rpm or rad/s",
+    }  # fmt: skip
+    return alike.get(unit, unit)
+
+
+def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged:
+    parts = words(label(stream))
+    whole = "".join(parts)
+    if "current" in whole or "strom" in whole or any(part in ("i", "iq", "amps") for part in parts):
+        return _raw("A", accepted[0], joints, "its name")
+    if any(long in whole for long in ("torque", "moment", "effort", "kraft", "force")) or "tau" in parts:
+        unit = accepted[-1] if "force" in whole or "kraft" in whole else accepted[0]
+        return Logged(unit, "its name", check=f"{_reach(stream)}: {others(unit)}?")
+    return _raw("1", accepted[0], joints, "")
+
+
+def _raw(unit: str, target: str, joints: int, why: str) -> Logged:
+    per = f"{target} at 100 %" if unit == "%" else f"{target} per {unit}"
+    return Logged(unit, why, (1.0,) * joints, f"the scale 1 is a placeholder: {per}")
+
+
+def _reach(stream: Stream) -> str:
+    largest = float(np.nanmax(np.abs(stream.values)))
+    return f"values reach {largest:.0f}" if 1000.0 <= largest < 1e7 else f"values reach {largest:.3g}"

@@ -1,0 +1,103 @@
+"""Units in names: `LogTime_ms`, `velocity_mps`, `motor_torque_nm`, `rpm`; and what of a name is left without them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from cdtool.formats.source import split_unit
+from cdtool.recording import MEASURED
+from cdtool.units import find_unit
+from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
+from cdtool.workflows.init.streams import Stream
+
+_QUANTITIES = (*MEASURED, "force")
+# What can be logged for a quantity, whatever the machine: SI units, and those that a scale makes one of these.
+_MEASURES: Mapping[str, tuple[str, ...]] = {
+    "time": ("s",),
+    "position": ("rad", "m", "count", "1", "V"),
+    "speed": ("rad/s", "m/s", "count", "1", "V"),
+    "acceleration": ("m/s2", "rad/s2", "count", "1", "V"),
+    "torque": ("N m", "N", "A", "count", "1", "V"),
+    "force": ("N", "count", "1", "V"),
+}
+# Tails of names in lower case; of one letter only the first kind stands for itself, `F_N`, where case tells.
+_CAPITALS = {"N": "N", "A": "A", "V": "V"}
+_TAILS = {
+    "s": "s", "ms": "ms", "us": "us", "ns": "ns", "min": "min", "sec": "s",
+    "rad": "rad", "mrad": "mrad", "deg": "deg", "rev": "rev", "mm": "mm", "cm": "cm", "um": "um", "m": "m",
+    "rpm": "rpm", "mps": "m/s", "mmps": "mm/s", "rads": "rad/s", "radps": "rad/s", "degs": "deg/s", "degps": "deg/s",
+    "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_min": "m/min", "u_min": "rpm", "1_min": "rpm",
+    "m_s2": "m/s2", "rad_s2": "rad/s2", "mps2": "m/s2", "g": "g", "mg": "mg",
+    "n": "N", "kn": "kN", "mn": "mN", "nm": "N m", "mnm": "mN m", "knm": "kN m", "n_m": "N m", "kg": "kgf",
+    "kgf": "kgf", "a": "A", "ma": "mA", "v": "V", "mv": "mV", "percent": "%", "prozent": "%", "pct": "%",
+    "counts": "count", "count": "count", "cnt": "count", "cnts": "count", "inc": "count", "ticks": "count",
+}  # fmt: skip
+_SEPARATOR = re.compile(r"[\W_]+")
+
+
+def own_name(stream: Stream) -> str:
+    """A column's name or a field's; a topic's says something only where the field's does not (`data`)."""
+    if not stream.topic:
+        return split_unit(stream.name)[0] if stream.unit else stream.name
+    plain = stream.field.split("[")[0] == "data"
+    return f"{stream.topic} {stream.field}" if plain else stream.field
+
+
+def label(stream: Stream) -> str:
+    """A stream's name without the unit that it ends with."""
+    name = own_name(stream)
+    rest, tail, unit = _split(name)
+    if not rest or not unit:
+        return name
+    asked = [quantity for quantity in _QUANTITIES if word_for(quantity, rest)[0]] + ["time"] * is_clock(rest)
+    if any(unit_in_name(quantity, name) for quantity in asked) or (not asked and _stands_for_itself(rest, tail)):
+        return rest
+    return name
+
+
+def unit_in_name(quantity: str, name: str) -> str:
+    """The unit at the end of a name, where it measures that quantity; empty where there is none.
+
+    Not every tail is one: `tau_m` is a motor's torque, `phi_m` its angle.
+    """
+    rest, _, unit = _split(name)
+    if not unit or not _measures(quantity, unit):
+        return ""
+    whole = "".join(words(rest))
+    if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ["q"]):
+        return ""
+    if unit == "N" and quantity == "torque" and not ("force" in whole or "kraft" in whole):
+        return ""
+    if unit == "kgf" and quantity != "force":
+        return ""
+    return unit
+
+
+def may_be(quantity: str, stream: Stream) -> bool:
+    """False where the unit in the header, or one in the name that means nothing else, is none of that quantity."""
+    if stream.unit and find_unit(stream.unit):
+        return _measures(quantity, stream.unit)
+    rest, tail, unit = _split(own_name(stream))
+    return not unit or _measures(quantity, unit) or not _stands_for_itself(rest, tail)
+
+
+def _measures(quantity: str, unit: str) -> bool:
+    known = find_unit(unit)
+    return known is not None and known.si in _MEASURES[quantity]
+
+
+def _split(name: str) -> tuple[str, str, str]:
+    """(what stands before it, the tail, its unit); empty where a name has no such tail."""
+    parts = [part for part in _SEPARATOR.split(name) if part]
+    for count in (2, 1):
+        tail = "_".join(parts[-count:])
+        unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
+        if unit and (len(parts) > count or tail.lower() == "rpm"):
+            return "_".join(parts[:-count]), tail, unit
+    return name, "", ""
+
+
+def _stands_for_itself(rest: str, tail: str) -> bool:
+    """True for a tail that is a unit whatever stands before it: `_mm`, `pulses_N`; not `MOTOR_N`, `tau_m`."""
+    return len(tail) > 1 if tail not in _CAPITALS else rest != rest.upper()

@@ -1,0 +1,56 @@
+"""The safety factor for a false-alarm budget, set on impact-free runs by cross-validation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cdtool.activation import Activation
+from cdtool.errors import SignatureError, UsageError
+from cdtool.evaluation.false_alarm_budget import Budget, Calibrated, set_factor
+from cdtool.evaluation.results import Skipped
+from cdtool.pipeline import Detection, judge
+from cdtool.workflows.signature.fitting import Fit, Pair
+
+# Runs are judged by what the other nine tenths teach.
+FOLDS = 10
+
+
+def in_fixed_order(pairs: Sequence[Pair]) -> list[Pair]:
+    """The runs in an order that is not that of their files: which runs judge which must not hang on it."""
+    return sorted(pairs, key=lambda pair: (pair[0].recording.digest, pair[0].number, pair[0].name))
+
+
+def kept(pairs: Sequence[Pair], skipped: Sequence[Skipped]) -> list[Pair]:
+    """The runs that were not left out."""
+    names = {item.recording for item in skipped}
+    return [pair for pair in pairs if pair[0].name not in names]
+
+
+def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, activation: Activation) -> Calibrated:
+    """The safety factor for a budget, set on every run, each judged by thresholds learned from runs of other folds.
+
+    Raises UsageError where the runs are too few for the budget, or nine tenths of them to learn from.
+    """
+    if budget.per == "operation":
+        budget.check(len(pairs), detector)
+    detections: list[Detection] = []
+    for fold in range(FOLDS):
+        others = [pair for i, pair in enumerate(pairs) if i % FOLDS != fold]
+        try:
+            fitted = fit(others)
+        except SignatureError as fault:
+            raise _too_few(budget, detector, fault.message) from fault
+        if fitted.skipped:
+            raise _too_few(budget, detector, fitted.skipped[0].reason)
+        held_out = [pair for i, pair in enumerate(pairs) if i % FOLDS == fold]
+        detections += [
+            judge(operation, detector, signal, fitted.thresholds, activation) for operation, signal in held_out
+        ]
+    return set_factor(budget, detector, detections, activation)
+
+
+def _too_few(budget: Budget, detector: str, why: str) -> UsageError:
+    return UsageError(
+        f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {why}",
+        "add runs (of each class of motion), or do without a budget",
+    )

@@ -1,0 +1,152 @@
+"""Fitting a threshold to impact-free runs: a detector's signals, classes of motion, what was used and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+from cdtool.detection import Signal
+from cdtool.errors import CdtoolError, SignatureError
+from cdtool.evaluation.results import Skipped
+from cdtool.operations import Operation
+from cdtool.pipeline import run_detector_on_each
+from cdtool.plain_text import counted
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.contract import checked_fit
+from cdtool.thresholds.settings import with_context
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.signature.grouping import by_class
+
+Pair = tuple[Operation, Signal]
+
+
+class NoUsableRunError(SignatureError):
+    """A detector can be used on none of the runs: mostly they lack a channel that it needs; `reason` is the first."""
+
+    def __init__(self, detector: str, reason: str) -> None:
+        first = f"; first reason: {reason}" if reason else ""
+        super().__init__(f"no run that {detector} can be used on{first}", "check with cdtool info")
+        self.reason = reason
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Fitted thresholds with the operations that each was learned from, and the operations left out."""
+
+    thresholds: tuple[FittedThreshold, ...]
+    learned_from: tuple[tuple[Operation, ...], ...]
+    skipped: tuple[Skipped, ...]
+
+    @property
+    def used(self) -> tuple[Operation, ...]:
+        """All operations that were learned from."""
+        return tuple(operation for operations in self.learned_from for operation in operations)
+
+
+Fit = Callable[[Sequence[Pair]], Fitted]
+
+
+def fitting(rule: Any) -> Fit:
+    """How that rule learns of runs: each class of motion apart where it is `by_class`, all together otherwise.
+
+    The function raises SignatureError where nothing can be learned.
+    """
+    by_class = getattr(rule, "by_class", False)
+    return lambda pairs: _fit_classes(rule, pairs) if by_class else _fit_all(rule, pairs)
+
+
+def signals_of(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    watched: Sequence[str] = (),
+    unread: Sequence[Skipped] = (),
+) -> tuple[list[Pair], list[Skipped]]:
+    """A detector's signal of each operation, and what was left out; raises NoUsableRunError where none is left.
+
+    `unread`: what was left out before, for the reason in that error.
+    """
+    skipped: list[Skipped] = []
+    refused: list[CdtoolError] = []
+    pairs: list[Pair] = []
+    for _, of_log in groupby(operations, key=lambda operation: id(operation.whole)):
+        cut = list(of_log)
+        try:
+            pairs += zip(cut, run_detector_on_each(cut, machine, detector, watched), strict=True)
+        except CdtoolError as fault:
+            refused.append(fault)
+            skipped += [Skipped(operation.name, str(fault)) for operation in cut]
+    if not pairs:
+        reasons = [*(fault.message for fault in refused), *(item.reason for item in unread)]
+        raise NoUsableRunError(detector.name, reasons[0] if reasons else "")
+    return pairs, skipped
+
+
+def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
+    """The same fit; where the runs are too few, its error names what was left out before."""
+
+    def told(pairs: Sequence[Pair]) -> Fitted:
+        try:
+            return fit(pairs)
+        except SignatureError as fault:
+            if skipped and type(fault) is SignatureError:
+                before = f"left out before: {counted(len(skipped), 'run')}"
+                first = f"first {skipped[0].recording}: {skipped[0].reason}"
+                raise SignatureError(f"{fault.message}; {before}, {first}", fault.hint) from fault
+            raise
+
+    return told
+
+
+def fit_operations(
+    operations: Sequence[Operation],
+    machine: Any,
+    detector: Any,
+    rule: Any,
+    unread: Sequence[Skipped] = (),
+    watched: Sequence[str] = (),
+) -> Fitted:
+    """What the rule learns of impact-free operations of a machine with a detector; raises SignatureError."""
+    pairs, skipped = signals_of(operations, machine, detector, watched, unread)
+    fitted = fitting(for_machine(rule, machine))(pairs)
+    return replace(fitted, skipped=(*skipped, *fitted.skipped))
+
+
+def for_machine(rule: Any, machine: Any) -> Any:
+    """The rule with the machine's own sides where it leaves them open, in its signature too."""
+    sides = machine.default_sides
+    return with_context(rule, sides, Signature(sides=sides))
+
+
+def _fit_all(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+    return Fitted((_fit(rule, pairs),), (tuple(operation for operation, _ in pairs),), ())
+
+
+def _fit_classes(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+    fitted: list[FittedThreshold] = []
+    used: list[tuple[Operation, ...]] = []
+    skipped: list[Skipped] = []
+    refused: list[CdtoolError] = []
+    classes, odd = by_class([operation for operation, _ in pairs])
+    skipped += odd
+    signals = {id(operation): signal for operation, signal in pairs}
+    for operations in classes:
+        members = [(operation, signals[id(operation)]) for operation in operations]
+        try:
+            fitted.append(_fit(rule, members))
+            used.append(tuple(operation for operation, _ in members))
+        except SignatureError as fault:
+            # A stray run of another class does not stop the others; without any class to learn it is an error.
+            refused.append(fault)
+            motion = members[0][0].motion.described
+            skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]
+    if not fitted:
+        raise refused[0]
+    return Fitted(tuple(fitted), tuple(used), tuple(skipped))
+
+
+def _fit(rule: Any, pairs: Sequence[Pair]) -> FittedThreshold:
+    fitted: FittedThreshold = checked_fit(rule, [(item.recording.without_ground_truth(), each) for item, each in pairs])
+    return fitted

@@ -1,0 +1,57 @@
+"""What every channel normally looks like, learned from impact-free operations, each class of motion apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from statistics import median
+
+from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.results import Skipped
+from cdtool.motion import measured_class
+from cdtool.operations import Operation
+from cdtool.signature_file import SignatureFile
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
+from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion
+from cdtool.workflows.signature.grouping import by_class
+
+
+def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
+    """Return the normal motion of each class of motion of which there are enough runs with speed and position."""
+    able = [item for item in operations if "speed" in item.recording and "position" in item.recording]
+    learned = []
+    for members in by_class(able)[0] if able else []:
+        classes = [measured_class(item.recording) for item in members]
+        motion = replace(classes[0], nominal_speed=median(item.nominal_speed for item in classes))
+        normal = learn_normal_motion([item.recording.without_ground_truth() for item in members], motion)
+        if normal is not None:
+            learned.append(normal)
+    return tuple(learned)
+
+
+def normals_of(file: SignatureFile) -> NormalMotions:
+    """Return the normal motions of a signature file, or why there are none."""
+    return NormalMotions(file.normal or (), Absence.OLDER_FILE if file.normal is None else Absence.FEW_RUNS)
+
+
+def notes_on(file: SignatureFile) -> list[Skipped]:
+    """Return what is to be said of a signature file of an earlier version, under its name; else nothing."""
+    return [Skipped(file.source, file.of_earlier_version)] if file.of_earlier_version else []
+
+
+def with_operation(
+    file: SignatureFile, operation: Operation, cap: float, forget: float | None
+) -> tuple[NormalMotion, ...] | None:
+    """Return a file's normal motions with one more impact-free operation in that of its class; None where it has none.
+
+    The run is clipped to `cap` spreads and counts as it does in the signature (`forget`).
+    """
+    if file.normal is None:
+        return None
+    recording, motions = operation.recording.without_ground_truth(), list(file.normal)
+    motion = measured_class(recording)
+    for i, normal in enumerate(motions):
+        if normal.motion.matches(motion, SPEED_TOLERANCE) and normal.serves(recording):
+            motions[i] = normal.with_run(recording, cap, forget)
+            break
+    return tuple(motions)

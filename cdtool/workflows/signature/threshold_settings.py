@@ -1,0 +1,125 @@
+"""A threshold rule and its settings, from the tables [threshold] and [signature] or from the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, fields
+from typing import Any
+
+from cdtool.bounded_loading import ContentError, parse_toml
+from cdtool.errors import UsageError, nearest
+from cdtool.motion.progress import ALIGNMENTS
+from cdtool.tables import Table
+from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.fitted_signature import RULES, SIDES
+from cdtool.thresholds.settings import with_context
+from cdtool.thresholds.signature import Signature
+from cdtool.value_words import value_in_words
+
+_DEFAULT = "signature"
+
+
+def read_signature(table: Table, default_sides: str) -> Signature:
+    """Return the signature rule that the table [signature] describes."""
+    if "debounce" in table:
+        raise table.fault("debounce", "belongs to another table", "write it in [activation]")
+    settings: dict[str, Any] = {
+        "rule": table.choice("rule", RULES, "pooled"),
+        "sides": table.choice("sides", SIDES, default_sides),
+        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
+        "position_step": table.number("position_step", Signature.position_step, above=0.0),
+        "position_window": table.number("position_window", Signature.position_window, above=0.0),
+        "force": table.flag("force", False),
+    }
+    if "safety_factor" in table:
+        settings["safety_factor"] = table.number("safety_factor", above=0.0)
+    table.finish()
+    return Signature(**settings)
+
+
+def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
+    """The threshold's name and its rule; raises ConfigurationError for an unknown name or key, or a wrong value.
+
+    `threshold = "NAME"` takes NAME's default settings, a table [threshold] has `name` and NAME's own fields. The
+    settings of the signature, also where another rule learns one, are in [signature]; so is the safety factor of any
+    rule for which [threshold] gives none.
+    """
+    names = THRESHOLDS.names(plugins=True)
+    if not isinstance(root.raw("threshold"), dict):
+        name, table = root.choice("threshold", names, _DEFAULT), Table({}, root.where, "threshold.")
+    else:
+        table = root.table("threshold")
+        name = table.choice("name", names, _DEFAULT)
+    if name == _DEFAULT:
+        for key in table.values:
+            if key != "name":
+                raise table.fault(key, "is no key of this table", "the signature's settings are in [signature]")
+        return name, signature
+    rule = THRESHOLDS.load(name)
+    own = [item for item in fields(rule) if item.name != "signature"]
+    settings = {item.name: _value(table, item) for item in own if item.name in table}
+    table.finish()
+    if "limits" in settings and ("safety_factor" in settings or signature.safety_factor is not None):
+        raise table.fault("safety_factor", "is given beside limits set by hand", "leave one of the two out")
+    if "safety_factor" not in settings and signature.safety_factor is not None:
+        settings["safety_factor"] = signature.safety_factor
+    try:
+        return name, with_context(rule(**settings), signature.sides, signature)
+    except UsageError as fault:
+        raise table.fault("name", f"'{name}': {fault.message}", fault.hint) from fault
+
+
+def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Any:
+    """The rule of that name for a command line: `given` are its settings as KEY=VALUE, `signature` the signature's.
+
+    Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
+    """
+    known = THRESHOLDS.names(plugins=True)
+    if name not in known:
+        raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
+    settings = dict(_setting(text) for text in given)
+    if name == _DEFAULT:
+        return read_signature(Table({**signature, **settings}, "--set"), default_sides)
+    learned = read_signature(Table(signature, "--set"), default_sides)
+    return read_threshold(Table({"threshold": {"name": name, **settings}}, "--set"), learned)[1]
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """KEY=VALUE, the value as TOML has it; a bare word is a text."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise UsageError(f"--set is '{text}'", "KEY=VALUE, as drift=0.5; docs/thresholds.md names the keys")
+    try:
+        return name, parse_toml(f"value = {value}")["value"]
+    except ContentError:
+        return name, value
+
+
+def set_by_hand(rule: Any) -> bool:
+    """Whether the rule's limits, or its safety factor, are other than what it has by itself."""
+    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
+
+
+def _value(table: Table, item: Field[Any]) -> Any:
+    """A key's value, checked against the type of the field."""
+    kind = item.type
+    if kind == "bool":
+        return table.flag(item.name, False)
+    if kind == "int":
+        return table.whole(item.name, 0, minimum=0)
+    if kind in ("float", "float | None"):
+        return table.number(item.name)
+    if kind == "tuple[int, ...]":
+        return _numbers(table, item.name, int, "a list of whole numbers is needed")
+    if kind == "tuple[float, ...]":
+        return _numbers(table, item.name, (int, float), "a list of numbers is needed")
+    return table.texts(item.name) if kind == "tuple[str, ...]" else table.text(item.name)
+
+
+def _numbers(table: Table, name: str, kind: type | tuple[type, ...], wanted: str) -> tuple[Any, ...]:
+    """A list of numbers, or one alone."""
+    values = table.raw(name)
+    values = values if isinstance(values, list) else [values]
+    if not values or any(isinstance(x, bool) or not isinstance(x, kind) for x in values):
+        raise table.fault(name, f"is {value_in_words(table.raw(name))}", wanted)
+    return tuple(values)

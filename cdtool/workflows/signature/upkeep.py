@@ -1,0 +1,258 @@
+"""Keeping a signature: do its runs suffice, has the machine drifted since, and adding runs without learning a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import CdtoolError, SignatureError, UsageError
+from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.evaluation.upkeep.advice import advice
+from cdtool.evaluation.upkeep.audit import DriftAudit
+from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
+from cdtool.evaluation.upkeep.drift import audit_drift
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import Operation
+from cdtool.pipeline import detect_operation, run_detector
+from cdtool.plain_text import counted
+from cdtool.signature_file import SignatureFile, with_run
+from cdtool.signature_store import read_signature, update_signature
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.runs import Progress, load_runs
+from cdtool.workflows.signature.fitting import Pair, signals_of
+from cdtool.workflows.signature.learning import learned_run
+from cdtool.workflows.signature.normal_runs import with_operation
+
+# The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
+TARGET, LEAST_TARGET = 1e-3, 1e-9
+
+
+@dataclass(frozen=True)
+class CheckedClass:
+    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given.
+
+    `signature` is what counts, `first` what was first learned.
+    """
+
+    signature: FittedSignature
+    first: FittedSignature
+    coverage: Coverage | None
+    drift: DriftAudit | None
+
+    @property
+    def advice(self) -> str:
+        """What to do, in a line."""
+        return advice(self.coverage, self.drift)
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check of a signature found, class by class, and what was left out."""
+
+    file: SignatureFile
+    classes: tuple[CheckedClass, ...]
+    skipped: tuple[Skipped, ...]
+    findings: tuple[Skipped, ...]
+
+
+@dataclass(frozen=True)
+class Updated:
+    """A signature file after an update, the runs added, those refused with the reason, and warnings about the logs."""
+
+    file: SignatureFile
+    added: tuple[str, ...]
+    refused: tuple[Skipped, ...]
+    findings: tuple[Skipped, ...] = ()
+
+
+def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:
+    """The current and the first signature of each class; raises SignatureError where the file holds another threshold.
+
+    What is learned afresh has no curve along the stroke that could be held against a season's runs.
+    """
+    pairs: list[tuple[FittedSignature, FittedSignature]] = []
+    for current, first in zip(file.current, file.first, strict=True):
+        ours = isinstance(file.rule, Signature)
+        if not ours or not isinstance(current, FittedSignature) or not isinstance(first, FittedSignature):
+            raise SignatureError(
+                f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
+                "such a threshold is not updated run by run: learn it again with learn-signature",
+            )
+        pairs.append((current, first))
+    return tuple(pairs)
+
+
+def check_signature(  # noqa: PLR0913  keyword options of the Python API
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    operations: str | None = None,
+    target: float = TARGET,
+    onset: OnsetRule | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Checked:
+    """Hold a signature against impact-free logs: those that it was learned from, and those of a season since.
+
+    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is the
+    chance of a false alarm in an operation that they have to show. In the second, taken in the order given, drift is
+    looked for. Which log is which is told by its bytes. `operations`: how logs are cut; as for learning where None. A
+    run in which the load cell shows a contact by the `onset` rule is left out. Raises SignatureError where the file
+    does not belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
+    """
+    if not LEAST_TARGET <= target < 1.0:
+        raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    file = read_signature(path)
+    signatures = signatures_in(file)
+    detector = machine_file.detector(file.detector)
+    file.check(machine_file.machine, detector)
+    cut = _cut(file, operations)
+    runs = load_runs(
+        [Path(log) for log in logs], machine_file, cut, onset=onset, ranges=file.plausible, jobs=jobs, progress=progress
+    )
+    pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
+    skipped = [*runs.skipped, *unusable]
+    known = {(run.sha256, run.operation) for run in file.runs}
+    learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
+    if 0 < sum(learned) < len(file.runs):
+        some = f"given: only {sum(learned)} of the {counted(len(file.runs), 'run')} that it was learned from"
+        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these alone"))
+    classes, served = [], set()
+    for current, first in signatures:
+        own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
+        served.update(own)
+        taught, season = (
+            [pairs[i] for i in own if learned[i]],
+            [pairs[i] for i in own if not learned[i]],
+        )
+        classes.append(
+            CheckedClass(
+                current,
+                first,
+                _tried(
+                    partial(check_coverage, taught, _rule_of(file, current), file.activation, target), taught, skipped
+                ),
+                _tried(partial(audit_drift, current, season, file.activation), season, skipped),
+            )
+        )
+    skipped += [
+        Skipped(item.name, f"no signature for its class: runs {item.motion.described}")
+        for i, (item, _) in enumerate(pairs)
+        if i not in served
+    ]
+    return Checked(file, tuple(classes), tuple(skipped), runs.findings)
+
+
+def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
+    """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
+    rule: Signature = replace(file.rule, safety_factor=current.safety_factor, force=True)
+    return rule
+
+
+def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
+    """What the work gives; None without runs, or where they are too few, which is named."""
+    if not pairs:
+        return None
+    try:
+        return work()
+    except SignatureError as fault:
+        skipped.append(Skipped(f"{counted(len(pairs), 'run')}, {pairs[0][0].name} first", str(fault)))
+        return None
+
+
+def update_with_runs(  # noqa: PLR0913  keyword options of the Python API
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    operations: str | None = None,
+    forget: float | None = None,
+    cap: float = CAP,
+    reserve: float = RESERVE,
+    onset: OnsetRule | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Updated:
+    """Add impact-free runs to a signature file, by Welford or by forgetting (`forget`: effective number of runs).
+
+    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
+    was first learned. Refused are such a run, one with an alarm, one in which the load cell shows a contact by the
+    `onset` rule, one that is in the signature already, one that ends early, and one that cannot be assessed. Raises
+    SignatureError where the file does not belong.
+    """
+    if forget is not None and not forget > 1.0:
+        raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
+    for name, value in (("cap", cap), ("reserve", reserve)):
+        if not value > 0.0:
+            raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    stored = read_signature(path)
+    detector = machine_file.detector(stored.detector)
+    cut = _cut(stored, operations)
+    runs = load_runs(
+        [Path(log) for log in logs],
+        machine_file,
+        cut,
+        onset=onset,
+        ranges=stored.plausible,
+        jobs=jobs,
+        progress=progress,
+    )
+    added: list[str] = []
+    refused = list(runs.skipped)
+
+    def change(file: SignatureFile) -> SignatureFile:
+        signatures_in(file)
+        file.check(machine_file.machine, detector)
+        for operation in runs.operations:
+            try:
+                file = _with_operation(file, operation, machine_file.machine, detector, (forget, cap, reserve))
+                added.append(operation.name)
+            except CdtoolError as fault:
+                refused.append(Skipped(operation.name, str(fault)))
+        return file
+
+    return Updated(update_signature(path, change), tuple(added), tuple(refused), runs.findings)
+
+
+def _cut(file: SignatureFile, operations: str | None) -> str:
+    """How logs are cut: as for learning, since a stroke cut otherwise would be taken for another one."""
+    if operations not in (None, file.operations):
+        raise SignatureError(
+            f"{file.source}: learned from logs cut by '{file.operations}', not by '{operations}'",
+            "leave --operations out, or learn another signature",
+        )
+    return file.operations
+
+
+def _with_operation(
+    file: SignatureFile, operation: Operation, machine: Any, detector: Any, guard: tuple[float | None, float, float]
+) -> SignatureFile:
+    run = learned_run(operation)
+    if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in file.runs):
+        raise SignatureError("this run is in the signature already")
+    detection = detect_operation(operation, machine, detector, file.current, file.activation, file.joints)
+    if detection.verdict.outcome == "alarm":
+        raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")
+    if detection.verdict.outcome == "not assessable":
+        raise SignatureError(f"not assessable: {detection.verdict.reason}")
+    pairs = signatures_in(file)
+    if not any(item.motion.matches(operation.motion, SPEED_TOLERANCE) for item, _ in pairs):
+        known = " and ".join(item.motion.described for item, _ in pairs)
+        raise SignatureError(f"no signature for its class: runs {operation.motion.described}, learned {known}")
+    index = next(i for i, (item, _) in enumerate(pairs) if item.motion.matches(operation.motion, SPEED_TOLERANCE))
+    current, first = pairs[index]
+    recording = operation.recording.without_ground_truth()
+    forget, cap, reserve = guard
+    signal = run_detector(operation, machine, detector, file.joints)
+    updated = guarded(first, current, recording, signal, forget, cap, reserve)
+    return with_run(file, index, updated, run, with_operation(file, operation, cap, forget))

@@ -1,0 +1,194 @@
+"""A machine and a study file -> the impact to simulate and the sensors to rank; every value that is not given is said.
+
+All on the load side. A rotary axis is taken at the contact: with the lever l inertia J/l^2, ratio n l, stiffness k/l^2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import UsageError
+from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.drives import SpeedController
+from cdtool.impact.sensor_ranking import ImpactCase
+from cdtool.impact.sensors import Sensor
+from cdtool.impact.transmission import ElasticTransmission
+from cdtool.machine_file import MachineFile
+from cdtool.tables import Table, read_toml
+from cdtool.workflows.study.joint import StudiedJoint, studied_joint
+from cdtool.workflows.study.number_reader import StudyReader
+
+_DRIVE_FREQUENCY = 10.0
+_LOOP_FREQUENCY = 2.0
+_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is simulated and looked at, the load's first natural frequency [Hz] if it is known, and what was assumed."""
+
+    joint: str
+    case: ImpactCase
+    sensors: tuple[Sensor, ...]
+    first_frequency: float | None
+    assumptions: tuple[str, ...]
+
+
+def read_study(
+    machine: MachineFile, file: str | Path | None, joint: str = "", options: Mapping[str, float] | None = None
+) -> Study:
+    """The impact and the sensors; `options` by key (impact.speed) win over the file.
+
+    Raises UsageError, ConfigurationError naming file and key; without the inertias nothing can be said.
+    """
+    options = options or {}
+    for name, value in options.items():
+        if not 0.0 < value < math.inf:
+            raise UsageError(f"{name} is {value:g}", "a number above 0 is needed")
+    root = Table(_merged(read_toml(Path(file)) if file else {}, options), str(file or "study"))
+    reader = StudyReader(root)
+    part = studied_joint(machine, joint, reader)
+    case = _case(part, reader)
+    frequency = reader.optional("impact", "first_frequency", "the load is rigid but for its drive")
+    sensors = _sensors(part, reader)
+    reader.finish()
+    return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
+
+
+def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, Any]:
+    merged = dict(values)
+    for name, value in options.items():
+        table, _, key = name.partition(".")
+        known = merged.get(table, {})
+        if isinstance(known, dict):
+            merged[table] = {**known, key: value}
+    return merged
+
+
+def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
+    speed = reader.number("impact", "speed", 0.2, "m/s", "at the contact", above=0.0)
+    stiffness = reader.number("impact", "stiffness", 5e5, "N/m", above=0.0)
+    factor = reader.number("impact", "damping_factor", 0.0, "s/m", minimum=0.0)
+    obstacle = HuntCrossley(stiffness, factor * stiffness, 1.0)
+    window = reader.number("impact", "window", 0.5, "s", "how long to look", above=0.0)
+    angular = 2.0 * math.pi * _DRIVE_FREQUENCY
+    why = f"the load swings at {_DRIVE_FREQUENCY:g} Hz on the drive while the motor stands"
+    default = part.load_mass * angular**2 * part.square
+    drive = reader.number("drive", "stiffness", default, part.unit("N/m"), why, above=0.0) / part.square
+    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that swing", minimum=0.0)
+    square = part.ratio**2
+    transmission = ElasticTransmission(
+        part.motor_inertia,
+        part.load_mass,
+        part.ratio,
+        drive * square,
+        2.0 * ratio * math.sqrt(drive * part.load_mass) * square,
+        part.motor_friction,
+    )
+    controller = _controller(part, reader)
+    needed = transmission.steady_torque(speed)
+    if controller.torque_limit < needed:
+        unit = part.unit("N")
+        limit, steady = (value / part.ratio * part.lever for value in (controller.torque_limit, needed))
+        raise UsageError(
+            f"controller.force_limit is {limit:.4g} {unit}, steady motion takes {steady:.4g} {unit}",
+            "a larger limit, or less friction or speed",
+        )
+    return ImpactCase(transmission, controller, obstacle, speed, window)
+
+
+def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
+    angular = 2.0 * math.pi * _LOOP_FREQUENCY
+    why = f"a speed loop of {_LOOP_FREQUENCY:g} Hz for the whole mass"
+    default = part.mass * angular * part.square
+    proportional = reader.number("controller", "proportional", default, part.unit("N s/m"), why, above=0.0)
+    default = 0.25 * angular * proportional
+    integral = reader.number("controller", "integral", default, part.unit("N/m"), "critically damped", minimum=0.0)
+    lag = reader.number("controller", "actuator_time", 0.002, "s", "lag of the current loop", above=0.0)
+    derivative = reader.number("controller", "derivative", 0.0, part.unit("N s2/m"), minimum=0.0)
+    filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative", above=0.0)
+    table = reader.table("controller")
+    slew = table.number("slew_limit", above=0.0) if "slew_limit" in table else math.inf
+    limit = reader.optional("controller", "force_limit", "nothing stops the drive") or math.inf
+    to_motor, to_torque = part.ratio**2 / part.square, part.ratio / part.lever
+    return SpeedController(
+        0.0,
+        proportional * to_motor,
+        integral * to_motor,
+        lag,
+        slew_limit=slew * to_torque,
+        derivative=derivative * to_motor,
+        derivative_time=filtered,
+        torque_limit=limit * to_torque,
+    )
+
+
+def _sensors(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, ...]:
+    """Return the sensors from the contact to the controller, with stated or assumed noise, steps and filters.
+
+    An encoder counts as two: the motor's position and its speed.
+    """
+    lever = part.lever
+    why = f"what accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
+    rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why, above=0.0) / lever
+    torque = (part, reader, rated, lever)
+    return (
+        _force_sensor("load_cell", "at the contact", "contact_force", (part, reader, rated, 1.0), 0.001, 500.0),
+        _force_sensor("torque_sensor", "in the drive", "drive_force", torque, 0.002, 500.0),
+        _accelerometer(reader),
+        *_encoder(part, reader),
+        _force_sensor("motor_torque", "control action", "motor_force", torque, 0.01, 200.0),
+    )
+
+
+def _force_sensor(
+    name: str,
+    place: str,
+    quantity: str,
+    scales: tuple[StudiedJoint, StudyReader, float, float],
+    share: float,
+    bandwidth: float,
+) -> Sensor:
+    part, reader, rated, lever = scales
+    table, unit = f"sensors.{name}", "N" if lever == 1.0 and name == "load_cell" else part.unit("N")
+    why = f"{100.0 * share:g} % of the rated force"
+    return Sensor(
+        name,
+        place,
+        quantity,
+        "N",
+        reader.number(table, "noise", share * rated * lever, unit, why, minimum=0.0) / lever,
+        reader.number(table, "resolution", 0.0, unit, minimum=0.0) / lever,
+        reader.number(table, "bandwidth", bandwidth, "Hz", above=0.0),
+        reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0),
+    )
+
+
+def _accelerometer(reader: StudyReader) -> Sensor:
+    table, unit = "sensors.accelerometer", "m/s2"
+    bandwidth = reader.number(table, "bandwidth", 100.0, "Hz", above=0.0)
+    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)", minimum=0.0)
+    vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms", minimum=0.0)
+    # A first-order low-pass lets noise of pi/2 times its corner through.
+    noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
+    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g", minimum=0.0)
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
+    return Sensor("accelerometer", "on the load", "load_acceleration", unit, noise, resolution, bandwidth, rate)
+
+
+def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
+    table = "sensors.encoder"
+    counts = reader.number(table, "counts_per_turn", 4096.0, "", "12 bit, on the motor", minimum=1.0)
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
+    bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference", above=0.0)
+    speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed", minimum=0.0)
+    noise = reader.number(table, "position_noise", 0.0, "m", "scatter of the impact-free position", minimum=0.0)
+    step = 2.0 * math.pi * part.ratio / counts
+    return (
+        Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
+        Sensor("motor_speed", "on the motor", "motor_position", "m/s", speed_noise, step, bandwidth, rate, True),
+    )
