@@ -113,20 +113,7 @@ def imports_of(modules: Mapping[str, Module]) -> list[Import]:
 
 
 def _imports(node: ast.AST, known: Mapping[str, Module], kind: str) -> Iterator[tuple[str, str]]:
-    if isinstance(node, ast.Import):
-        yield from ((found, kind) for item in node.names if (found := _known(item.name, known)))
-    elif isinstance(node, ast.ImportFrom) and node.module:
-        for item in node.names:
-            if found := _known(f"{node.module}.{item.name}", known):
-                yield found, kind
-    elif isinstance(node, ast.Call) and _last_name(node.func) == "import_module":
-        for argument in node.args[:1]:
-            if isinstance(argument, ast.Constant) and (found := _known(str(argument.value), known)):
-                yield found, "function"
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-        name, colon, _ = node.value.partition(":")
-        if colon and name in known:
-            yield name, "name"
+    yield from _named_by(node, known, kind)
     if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
         for inner in node.body:
             yield from _imports(inner, known, "types")
@@ -136,6 +123,22 @@ def _imports(node: ast.AST, known: Mapping[str, Module], kind: str) -> Iterator[
     inside = "function" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) else kind
     for child in ast.iter_child_nodes(node):
         yield from _imports(child, known, inside)
+
+
+def _named_by(node: ast.AST, known: Mapping[str, Module], kind: str) -> Iterator[tuple[str, str]]:
+    """The modules that one node names by itself: an import, a call of `import_module`, or a text "module:name"."""
+    if isinstance(node, ast.Import):
+        yield from ((found, kind) for item in node.names if (found := _known(item.name, known)))
+    elif isinstance(node, ast.ImportFrom) and node.module:
+        names = (f"{node.module}.{item.name}" for item in node.names)
+        yield from ((found, kind) for name in names if (found := _known(name, known)))
+    elif isinstance(node, ast.Call) and _last_name(node.func) == "import_module":
+        names = (str(item.value) for item in node.args[:1] if isinstance(item, ast.Constant))
+        yield from ((found, "function") for name in names if (found := _known(name, known)))
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        name, colon, _ = node.value.partition(":")
+        if colon and name in known:
+            yield name, "name"
 
 
 def _known(name: str, known: Mapping[str, Module]) -> str:
