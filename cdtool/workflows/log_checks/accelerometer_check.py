@@ -13,6 +13,8 @@ from cdtool.recording import Contact, Finding, FloatArray, Recording
 _WINDOW = 0.2
 # Below this correlation the motion does not say enough about the sign, or about the scale.
 _TELLING, _TELLING_SCALE = 0.5, 0.8
+# Below this share of the fastest joint's range of speed a joint hardly moves: its drive's vibration is all that shows.
+_HARDLY = 0.1
 _STANDARD_GRAVITY = 9.80665
 
 
@@ -22,11 +24,21 @@ def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) ->
     if "acceleration" not in recording or "speed" not in recording:
         return []
     found = []
+    ranges = [_range(recording["speed"].values[:, j]) for j in range(len(recording.joints))]
     for j, joint in enumerate(recording.joints):
-        expected, measured = _pairs(recording, j)
         name = f" of {joint}" if len(recording.joints) > 1 else ""
+        if ranges[j] < _HARDLY * max(ranges):
+            text = f"accelerometer{name} cannot be checked: the joint hardly moves"
+            found.append(Finding(text, "acceleration", "note"))
+            continue
+        expected, measured = _pairs(recording, j)
         found.append(_judge(expected, measured, name))
     return found
+
+
+def _range(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if len(known) else 0.0
 
 
 def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Recording:

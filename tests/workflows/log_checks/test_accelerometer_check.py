@@ -1,0 +1,48 @@
+"""The accelerometer against the derivative of the speed: what is wrong is found, and vibration is no evidence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from cdtool.recording import Recording, Series
+from cdtool.workflows.log_checks.accelerometer_check import accelerometer_findings
+from cdtool.workflows.runs import read_log
+
+LOGS = Path(__file__).parents[3] / "sample_logs"
+
+
+@cache
+def log(folder: str, name: str) -> Recording:
+    return read_log(LOGS / folder / name, LOGS / folder / "machine.toml")
+
+
+def warnings(recording: Recording) -> list[str]:
+    return [item.message for item in accelerometer_findings(recording, ()) if item.severity == "warning"]
+
+
+def scaled(recording: Recording, factor: float) -> Recording:
+    series = recording["acceleration"]
+    values = Series(series.time, factor * series.values, series.unit)
+    return replace(recording, channels={**recording.channels, "acceleration": values})
+
+
+@pytest.mark.parametrize("folder", ["gate", "arm/trial_1", "arm/trial_2"])
+def test_no_sample_run_has_a_warning_and_a_joint_that_is_held_is_no_evidence(folder):
+    for path in sorted((LOGS / folder / "free").iterdir()):
+        recording = log(folder, f"free/{path.name}")
+        assert warnings(recording) == []
+        texts = [item.message for item in accelerometer_findings(recording, ())]
+        assert ("accelerometer of forearm cannot be checked: the joint hardly moves" in texts) == ("arm" in folder)
+
+
+@pytest.mark.parametrize("folder", ["gate", "arm/trial_1"])
+@pytest.mark.parametrize(
+    ("factor", "words"), [(-1.0, "opposite sign"), (9.81, "wrong scale"), (1 / 9.81, "wrong scale")]
+)
+def test_a_joint_that_moves_is_found_with_the_wrong_sign_or_scale(folder, factor, words):
+    (found,) = warnings(scaled(log(folder, "free/03.csv"), factor))
+    assert words in found
