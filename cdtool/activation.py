@@ -221,9 +221,9 @@ def _activate(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     for k in range(len(time)):
         if fresh[k]:
             armed = True
-        if status[k] == 3:
+        if status[k] == Status.GAP:
             continue
-        if outside[k] and status[k] == 0:
+        if outside[k] and status[k] == Status.VALID:
             inside = False
             count += 1
             if count >= needed[k] and not raised:
@@ -236,7 +236,7 @@ def _activate(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         count = 0
         raised = False
         # Where the value cannot be judged it is not known to be outside: that time counts as before.
-        if status[k] == 0 and not calm[k]:
+        if status[k] == Status.VALID and not calm[k]:
             inside = False
         elif not inside:
             inside = True

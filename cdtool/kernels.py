@@ -12,6 +12,7 @@ import types
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import EnumType
 from pathlib import Path
 from typing import Any
 
@@ -120,14 +121,34 @@ def _files(item: Kernel) -> set[str]:
     return {item.function.__code__.co_filename}.union(*map(_files, item.called.values()))
 
 
+def _constants(item: Kernel) -> dict[str, object]:
+    """Return the numbers and enumerations that a kernel and those it calls read, by module and name."""
+    constants: dict[str, object] = {}
+    for name in item.function.__code__.co_names:
+        value = item.function.__globals__.get(name)
+        if isinstance(value, EnumType):
+            value = {member.name: member.value for member in value}  # type: ignore[var-annotated]
+        elif not isinstance(value, int | float | str):
+            continue
+        constants[f"{item.function.__module__}.{name}"] = value
+    for other in item.called.values():
+        constants |= _constants(other)
+    return constants
+
+
 def _stamp(item: Kernel) -> str:
+    """Return what changes in the name of the cache file with what the kernel takes from other modules.
+
+    numba recompiles a cached function when its own file has changed, but not when one that it imports from has.
+    """
     import hashlib
 
-    # numba recompiles a cached function when its own file has changed; the files of what it calls go into its name.
     others = sorted(_files(item) - {item.function.__code__.co_filename})
-    if not others:
+    constants = _constants(item)
+    if not others and not constants:
         return ""
-    return "_" + hashlib.sha256(b"".join(Path(file).read_bytes() for file in others)).hexdigest()[:12]
+    parts = [Path(file).read_bytes() for file in others] + [repr(sorted(constants.items())).encode()]
+    return "_" + hashlib.sha256(b"".join(parts)).hexdigest()[:12]
 
 
 @contextmanager

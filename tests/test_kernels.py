@@ -54,16 +54,28 @@ def test_where_no_cache_can_be_written_it_compiles_anyway_and_says_so_once(no_ca
     assert len(told) == 1
 
 
-def test_a_cached_kernel_is_compiled_anew_when_a_kernel_it_imports_has_changed(tmp_path):
-    define = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "
-    (tmp_path / "outer.py").write_text(
-        f"from inner import inner\n{define}outer(x):\n    return inner(x)\nprint(outer(3.0))"
-    )
+_DEFINE = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner"),
+    [
+        (f"{_DEFINE}outer(x):\n    return inner(x)\n", _DEFINE + "inner(x):\n    return {} * x\n"),
+        (f"{_DEFINE}outer(x):\n    return inner * x\n", "inner = {}\n"),
+        (
+            f"{_DEFINE}outer(x):\n    return inner.FACTOR.value * x\n",
+            "from enum import IntEnum\nclass inner(IntEnum):\n    FACTOR = {}\n",
+        ),
+    ],
+    ids=["kernel", "number", "enumeration"],
+)
+def test_a_cached_kernel_is_recompiled_when_what_it_imports_has_changed(outer, inner, tmp_path):
+    (tmp_path / "outer.py").write_text(f"from inner import inner\n{outer}print(outer(3.0))")
     project = str(Path(__file__).parents[1])
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": project}
     said = []
     for factor in (2, 2, 5):
-        (tmp_path / "inner.py").write_text(f"{define}inner(x):\n    return {factor} * x\n")
+        (tmp_path / "inner.py").write_text(inner.format(factor))
         run = [sys.executable, "-B", str(tmp_path / "outer.py")]
         said.append(float(subprocess.run(run, env=environment, capture_output=True, check=True).stdout))
     assert said == [6.0, 6.0, 15.0]

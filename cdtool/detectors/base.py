@@ -10,7 +10,7 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.clock.lost import lost_samples
-from cdtool.detection import Signal, StatusArray
+from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
@@ -231,7 +231,7 @@ def _observe(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
             # p or its rate is unknown: the residual waits for the next whole sample.
             bridged = bridged or coupled or not speed_missing[k]
             residual[k] = value
-            status[k] = 3
+            status[k] = Status.GAP
             continue
         if bridged:
             impulse = 0.5 * (net_force[k] + force_before) * elapsed
@@ -257,8 +257,8 @@ def _observe(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         elapsed = 0.0
         residual[k] = value
         if missing[k]:
-            status[k] = 3
+            status[k] = Status.GAP
         elif time[k] < ready:
-            status[k] = 1
+            status[k] = Status.START_UP
         else:
-            status[k] = 0
+            status[k] = Status.VALID

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from cdtool.detection import StatusArray
+from cdtool.detection import Status, StatusArray
 from cdtool.detectors.friction_ekf_kernel import progress_of_settling
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
@@ -124,7 +124,7 @@ def run_arm_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
+    """Fill `friction` and `status` (n,), zeros before, of one joint.
 
     `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is.
     """
@@ -153,7 +153,7 @@ def run_arm_filter(
                 next_sample += 1
             friction[k] = d
             if not seen or missing[k]:
-                status[k] = 3
+                status[k] = Status.GAP
                 continue
             started = True
             d, v, q = viscous, speed[k], position[k]
@@ -166,7 +166,7 @@ def run_arm_filter(
             now = last_speed_time = time[k]
             held = k
             friction[k] = d
-            status[k] = 1 if applicable else 2
+            status[k] = Status.START_UP if applicable else Status.NOT_APPLICABLE
             continue
         while True:
             # The next event: an accelerometer sample of its own time, else the speed's time.
@@ -207,11 +207,11 @@ def run_arm_filter(
             # Steps too long for the speed: the linearised model has run away, and restarts.
             started = False
             friction[k] = viscous
-            status[k] = 1
+            status[k] = Status.START_UP
             continue
         if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
-            status[k] = 3
+            status[k] = Status.GAP
         elif not applicable:
-            status[k] = 2
+            status[k] = Status.NOT_APPLICABLE
         elif settled < 3.0:
-            status[k] = 1
+            status[k] = Status.START_UP

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from cdtool.detection import StatusArray
+from cdtool.detection import Status, StatusArray
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
@@ -129,7 +129,7 @@ def run_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (0 valid, 1 start-up, 2 not applicable, 3 missing) for one joint.
+    """Fill `friction` and `status` (n,), zeros before, of one joint.
 
     `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not;
     `missing`: force or speed is missing.
@@ -165,7 +165,7 @@ def run_filter(
                     last_acceleration_time = acceleration_time[next_sample]
                 next_sample += 1
             if not seen or missing[k]:
-                status[k] = 3
+                status[k] = Status.GAP
                 friction[k] = d
                 continue
             started = True
@@ -183,7 +183,7 @@ def run_filter(
             if varies:
                 inverse_inertia = 1.0 / inertia[k]
             friction[k] = d
-            status[k] = 1 if applicable else 2
+            status[k] = Status.START_UP if applicable else Status.NOT_APPLICABLE
             continue
         while True:
             # The next event: an accelerometer sample of its own time, else the speed's time.
@@ -236,11 +236,11 @@ def run_filter(
             # Steps too long for the speed: the linearised model has run away, and restarts.
             started = False
             friction[k] = viscous
-            status[k] = 1
+            status[k] = Status.START_UP
             continue
         if missing[k] or not seen or time[k] - last_acceleration_time > acceleration_hold:
-            status[k] = 3
+            status[k] = Status.GAP
         elif not applicable:
-            status[k] = 2
+            status[k] = Status.NOT_APPLICABLE
         elif settled < 3.0:
-            status[k] = 1
+            status[k] = Status.START_UP

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal, StatusArray
+from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
     BRIDGED,
     drive_of,
@@ -156,7 +156,7 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         if waits[k]:
             bridged = bridged or coupled or not speed_missing[k]
             estimate[k] = contact
-            status[k] = 3
+            status[k] = Status.GAP
             continue
         if not started:
             started = True
@@ -193,8 +193,8 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         last = time[k]
         estimate[k] = contact
         if missing[k]:
-            status[k] = 3
+            status[k] = Status.GAP
         elif settled < 3.0:
-            status[k] = 1
+            status[k] = Status.START_UP
         else:
-            status[k] = 0
+            status[k] = Status.VALID

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cdtool.detection import StatusArray
+from cdtool.detection import Status, StatusArray
 from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
@@ -81,7 +81,7 @@ def _observe(
         if motion_missing[k]:
             for j in range(joints):
                 residual[k, j] = work[_VALUE, j]
-                status[k, j] = 3
+                status[k, j] = Status.GAP
             continue
         if started:
             slowest = periods[k, joints - 1]
@@ -114,7 +114,7 @@ def _observe(
         started = True
         elapsed = 0.0
         last = k
-        verdict = 3 if missing[k] else 1 if settled < 3.0 else 0
+        verdict = Status.GAP if missing[k] else Status.START_UP if settled < 3.0 else Status.VALID
         for j in range(joints):
             work[_IMPULSE, j] = 0.0
             residual[k, j] = work[_VALUE, j]

@@ -62,7 +62,7 @@ def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: L
     part = course.within(span)
     if not len(part.time):
         return
-    judged = part.status == 0
+    judged = part.status == Status.VALID
     axes.plot(*decimate(part.time, part.value, _PIXELS), color=UNJUDGED, linewidth=0.8, zorder=2)
     value = np.where(judged, part.value, np.nan)
     axes.plot(*decimate(part.time, value, _PIXELS), color=look_of(detector).colour, zorder=3)
@@ -77,11 +77,12 @@ def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: fl
     bounds: list[float] = []
     for course in courses:
         part = course.within(span)
-        judged = part.value[part.status == 0]
+        valid = part.status == Status.VALID
+        judged = part.value[valid]
         inside += _ends(judged if len(judged) else part.value)
         if not len(judged):
             bounds += _ends(part.value)
-        bounds += _ends(part.value[(part.value >= part.lower) & (part.value <= part.upper) & (part.status == 0)])
+        bounds += _ends(part.value[(part.value >= part.lower) & (part.value <= part.upper) & valid])
         bounds += _ends(part.lower) + _ends(part.upper)
     if not inside and not bounds:
         return
