@@ -136,7 +136,7 @@ def _c(library: ctypes.CDLL, detector: FrictionEkf, run: Run, machine: LinearAxi
 
 
 def _gains(detector: FrictionEkf, inertia: float, viscous: float) -> tuple[float, ...]:
-    """What `FrictionEkf.estimate` hands its kernel, in the kernel's order."""
+    """The numbers that `FrictionEkf.estimate` uses, in the order of the arguments in friction_ekf.c."""
     return (
         inertia,
         viscous,

@@ -7,6 +7,7 @@ installation and a read-only home), the kernel is recompiled in each process, an
 from __future__ import annotations
 
 import gc
+import re
 import threading
 import types
 import warnings
@@ -14,10 +15,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import EnumType
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
 
 # The signature of an array (n,) of float64 that a kernel only reads; writable arrays fit it too.
 READ_ONLY = "Array(float64, 1, 'C', readonly=True)"
+
+# The signature of a field of a named tuple by its annotation. Arrays come from `read_only`: inside a tuple numba fits
+# no writable array to a type that is read-only.
+_FIELDS: dict[Any, str] = {
+    float: "float64",
+    npt.NDArray[np.float64]: READ_ONLY,
+    npt.NDArray[np.uint8]: "Array(uint8, 1, 'C', readonly=True)",
+}
 
 _lock = threading.RLock()
 _all: list[Kernel] = []
@@ -26,6 +38,9 @@ _told = False
 
 class Kernel:
     """A function that numba compiles when it is first called; `signature` fixes its one specialisation.
+
+    The signature may name a `NamedTuple` of the kernel's module, whose fields are numbers (`float`) or arrays (n,) that
+    the kernel only reads (`FloatArray`, `StatusArray`, made by `read_only`): arguments then have names.
 
     A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. What
     kernels call is compiled for them without an entry from Python, which alone takes as long as a small kernel; called
@@ -48,7 +63,7 @@ class Kernel:
         if self._compiled is None:
             with _lock:
                 if self._compiled is None:
-                    self._compiled = _compile(named(self), self.signature, {})
+                    self._compiled = _compile(self, "", {})
         return self._compiled
 
     @property
@@ -58,13 +73,19 @@ class Kernel:
             return self.compiled
         with _lock:
             if self._linked is None:
-                self._linked = _compile(named(self, "_linked"), self.signature, {"no_cpython_wrapper": True})
+                self._linked = _compile(self, "_linked", {"no_cpython_wrapper": True})
         return self._linked
 
     @property
     def is_instruction(self) -> bool:
         """Whether it stands for an instruction of the processor: it has no signature, and nothing of it is compiled."""
         return not self.signature
+
+    @property
+    def tuples(self) -> dict[str, type]:
+        """The named tuples that its signature names, by their names in its module."""
+        known = ((name, self.function.__globals__.get(name)) for name in re.findall(r"\w+", self.signature))
+        return {name: value for name, value in known if isinstance(value, type) and hasattr(value, "_fields")}
 
     @property
     def called(self) -> dict[str, Kernel]:
@@ -80,6 +101,13 @@ class Kernel:
 def kernel(signature: str, *, entry: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
     """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it."""
     return lambda function: Kernel(function, signature, entry)
+
+
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the array as a named tuple of a kernel's arguments holds it: contiguous, not to be written to."""
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
 
 
 def entries() -> list[Kernel]:
@@ -122,8 +150,10 @@ def _files(item: Kernel) -> set[str]:
 
 
 def _constants(item: Kernel) -> dict[str, object]:
-    """Return the numbers and enumerations that a kernel and those it calls read, by module and name."""
-    constants: dict[str, object] = {}
+    """Return the numbers, enumerations and named tuples that a kernel and those it calls read, by module and name."""
+    constants: dict[str, object] = {
+        f"{value.__module__}.{value.__qualname__}": dict(value.__annotations__) for value in item.tuples.values()
+    }
     for name in item.function.__code__.co_names:
         value = item.function.__globals__.get(name)
         if isinstance(value, EnumType):
@@ -164,10 +194,24 @@ def _no_collection() -> Iterator[None]:
         gc.enable()
 
 
-def _compile(function: Callable[..., Any], signature: str, options: dict[str, Any]) -> Callable[..., Any]:
+def _signature(item: Kernel) -> Any:
+    """Return the signature for numba, which knows the names of its own types alone."""
+    from numba import types
+
+    if not item.tuples:
+        return item.signature
+    names = dict(vars(types))
+    for name, value in item.tuples.items():
+        fields = [eval(_FIELDS[hint], vars(types)) for hint in get_type_hints(value).values()]
+        names[name] = types.BaseTuple.from_types(fields, value)
+    return eval(item.signature, names)
+
+
+def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[..., Any]:
     from numba import njit
 
     global _told
+    function, signature = named(item, suffix), _signature(item)
     options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, **options}
     with _no_collection():
         try:

@@ -6,7 +6,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 import cdtool.activation
@@ -15,7 +17,8 @@ import cdtool.machines.tree_kernel
 import cdtool.thresholds.first_order
 from cdtool import kernel_warm_up, kernels
 from cdtool.kernel_warm_up import compile_loaded, shares
-from cdtool.kernels import Kernel, kernel
+from cdtool.kernels import Kernel, kernel, read_only
+from cdtool.recording import FloatArray
 
 
 @kernel("float64(float64)")
@@ -34,6 +37,29 @@ def test_a_kernel_may_call_a_kernel_of_its_module():
 
 def test_a_kernel_says_what_the_function_said():
     assert _double.__name__ == "_double"
+
+
+class _Scale(NamedTuple):
+    factor: float
+    values: FloatArray
+
+
+@kernel("float64(_Scale, int64)")
+def _scaled(scale: _Scale, k: int) -> float:
+    return scale.factor * scale.values[k]
+
+
+@pytest.mark.parametrize("values", [np.arange(3.0), np.arange(6.0)[::2] / 2.0, read_only(np.arange(3.0))])
+def test_a_named_tuple_gives_a_kernel_numbers_and_arrays_by_name(values):
+    assert _scaled(_Scale(values=read_only(values), factor=5.0), 2) == 10.0
+
+
+def test_what_a_named_tuple_holds_cannot_be_written_to_and_is_no_copy():
+    values = np.arange(3.0)
+    shown = read_only(values)
+    assert np.shares_memory(shown, values) and values.flags.writeable
+    with pytest.raises(ValueError, match="read-only"):
+        shown[0] = 1.0
 
 
 @pytest.fixture
@@ -79,6 +105,21 @@ def test_a_cached_kernel_is_recompiled_when_what_it_imports_has_changed(outer, i
         run = [sys.executable, "-B", str(tmp_path / "outer.py")]
         said.append(float(subprocess.run(run, env=environment, capture_output=True, check=True).stdout))
     assert said == [6.0, 6.0, 15.0]
+
+
+def test_a_cached_kernel_is_recompiled_when_a_field_of_its_named_tuple_has_another_name(tmp_path):
+    (tmp_path / "outer.py").write_text(
+        "from cdtool.kernels import kernel\nfrom inner import inner\n"
+        "@kernel('float64(inner)')\ndef outer(x):\n    return 2.0 * x.value\nprint(outer(inner(3.0, 5.0)))\n"
+    )
+    project = str(Path(__file__).parents[1])
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": project}
+    said = []
+    for fields in ("value: float\n    other: float", "other: float\n    value: float"):
+        (tmp_path / "inner.py").write_text(f"from typing import NamedTuple\nclass inner(NamedTuple):\n    {fields}\n")
+        run = [sys.executable, "-B", str(tmp_path / "outer.py")]
+        said.append(float(subprocess.run(run, env=environment, capture_output=True, check=True).stdout))
+    assert said == [6.0, 10.0]
 
 
 def test_importing_modules_with_kernels_does_not_load_numba():

@@ -21,9 +21,10 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
-from cdtool.detectors.friction_ekf_arm_kernel import run_arm_filter
-from cdtool.detectors.friction_ekf_kernel import run_filter
+from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
+from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
 from cdtool.dynamics import Gain, JointEquation, Machine
+from cdtool.kernels import read_only
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
@@ -127,37 +128,37 @@ class FrictionEkf:
         """One joint: friction (n,) and status (n,); every accelerometer sample is used once, at its own time."""
         friction = np.zeros(len(motion.time))
         status = np.zeros(len(motion.time), dtype=np.uint8)
-        process = tuple(single(x) ** 2 for x in (self.friction_drift, self.drift_acceleration, self.drift_speed))
-        noise = (single(self.sigma_acceleration) ** 2, single(self.sigma_speed) ** 2)
-        limits = (process[0] * _INITIAL_DRIFT_TIME, single(self.minimum_speed), _ACCELERATION_HOLD, _GLITCH)
-        sensor = (motion.missing, motion.acceleration_time, motion.acceleration)
-        force = np.ascontiguousarray(equation.force)
-        link = equation.pendulum
-        if link is None:
-            body = (np.ascontiguousarray(equation.inertia), equation.viscous)
-            run_filter(motion.time, force, motion.speed, *sensor, *body, *process, *noise, *limits, friction, status)
-        else:
-            run_arm_filter(
-                motion.time,
-                force,
-                motion.speed,
-                motion.position,
-                link.other_position,
-                link.other_speed,
-                link.other_acceleration,
-                *sensor,
-                float(equation.inertia[0]),
-                equation.viscous,
-                link.gravity,
-                link.coupling,
-                *process,
-                single(self.drift_position) ** 2,
-                *noise,
-                single(self.sigma_position) ** 2,
-                *limits,
-                friction,
-                status,
-            )
+        samples = Samples(
+            *map(read_only, (motion.time, equation.force, motion.speed, motion.missing)),
+            *map(read_only, (motion.acceleration_time, motion.acceleration)),
+        )
+        drift = single(self.friction_drift) ** 2
+        variances = Variances(
+            q_d=drift,
+            q_a=single(self.drift_acceleration) ** 2,
+            q_v=single(self.drift_speed) ** 2,
+            r_a=single(self.sigma_acceleration) ** 2,
+            r_v=single(self.sigma_speed) ** 2,
+            initial=drift * _INITIAL_DRIFT_TIME,
+        )
+        bounds = Bounds(single(self.minimum_speed), _ACCELERATION_HOLD, _GLITCH)
+        pendulum = equation.pendulum
+        if pendulum is None:
+            inertia = np.ascontiguousarray(equation.inertia)
+            run_filter(samples, inertia, equation.viscous, variances, bounds, friction, status)
+            return friction, status
+        link = Link(
+            read_only(motion.position),
+            read_only(pendulum.other_position),
+            read_only(pendulum.other_speed),
+            read_only(pendulum.other_acceleration),
+            inertia=float(equation.inertia[0]),
+            viscous=float(equation.viscous),
+            gravity=float(pendulum.gravity),
+            coupling=float(pendulum.coupling),
+        )
+        angle = AngleVariances(q_q=single(self.drift_position) ** 2, r_q=single(self.sigma_position) ** 2)
+        run_arm_filter(samples, link, variances, angle, bounds, friction, status)
         return friction, status
 
     def steady_state(self, inertia: float, speed: float, friction: float, period: float) -> tuple[FloatArray, float]:

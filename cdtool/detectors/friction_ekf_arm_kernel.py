@@ -11,10 +11,11 @@ p14, p22, p23, p24, p33, p34, p44); each of the three measurements (a, v, q) is 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from cdtool.detection import Status, StatusArray
-from cdtool.detectors.friction_ekf_kernel import progress_of_settling
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, progress_of_settling
+from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
 State = tuple[float, float, float, float]
@@ -22,6 +23,29 @@ Covariance = tuple[float, float, float, float, float, float, float, float, float
 
 _TEN = "UniTuple(float64, 10)"
 _FOUR = "UniTuple(float64, 4)"
+
+
+class Link(NamedTuple):
+    """One joint of the arm: its angle (n,), which may hold NaN, and its terms of `dynamics.Pendulum`, all n known.
+
+    `inertia` and `coupling` [kg m2], `gravity` [N m], `viscous` [N m s/rad]: the friction to start from.
+    """
+
+    position: FloatArray
+    other_position: FloatArray
+    other_speed: FloatArray
+    other_acceleration: FloatArray
+    inertia: float
+    viscous: float
+    gravity: float
+    coupling: float
+
+
+class AngleVariances(NamedTuple):
+    """Process noise q and measurement noise r of the angle, the fourth state."""
+
+    q_q: float
+    r_q: float
 
 
 @kernel(f"{_TEN}({_TEN}, {', '.join(['float64'] * 8)})")
@@ -90,45 +114,23 @@ def correct(
     return corrected, update_covariance(p, column, k, innovation)
 
 
-@kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
-    f"Array(uint8, 1, 'C', readonly=True), {READ_ONLY}, {READ_ONLY}, {', '.join(['float64'] * 15)}, "
-    "float64[::1], uint8[::1])"
-)
+@kernel("void(Samples, Link, Variances, AngleVariances, Bounds, float64[::1], uint8[::1])")
 def run_arm_filter(
-    time: FloatArray,
-    force: FloatArray,
-    speed: FloatArray,
-    position: FloatArray,
-    other_position: FloatArray,
-    other_speed: FloatArray,
-    other_acceleration: FloatArray,
-    missing: StatusArray,
-    acceleration_time: FloatArray,
-    acceleration: FloatArray,
-    inertia: float,
-    viscous: float,
-    gravity: float,
-    coupling: float,
-    q_d: float,
-    q_a: float,
-    q_v: float,
-    q_q: float,
-    r_a: float,
-    r_v: float,
-    r_q: float,
-    initial_variance: float,
-    minimum_speed: float,
-    acceleration_hold: float,
-    glitch: float,
+    samples: Samples,
+    link: Link,
+    variances: Variances,
+    angle: AngleVariances,
+    bounds: Bounds,
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (n,), zeros before, of one joint.
-
-    `speed`, `position` and `acceleration` may hold NaN (no sample), the others may not; `missing`: any input is.
-    """
-    samples = len(acceleration)
+    """Fill `friction` and `status` (n,), zeros before, of one joint of the arm."""
+    time, force, speed, missing, acceleration_time, acceleration = samples
+    position, other_position, other_speed, other_acceleration, inertia, viscous, gravity, coupling = link
+    q_d, q_a, q_v, r_a, r_v, initial_variance = variances
+    q_q, r_q = angle
+    minimum_speed, acceleration_hold, glitch = bounds
+    last_sample = len(acceleration)
     next_sample = 0
     started = False
     p: Covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -146,7 +148,7 @@ def run_arm_filter(
         if started and time[k] - last_speed_time > 1.0:
             started = False  # a long gap: nothing of the old state is worth keeping
         if not started:
-            while next_sample < samples and acceleration_time[next_sample] <= time[k]:
+            while next_sample < last_sample and acceleration_time[next_sample] <= time[k]:
                 if math.isfinite(acceleration[next_sample]):
                     a = acceleration[next_sample]
                     last_acceleration_time = acceleration_time[next_sample]
@@ -170,7 +172,7 @@ def run_arm_filter(
             continue
         while True:
             # The next event: an accelerometer sample of its own time, else the speed's time.
-            own_sample = next_sample < samples and acceleration_time[next_sample] <= time[k]
+            own_sample = next_sample < last_sample and acceleration_time[next_sample] <= time[k]
             until = acceleration_time[next_sample] if own_sample else time[k]
             step = until - now
             if step > 0.0:

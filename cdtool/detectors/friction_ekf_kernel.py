@@ -9,14 +9,52 @@ forced to zero where the friction cannot be observed.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from cdtool.detection import Status, StatusArray
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
 Covariance = tuple[float, float, float, float, float, float]
 
 _SIX = "UniTuple(float64, 6)"
+
+
+class Samples(NamedTuple):
+    """What is known of one joint at `time` (n,) s, and its accelerometer at `acceleration_time` (m,) s.
+
+    `speed` and `acceleration` may hold NaN (no sample), `force` may not. `missing` (n,) uint8: not 0 where the status
+    is to be GAP, whatever is finite.
+    """
+
+    time: FloatArray
+    force: FloatArray
+    speed: FloatArray
+    missing: StatusArray
+    acceleration_time: FloatArray
+    acceleration: FloatArray
+
+
+class Variances(NamedTuple):
+    """Process noise q of (d, a, v), measurement noise r of (a, v), and the variance of d at a start."""
+
+    q_d: float
+    q_a: float
+    q_v: float
+    r_a: float
+    r_v: float
+    initial: float
+
+
+class Bounds(NamedTuple):
+    """`minimum_speed`: below it the friction cannot be observed [m/s, rad/s].
+
+    `acceleration_hold` [s]: how long an accelerometer may be silent. `glitch` [s]: a shorter stop is none.
+    """
+
+    minimum_speed: float
+    acceleration_hold: float
+    glitch: float
 
 
 @kernel(f"{_SIX}({_SIX}, float64, float64, float64, float64, float64, float64)")
@@ -101,40 +139,24 @@ def progress_of_settling(
     return 0.0 if time - last_applicable > glitch else settled, against, forward, last_applicable
 
 
-_READ = "Array(float64, 1, 'C', readonly=True)"
-
-
-@kernel(
-    f"void({_READ}, {_READ}, {_READ}, Array(uint8, 1, 'C', readonly=True), {_READ}, {_READ}, {_READ}, "
-    f"{', '.join(['float64'] * 10)}, float64[::1], uint8[::1])"
-)
+@kernel(f"void(Samples, {READ_ONLY}, float64, Variances, Bounds, float64[::1], uint8[::1])")
 def run_filter(
-    time: FloatArray,
-    force: FloatArray,
-    speed: FloatArray,
-    missing: StatusArray,
-    acceleration_time: FloatArray,
-    acceleration: FloatArray,
+    samples: Samples,
     inertia: FloatArray,
     viscous: float,
-    q_d: float,
-    q_a: float,
-    q_v: float,
-    r_a: float,
-    r_v: float,
-    initial_variance: float,
-    minimum_speed: float,
-    acceleration_hold: float,
-    glitch: float,
+    variances: Variances,
+    bounds: Bounds,
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
     """Fill `friction` and `status` (n,), zeros before, of one joint.
 
-    `inertia` (n,), or (1,) where it is constant. `speed` and `acceleration` may hold NaN (no sample), `force` may not;
-    `missing`: force or speed is missing.
+    `inertia` (n,), or (1,) where it is constant [kg, kg m2]; `viscous` [N s/m, N m s/rad]: the friction to start from.
     """
-    samples = len(acceleration)
+    time, force, speed, missing, acceleration_time, acceleration = samples
+    q_d, q_a, q_v, r_a, r_v, initial_variance = variances
+    minimum_speed, acceleration_hold, glitch = bounds
+    last_sample = len(acceleration)
     next_sample = 0
     started = False
     p: Covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -159,7 +181,7 @@ def run_filter(
         if started and time[k] - last_speed_time > 1.0:
             started = False  # a long gap: nothing of the old state is worth keeping
         if not started:
-            while next_sample < samples and acceleration_time[next_sample] <= time[k]:
+            while next_sample < last_sample and acceleration_time[next_sample] <= time[k]:
                 if math.isfinite(acceleration[next_sample]):
                     a = acceleration[next_sample]
                     last_acceleration_time = acceleration_time[next_sample]
@@ -187,7 +209,7 @@ def run_filter(
             continue
         while True:
             # The next event: an accelerometer sample of its own time, else the speed's time.
-            own_sample = next_sample < samples and acceleration_time[next_sample] <= time[k]
+            own_sample = next_sample < last_sample and acceleration_time[next_sample] <= time[k]
             until = acceleration_time[next_sample] if own_sample else time[k]
             step = until - now
             if step > 0.0:
