@@ -13,8 +13,8 @@ import numpy as np
 from cdtool.clock.wild import EPOCH, leading_wild
 from cdtool.formats.csv.blank_lines import filled
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import Integers
-from cdtool.formats.csv.rows import Rows
 from cdtool.formats.csv.stamps import NS
 from cdtool.formats.csv.text import Bytes
 from cdtool.recording import BoolArray, FloatArray

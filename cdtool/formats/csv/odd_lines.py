@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import STAMP_LIKE, holds_numbers, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
 from cdtool.formats.csv.shown_pins import quoted
 from cdtool.plain_text import counted
@@ -19,9 +19,6 @@ from cdtool.recording import Finding
 # A survey keeps a column of numbers with so many cells that are none, or with this share of the rows.
 _FEW, _SHARE = 3, 0.05
 _LAYOUT = 'repair it, or pin time_format in [csv], e.g. "%d.%m.%Y %H:%M:%S.%f"'
-
-if TYPE_CHECKING:
-    from cdtool.formats.csv.rows import Rows
 
 
 @dataclass(frozen=True)

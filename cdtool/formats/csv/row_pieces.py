@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from cdtool.formats.csv.odd_lines import OddLines
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import read_rows
-from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.rows import RowReader
 
 _AHEAD = 2
 

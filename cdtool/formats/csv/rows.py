@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,10 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.marks import thousands_byte
 from cdtool.formats.csv.number_kernel import powers
 from cdtool.formats.csv.odd_lines import OddLine, OddLines
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, STAMP, Integers, count_lines, read_rows
 from cdtool.formats.csv.stamp_kernel import STEPS
 from cdtool.formats.csv.text import AFTER
-from cdtool.recording import FloatArray
 
 _THREADS = 4
 
@@ -38,22 +38,6 @@ class _Read:
     blank: Integers
     empty: Integers
     odd: list[OddLine]
-
-
-@dataclass
-class Rows:
-    """The numbers (k, n) and the stamps (m, n) of the columns asked for; `not_rows` are lines that are none."""
-
-    numbers: FloatArray
-    stamps: Integers
-    count: int
-    first_line: int
-    not_rows: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-
-    def line(self, row: int) -> int:
-        """The file's line (from 1) of a row (from 0)."""
-        before = self.not_rows - np.arange(len(self.not_rows))
-        return self.first_line + row + int(np.searchsorted(before, self.first_line + row, side="right"))
 
 
 class RowReader:

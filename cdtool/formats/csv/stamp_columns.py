@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
-from cdtool.formats.csv.rows import Rows
 from cdtool.formats.csv.stamps import Layout, seconds_since, unwrapped
 from cdtool.recording import Finding, FloatArray
 

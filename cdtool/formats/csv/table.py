@@ -16,7 +16,8 @@ from cdtool.formats.csv.exact_clock import exact_differences
 from cdtool.formats.csv.excel_days import DAY_S, since_1970, two_readings
 from cdtool.formats.csv.last_line import RECENT, is_whole
 from cdtool.formats.csv.odd_lines import OddLines, not_numeric
-from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.row_arrays import Rows
+from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
 from cdtool.formats.large_integers import rounded_integers, rounding_finding

@@ -11,8 +11,8 @@ import numpy as np
 
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.odd_lines import OddLines
+from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_pieces import RowPieces
-from cdtool.formats.csv.rows import Rows
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
