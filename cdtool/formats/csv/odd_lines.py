@@ -35,6 +35,8 @@ class OddLine:
 class OddLines:
     """What became of the lines that are not plain.
 
+    `targets` (width,) is which column goes where, as the loop over the plain ones has it: a column that is left out
+    later is left out there too.
     With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
     `unread` are these cells by column, each with its line. `dropped` are the rows that are none, with their lines;
     `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none);
@@ -45,6 +47,7 @@ class OddLines:
     path: Path
     dialect: Dialect
     survey: bool
+    targets: Integers
     dropped: dict[int, int] = field(default_factory=dict)
     left_out: dict[int, Finding] = field(default_factory=dict)
     unread: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
@@ -55,12 +58,8 @@ class OddLines:
     empty: list[int] = field(default_factory=list)
     words: list[tuple[int, int, str]] = field(default_factory=list)
 
-    def attach(self, rows: Rows, targets: Integers) -> None:
-        """The arrays that the rows go to, and which column goes where."""
-        self.rows, self.targets = rows, targets
-
-    def take(self, item: OddLine, first_line: int) -> None:
-        """One line, in the file's order; `first_line` is that of its block."""
+    def take(self, item: OddLine, first_line: int, rows: Rows) -> None:
+        """Read one line into `rows`, in the file's order; `first_line` is that of its block."""
         line = first_line + item.line
         if self._is_skipped(item, line):
             self.ends_skipped = item.unfinished
@@ -69,7 +68,7 @@ class OddLines:
             self._drop(item, line, "")
             self.cut_line = line
         else:
-            self._judge(item, line)
+            self._judge(item, line, rows)
 
     def findings(self, last_line: int) -> list[Finding]:
         """What was skipped, each kind once; blank lines behind the last row are not worth a word."""
@@ -115,7 +114,7 @@ class OddLines:
         cells = split_line(rest, self.dialect.separator)
         return self.dialect.commented or len(cells) != self.dialect.width or rest[:1] == " " or kind(cells[0]) != "X"
 
-    def _judge(self, item: OddLine, line: int) -> None:
+    def _judge(self, item: OddLine, line: int, rows: Rows) -> None:
         text = self.dialect.text.decode(item.text).rstrip("\r")
         if "\r" in text:
             raise RecordingError(
@@ -132,7 +131,7 @@ class OddLines:
             return
         for column, target in enumerate(self.targets.tolist()):
             if target != LEFT:
-                self._cell(item, line, column, target, cells[column])
+                self._cell(rows, item.row, line, column, cells[column])
 
     def _not_a_row(self, item: OddLine, line: int, cells: list[str], text: str) -> None:
         """Words below the rows are a footer, if nothing but words follows; anything else is a row of another width."""
@@ -161,7 +160,8 @@ class OddLines:
             "repair or remove the line; pin comment in [csv] if such lines are comments",
         )
 
-    def _cell(self, item: OddLine, line: int, column: int, target: int, cell: str) -> None:
+    def _cell(self, rows: Rows, row: int, line: int, column: int, cell: str) -> None:
+        target = int(self.targets[column])
         if target == EMPTY:
             if cell:
                 raise RecordingError(
@@ -173,24 +173,24 @@ class OddLines:
         if target <= STAMP:
             stamp = MISSING_STAMP if cell in ("", *self.dialect.missing) else self._stamp(column, cell)
             if stamp is not None:
-                self.rows.stamps[STAMP - target, item.row] = stamp
+                rows.stamps[STAMP - target, row] = stamp
                 return
         else:
             value = self._number(cell)
             if value is not None:
-                self.rows.numbers[target, item.row] = value
+                rows.numbers[target, row] = value
                 return
         name = self.dialect.names[column]
         if not self.survey:
             raise self._unreadable(line, column, target, cell)
         if target <= STAMP:
-            self.rows.stamps[STAMP - target, item.row] = MISSING_STAMP
+            rows.stamps[STAMP - target, row] = MISSING_STAMP
         else:
-            self.rows.numbers[target, item.row] = math.nan
+            rows.numbers[target, row] = math.nan
         unread = self.unread.setdefault(column, [])
         unread.append((line, cell))
-        rows = max(self.dialect.sampled, line - self.dialect.first_line)
-        if len(unread) > max(_FEW, _SHARE * rows):
+        so_far = max(self.dialect.sampled, line - self.dialect.first_line)
+        if len(unread) > max(_FEW, _SHARE * so_far):
             self.targets[column] = LEFT
             text = f"{not_numeric(name, *unread[0]).message}; {_hint(self.dialect, unread[0][1])}"
             self.left_out[column] = Finding(text)

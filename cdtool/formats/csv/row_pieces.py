@@ -25,10 +25,9 @@ class RowPieces(RowReader):
         line = self.dialect.first_line
         for done, rows in self._ahead():
             rows.first_line = line
-            odd.attach(rows, self.targets)
             words = len(odd.words)
             for item in done.odd:
-                odd.take(item, line)
+                odd.take(item, line, rows)
             dropped, odd.dropped = odd.dropped, {}
             kept = np.ones(done.rows, dtype=bool)
             kept[list(dropped)] = False

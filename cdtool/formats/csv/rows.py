@@ -66,7 +66,6 @@ class RowReader:
             0,
             self.dialect.first_line,
         )
-        odd.attach(rows, self.targets)
         runs: list[tuple[int, int]] = []
         blank: list[Integers] = []
         line = self.dialect.first_line
@@ -75,7 +74,7 @@ class RowReader:
             blank.append(done.blank + line)
             odd.empty += (done.empty + line).tolist()
             for item in done.odd:
-                odd.take(item, line)
+                odd.take(item, line, rows)
             runs.append((place, done.rows))
             place += room
             line += done.lines

@@ -65,8 +65,8 @@ def read_table(
     """The columns `keys`; `clock` is the one that the machine file calls the time. Raises RecordingError."""
     survey = wanted is None
     asked = Asked.of(path, dialect, keys, clock, survey)
-    odd = OddLines(path, dialect, survey, left_out=asked.left_out)
     reader = RowReader(path, dialect, asked.numeric, asked.stamps)
+    odd = OddLines(path, dialect, survey, reader.targets, left_out=asked.left_out)
     rows = reader.read(odd)
     findings = end_findings(dialect, asked, odd, reader.ended, rows)
     values = {

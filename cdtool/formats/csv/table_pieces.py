@@ -25,9 +25,10 @@ from cdtool.recording import FloatArray
 def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, Table]:
     """The columns `keys`, as far as they hold numbers; at the end the table without its rows. Raises RecordingError."""
     asked = Asked.of(path, dialect, keys, None, survey=True)
-    odd = OddLines(path, dialect, True, left_out=asked.left_out)
+    reader = RowPieces(path, dialect, asked.numeric, asked.stamps)
+    odd = OddLines(path, dialect, True, reader.targets, left_out=asked.left_out)
     stamped = StampColumns(dialect, asked.stamps, asked.dates)
-    blocks = _Blocks(RowPieces(path, dialect, asked.numeric, asked.stamps))
+    blocks = _Blocks(reader)
     clocks = Clocks.by_names(dialect)
     first: dict[str, FloatArray] = {}
     rounded: Counter[str] = Counter()
