@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from cdtool.cores import usable_cores
@@ -110,15 +111,33 @@ def _weight(items: Iterable[Kernel]) -> int:
 
 
 def _not_cached(items: Iterable[Kernel]) -> list[Kernel]:
-    """The kernels that are not in numba's cache; none where there is no cache, or no telling what is in it."""
-    numba: Any = import_module("numba")
-    cache: Any = import_module("numba.core.caching").FunctionCache
+    """Return the kernels that are not in numba's cache; none where there is no cache.
+
+    numba has no call that looks into its cache without compiling. What it documents is used instead: the folder
+    (`stats.cache_path` of a function that was not compiled yet), and that each function has one index file there,
+    `.nbi`, by its name. An index older than the kernel's file or than numba is out of date. A wrong answer costs time,
+    never a result: what was taken for cached is compiled by this process.
+    """
+    import numba
+
     if numba.config.DISABLE_JIT:
         return []
     try:
-        return [item for item in items if not cache(named(item))._cache_file._load_index()]
-    except (AttributeError, RuntimeError, OSError):
+        return [item for item in items if not _is_cached(item)]
+    except (RuntimeError, OSError):  # no folder can be written
         return []
+
+
+def _is_cached(item: Kernel) -> bool:
+    import numba
+
+    function = named(item)
+    lazy: Any = numba.njit(cache=True)(function)
+    changed = max(Path(file).stat().st_mtime for file in (item.function.__code__.co_filename, numba.__file__))
+    # numba leaves the signs < and > out of file names.
+    name = function.__qualname__.translate({ord("<"): None, ord(">"): None})
+    indices = Path(lazy.stats.cache_path).glob(f"*.{name}-*.nbi")
+    return any(index.stat().st_mtime >= changed for index in indices)
 
 
 def _start(share: Iterable[Kernel]) -> subprocess.Popen[bytes] | None:

@@ -201,21 +201,23 @@ def _signature(item: Kernel) -> Any:
     if not item.tuples:
         return item.signature
     names = dict(vars(types))
+    kind_of: Any = types.BaseTuple.from_types
     for name, value in item.tuples.items():
         fields = [eval(_FIELDS[hint], vars(types)) for hint in get_type_hints(value).values()]
-        names[name] = types.BaseTuple.from_types(fields, value)
+        names[name] = kind_of(fields, value)
     return eval(item.signature, names)
 
 
 def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[..., Any]:
-    from numba import njit
+    import numba
 
     global _told
+    njit: Any = numba.njit
     function, signature = named(item, suffix), _signature(item)
     options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, **options}
     with _no_collection():
         try:
-            return njit(signature, cache=True, **options)(function)
+            compiled: Callable[..., Any] = njit(signature, cache=True, **options)(function)
         except (RuntimeError, OSError) as fault:
             if not _told:
                 _told = True
@@ -225,4 +227,5 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
                     RuntimeWarning,
                     stacklevel=4,
                 )
-            return njit(signature, **options)(function)
+            compiled = njit(signature, **options)(function)
+        return compiled

@@ -203,5 +203,20 @@ def test_what_another_process_compiled_is_taken_from_the_cache_and_the_rest_comp
     assert done.stdout.splitlines() == ["1 3 6", f"0 {taken} {taken} {taken}", "0 0"], done.stderr
 
 
+@pytest.mark.parametrize("name", ["kernel", "<lambda>"])
+def test_a_kernel_is_not_in_the_cache_before_it_is_compiled_and_after_its_file_has_changed(name, tmp_path):
+    source = tmp_path / "own_kernels.py"
+    source.write_text("def f(x):\n    return x + 1.0\ng = lambda x: x + 1.0\n")
+    namespace: dict = {"__name__": "own_kernels"}
+    exec(compile(source.read_text(), str(source), "exec"), namespace)
+    item = kernel("float64(float64)")(namespace["f" if name == "kernel" else "g"])
+    assert kernel_warm_up._not_cached([item]) == [item]
+    assert item(1.0) == 2.0
+    assert kernel_warm_up._not_cached([item]) == []
+    later = source.stat().st_mtime + 3600.0
+    os.utime(source, (later, later))
+    assert kernel_warm_up._not_cached([item]) == [item]
+
+
 def test_where_no_cache_can_be_written_no_process_is_started(no_cache_folder):
     assert kernel_warm_up._not_cached(_ours()) == []

@@ -10,11 +10,12 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import Detector
+from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import Recording
 
 
-def checked_signal(detector: Detector, recording: Recording, machine: Any) -> Signal:
+def checked_signal(detector: Detector, recording: Recording, machine: Machine) -> Signal:
     """`detector.signal` of a recording; raises RecordingError where it fails or breaks the contract."""
     try:
         signal = detector.signal(recording, machine)

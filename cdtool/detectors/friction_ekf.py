@@ -129,8 +129,12 @@ class FrictionEkf:
         friction = np.zeros(len(motion.time))
         status = np.zeros(len(motion.time), dtype=np.uint8)
         samples = Samples(
-            *map(read_only, (motion.time, equation.force, motion.speed, motion.missing)),
-            *map(read_only, (motion.acceleration_time, motion.acceleration)),
+            read_only(motion.time),
+            read_only(equation.force),
+            read_only(motion.speed),
+            read_only(motion.missing),
+            read_only(motion.acceleration_time),
+            read_only(motion.acceleration),
         )
         drift = single(self.friction_drift) ** 2
         variances = Variances(
