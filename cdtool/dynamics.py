@@ -7,8 +7,8 @@ what the machine exerts on the obstacle; every residual tends to +tau_c. Positio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import Field, dataclass
+from typing import Any, ClassVar, Protocol, TypeGuard
 
 from cdtool.recording import FloatArray, Recording
 
@@ -46,7 +46,14 @@ class JointEquation:
 
 
 class Machine(Protocol):
-    """The contract of machines/: see the module's conventions. Every method works on whole recordings at once."""
+    """The contract of machines/: see the module's conventions. Every method works on whole recordings at once.
+
+    A machine is a frozen dataclass of its parameters, from which its fingerprint is made. `default_sides`, "one" or
+    "two": on which sides of its band a threshold raises alarms where neither settings nor a file say.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    default_sides: ClassVar[str]
 
     @property
     def name(self) -> str:
@@ -134,3 +141,24 @@ class Machine(Protocol):
     ) -> list[JointEquation]:
         """One equation a joint, the other joints' motion taken as known."""
         ...
+
+
+class LinkedMachine(Machine, Protocol):
+    """A machine of coupled joints: it knows what a force at a point of a link does to them."""
+
+    def contact_torque(
+        self, position: FloatArray, force: FloatArray, link: str, point: tuple[float, float, float]
+    ) -> FloatArray:
+        """J_c' F (n, J) of the force and moment (n, 6) that the machine exerts at a point of a link (thesis 2.5)."""
+        ...
+
+    def contact_force(
+        self, position: FloatArray, residual: FloatArray, link: str, point: tuple[float, float, float]
+    ) -> FloatArray:
+        """The force (n, 3) [N] at that point that explains a joint residual (n, J) best."""
+        ...
+
+
+def has_links(machine: Machine) -> TypeGuard[LinkedMachine]:
+    """Whether a force can be said to act at a point of one of its links."""
+    return machine.coupled

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.channels import ChannelMap, TablePins, read_channel_map
-from cdtool.dynamics import Gain
+from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
 from cdtool.tables import Table, read_toml
@@ -25,7 +25,7 @@ class MachineFile:
     """A validated machine file: the machine, where its channels are, and gains that differ from the defaults."""
 
     path: Path
-    machine: Any
+    machine: Machine
     columns: ChannelMap
     topics: ChannelMap
     gains: Mapping[str, Mapping[str, Gain]]
@@ -67,7 +67,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     return MachineFile(file, machine, columns, topics, gains, digest)
 
 
-def fingerprint(machine: Any) -> str:
+def fingerprint(machine: Machine) -> str:
     """A hash of a machine's parameters: a signature belongs to exactly these."""
     text = json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from cdtool.clock.lost import lost_samples
 from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
+from cdtool.dynamics import Machine
 from cdtool.judgement import Judgement, judged
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD
@@ -120,7 +120,7 @@ class Detection:
         ]
 
 
-def run_detector(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str] = ()) -> Signal:
+def run_detector(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str] = ()) -> Signal:
     """The detector's signal of an operation, of the watched joints (none named: all of them).
 
     It runs over the whole log that the operation was cut from, and ground truth is taken away before it looks. Raises
@@ -131,7 +131,7 @@ def run_detector(operation: Operation, machine: Any, detector: Detector, watched
 
 
 def run_detector_on_each(
-    operations: Sequence[Operation], machine: Any, detector: Detector, watched: Sequence[str] = ()
+    operations: Sequence[Operation], machine: Machine, detector: Detector, watched: Sequence[str] = ()
 ) -> list[Signal]:
     """The detector's signal of each operation of one log, over which it runs once; raises as `run_detector` does."""
     if not operations:
@@ -142,7 +142,7 @@ def run_detector_on_each(
 
 def detect_operations(
     operations: Sequence[Operation],
-    machine: Any,
+    machine: Machine,
     detector: Detector,
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
@@ -160,7 +160,7 @@ def detect_operations(
     return _judge_log(operations, detector.name, signal, thresholds, activation, hold)
 
 
-def _lost_inputs(detector: Detector, recording: Recording, machine: Any, signal: Signal) -> BoolArray | None:
+def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
     """Where the detector's inputs lost samples, for the columns of its signal; None where none was lost."""
     channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
     lost = lost_samples(recording, channels, signal.time)
@@ -172,7 +172,7 @@ def _lost_inputs(detector: Detector, recording: Recording, machine: Any, signal:
 
 def detect_operation(
     operation: Operation,
-    machine: Any,
+    machine: Machine,
     detector: Detector,
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
@@ -195,7 +195,7 @@ def judge(
     return replace(detection, operation=operation)
 
 
-def _signal_of_log(operation: Operation, machine: Any, detector: Detector, watched: Sequence[str]) -> Signal:
+def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str]) -> Signal:
     recording = operation.whole.without_ground_truth()
     signal = checked_signal(detector, recording, machine)
     lost = _lost_inputs(detector, recording, machine, signal)

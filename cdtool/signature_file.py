@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from cdtool.activation import Activation
-from cdtool.dynamics import Gain
+from cdtool.dynamics import Gain, Machine
 from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint
 from cdtool.plain_text import counted, digits
 from cdtool.plausible import PlausibleRanges
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
 
 
@@ -63,7 +63,7 @@ class SignatureFile:
     gains: Mapping[str, Gain]
     unit: str
     joints: tuple[str, ...]
-    rule: Any
+    rule: Threshold
     origin: FactorOrigin
     activation: Activation
     current: tuple[FittedThreshold, ...]
@@ -112,7 +112,7 @@ class SignatureFile:
             return f"{self.threshold} {', '.join(map(digits, by_hand))} {self.unit} {self.origin}"
         return f"{self.threshold}, safety factor {self.current[0].safety_factor:.4g} {self.origin}"
 
-    def check(self, machine: Any, detector: Any) -> None:
+    def check(self, machine: Machine, detector: Any) -> None:
         """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
         where = self.source or "signature"
         if detector.name != self.detector:

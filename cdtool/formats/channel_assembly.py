@@ -10,13 +10,14 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
+from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.formats.source import Column, Source, find_key
@@ -28,7 +29,7 @@ from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray,
 Counts = npt.NDArray[np.int64]
 
 
-def as_logged(source: Source, channels: ChannelMap, machine: Any) -> Recording:
+def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
     """The channels in SI as the machine logs them, not yet referred to the load side.
 
     The columns are taken out of the source one after another: none is longer in memory than it is needed.

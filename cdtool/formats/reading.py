@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
 from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
@@ -97,7 +97,9 @@ class LoggedRecording:
     factors: Mapping[str, tuple[float, ...]]
     speed_low_pass: float
 
-    def on_load_side(self, machine: Any, ranges: PlausibleRanges | None = None, *, to_learn: bool = False) -> Recording:
+    def on_load_side(
+        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
+    ) -> Recording:
         """The recording on the load side, made without the values that are outside of the plausible ranges."""
         plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
         recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)

@@ -28,6 +28,11 @@ class CoupledMachine(JointMachine, ABC):
     default_sides: ClassVar[str] = "two"  # which side of a link a contact is on is not known
     derives_position: ClassVar[bool] = False
 
+    @property
+    @abstractmethod
+    def nominal_inertia(self) -> FloatArray:
+        """(J,): the diagonal of M at home [kg m2, kg]."""
+
     @abstractmethod
     def momentum_terms(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """p = M v, C'v and g, each (n, J): momentum [N m s, N s] and torques [N m, N]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import Field, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
@@ -51,9 +51,15 @@ class Threshold(Protocol):
     benchmark file's [signature].
     """
 
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     name: ClassVar[str]
     needs: ClassVar[tuple[str, ...]]
     fitted: ClassVar[tuple[type, ...]]
+
+    @property
+    def safety_factor(self) -> float | None:
+        """How far the limits are to be from what is normal, above 0; None where other settings decide."""
+        ...
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
         """Learn from impact-free runs; fitting may look at whole runs. Raises SignatureError."""

@@ -13,7 +13,7 @@ from cdtool.errors import UsageError
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
 from cdtool.thresholds.adaptive import Adaptive
-from cdtool.thresholds.base import FittedThreshold, exceedance
+from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.glr import Glr
@@ -26,7 +26,7 @@ from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.trend import Trend
 
 ACTIVATIONS = ("any", "all")
-_RULES = {
+_RULES: dict[str, type[Threshold]] = {
     rule.name: rule
     for rule in (Signature, Limit, PredictedLimit, Trend, LimitAndTrend, Innovation, Adaptive, Cusum, Glr)
 }
@@ -125,5 +125,5 @@ class Combined:
         members = tuple(rule.fit(pairs) for rule in self._rules())
         return FittedCombined(members, self.activation, self.safety_factor)
 
-    def _rules(self) -> list[Any]:
+    def _rules(self) -> list[Threshold]:
         return [with_context(_RULES[name](), self.sides, self.signature) for name in self.members]

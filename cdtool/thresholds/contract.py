@@ -5,19 +5,18 @@ from __future__ import annotations
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cdtool.detection import Band, Signal
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, exceedance
+from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
 
 _HINT = "a fault of the threshold: see docs/own-detector.md"
 
 
-def checked_fit(rule: Any, pairs: Sequence[tuple[Recording, Signal]]) -> Any:
+def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
     """What the rule learns of impact-free runs; raises SignatureError where it fails or makes what it does not name."""
     try:
         fitted = rule.fit(pairs)

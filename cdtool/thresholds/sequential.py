@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, Protocol, Self
 
 from cdtool.detection import Band, Signal
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.limit import FittedLimit, Limit
 from cdtool.thresholds.settings import on_side, watched_side
 from cdtool.thresholds.signature import Signature
@@ -19,10 +20,8 @@ from cdtool.thresholds.whitening import Whitening
 LARGEST_ORDER = 20
 
 
-class SequentialRule(Protocol):
-    """A frozen dataclass of settings that makes a statistic of innovations."""
-
-    name: ClassVar[str]
+class SequentialRule(Threshold, Protocol):
+    """A threshold that makes a statistic of innovations."""
 
     @property
     def safety_factor(self) -> float:
@@ -81,7 +80,7 @@ class FittedSequential:
         """As JSON values."""
         return {
             # The signature's own settings are in the learned one.
-            **rule_to_dict(replace(self.rule, signature=None)),  # type: ignore[type-var]
+            **rule_to_dict(replace(self.rule, signature=None)),
             "whitening": self.whitening.to_dict(),
             "limit": self.limit.to_dict(),
             "side": self.side,

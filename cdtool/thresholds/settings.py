@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import TypeVar
 
 from cdtool.errors import UsageError
 from cdtool.motion import MotionClass
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.fitted_signature import SIDES, known
 from cdtool.thresholds.limit import FittedLimit
+
+Rule = TypeVar("Rule", bound=Threshold)
 
 
 def check_above(value: float, least: float, what: str) -> None:
@@ -42,7 +45,7 @@ def on_side(limit: FittedLimit, side: int) -> FittedLimit:
     return replace(limit, spread_above=nothing) if side < 0 else limit
 
 
-def with_context(rule: Any, sides: str | None, signature: Any) -> Any:
+def with_context(rule: Rule, sides: str | None, signature: Threshold | None) -> Rule:
     """The rule with these sides where it leaves them open, and this signature's settings where it has such a field."""
     open_fields = {item.name for item in fields(rule) if getattr(rule, item.name) is None}
     given = {"sides": sides, "signature": signature}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -12,16 +12,15 @@ from cdtool.detection import Band, Signal
 from cdtool.errors import SignatureError
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.limit import FittedLimit, Limit
 from cdtool.thresholds.settings import on_side, watched_side
 from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
 
 
-class StatisticRule(Protocol):
-    """A frozen dataclass of settings that makes a statistic of a signal."""
-
-    name: ClassVar[str]
+class StatisticRule(Threshold, Protocol):
+    """A threshold that makes a statistic of a signal."""
 
     @property
     def safety_factor(self) -> float:

@@ -7,9 +7,10 @@ from dataclasses import asdict
 from typing import Any
 
 from cdtool.errors import SignatureError
+from cdtool.thresholds.base import Threshold
 
 
-def rule_to_dict(rule: Any) -> dict[str, Any]:
+def rule_to_dict(rule: Threshold) -> dict[str, Any]:
     """A rule's name and settings."""
     return {"rule": rule.name, "settings": asdict(rule)}
 
@@ -28,7 +29,7 @@ def rule_from_dict(values: Mapping[str, Any]) -> Any:
     return THRESHOLDS.load(values["rule"])(**settings)
 
 
-def fitted_to_dict(rule: Any, fitted: Any) -> dict[str, Any]:
+def fitted_to_dict(rule: Threshold, fitted: Any) -> dict[str, Any]:
     """A fitted threshold with the name of its class, which must be among those that its rule names in `fitted`."""
     if type(fitted) not in rule.fitted:
         raise SignatureError(
@@ -43,7 +44,7 @@ def fitted_to_dict(rule: Any, fitted: Any) -> dict[str, Any]:
         ) from fault
 
 
-def fitted_from_dict(rule: Any, values: Mapping[str, Any]) -> Any:
+def fitted_from_dict(rule: Threshold, values: Mapping[str, Any]) -> Any:
     """The inverse of `fitted_to_dict`; raises KeyError for a class that the rule does not make."""
-    known = {item.__name__: item for item in rule.fitted}
+    known: dict[str, Any] = {item.__name__: item for item in rule.fitted}
     return known[values["fitted"]].from_dict(values)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from cdtool.clock import previous_value
+from cdtool.dynamics import Machine, has_links
 from cdtool.errors import UsageError
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray, Series
@@ -36,7 +36,7 @@ class ContactPoint:
         return f"{self.link} ({', '.join(f'{x:g}' for x in self.point)}) m"
 
 
-def contact_force(detection: Detection, machine: Any, contact: ContactPoint) -> Series:
+def contact_force(detection: Detection, machine: Machine, contact: ContactPoint) -> Series:
     """The force (n, 3) [N], base axes, that the machine exerts at the point, on the signal's clock.
 
     Least squares of J_c' F = residual. NaN where the signal cannot be judged or the pose is missing. In a direction in
@@ -44,7 +44,7 @@ def contact_force(detection: Detection, machine: Any, contact: ContactPoint) -> 
     signal is no contact torque of all joints, ConfigurationError for an unknown link.
     """
     signal, recording = detection.statistic, detection.operation.recording
-    if not machine.coupled:
+    if not has_links(machine):
         raise UsageError(f"machine '{machine.name}' has no links to touch", "a planar_arm or urdf_robot is needed")
     if signal.joints != recording.joints or signal.unit != machine.force_unit or detection.detector == "pure_torque":
         raise UsageError(
@@ -69,7 +69,7 @@ class ForceSummary:
     largest_at: float
 
 
-def summarise_force(detection: Detection, machine: Any, contact: ContactPoint) -> ForceSummary:
+def summarise_force(detection: Detection, machine: Machine, contact: ContactPoint) -> ForceSummary:
     """Magnitude of the estimated force at the first alarm and at its largest; raises as `contact_force` does."""
     force = contact_force(detection, machine, contact)
     size = np.linalg.norm(force.values, axis=1)

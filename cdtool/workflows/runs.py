@@ -8,8 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
@@ -196,7 +197,7 @@ def shown_path(path: Path, base: Path | None = None) -> str:
     return path.as_posix()
 
 
-def check_joints(joints: Sequence[str], machine: Any) -> None:
+def check_joints(joints: Sequence[str], machine: Machine) -> None:
     """Raise UsageError, before anything is read, where one of the joints to watch is not the machine's."""
     for joint in joints:
         if joint not in machine.joints:

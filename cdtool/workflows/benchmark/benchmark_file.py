@@ -21,6 +21,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.plain_text import counted
 from cdtool.tables import Table, read_toml
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
@@ -55,7 +56,7 @@ class BenchmarkFile:
     threshold: str
     budget: Budget | None
     signature: Signature
-    rule: Any
+    rule: Threshold
     activation: Activation
     onset: OnsetRule
     labels: Labels | None

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, NothingValidError, SignatureError
 from cdtool.evaluation.results import CalibrationResult, Skipped
 from cdtool.operations import Operation
@@ -89,7 +90,7 @@ def _none_usable(lacking: Mapping[str, str], known: bool) -> SignatureError:
 
 
 def that_can_run(
-    detectors: Sequence[Any], operations: Sequence[Operation], machine: Any
+    detectors: Sequence[Any], operations: Sequence[Operation], machine: Machine
 ) -> tuple[list[Any], list[Skipped]]:
     """The detectors that the first run holds all channels for, and why not the others."""
     able: list[Any] = []

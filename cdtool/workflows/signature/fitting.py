@@ -8,12 +8,13 @@ from itertools import groupby
 from typing import Any
 
 from cdtool.detection import Signal
+from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import Skipped
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector_on_each
 from cdtool.plain_text import counted
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.contract import checked_fit
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
@@ -48,7 +49,7 @@ class Fitted:
 Fit = Callable[[Sequence[Pair]], Fitted]
 
 
-def fitting(rule: Any) -> Fit:
+def fitting(rule: Threshold) -> Fit:
     """How that rule learns of runs: each class of motion apart where it is `by_class`, all together otherwise.
 
     The function raises SignatureError where nothing can be learned.
@@ -59,7 +60,7 @@ def fitting(rule: Any) -> Fit:
 
 def signals_of(
     operations: Sequence[Operation],
-    machine: Any,
+    machine: Machine,
     detector: Any,
     watched: Sequence[str] = (),
     unread: Sequence[Skipped] = (),
@@ -102,9 +103,9 @@ def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
 
 def fit_operations(
     operations: Sequence[Operation],
-    machine: Any,
+    machine: Machine,
     detector: Any,
-    rule: Any,
+    rule: Threshold,
     unread: Sequence[Skipped] = (),
     watched: Sequence[str] = (),
 ) -> Fitted:
@@ -114,17 +115,17 @@ def fit_operations(
     return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 
-def for_machine(rule: Any, machine: Any) -> Any:
+def for_machine(rule: Threshold, machine: Machine) -> Threshold:
     """The rule with the machine's own sides where it leaves them open, in its signature too."""
     sides = machine.default_sides
     return with_context(rule, sides, Signature(sides=sides))
 
 
-def _fit_all(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+def _fit_all(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
     return Fitted((_fit(rule, pairs),), (tuple(operation for operation, _ in pairs),), ())
 
 
-def _fit_classes(rule: Any, pairs: Sequence[Pair]) -> Fitted:
+def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
     fitted: list[FittedThreshold] = []
     used: list[tuple[Operation, ...]] = []
     skipped: list[Skipped] = []
@@ -147,6 +148,5 @@ def _fit_classes(rule: Any, pairs: Sequence[Pair]) -> Fitted:
     return Fitted(tuple(fitted), tuple(used), tuple(skipped))
 
 
-def _fit(rule: Any, pairs: Sequence[Pair]) -> FittedThreshold:
-    fitted: FittedThreshold = checked_fit(rule, [(item.recording.without_ground_truth(), each) for item, each in pairs])
-    return fitted
+def _fit(rule: Threshold, pairs: Sequence[Pair]) -> FittedThreshold:
+    return checked_fit(rule, [(item.recording.without_ground_truth(), each) for item, each in pairs])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.errors import UsageError
@@ -16,6 +15,7 @@ from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.runs import Progress, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
@@ -39,7 +39,7 @@ def learn_signature(  # noqa: PLR0913  keyword options of the Python API
     machine: str | Path | MachineFile,
     detector: str,
     *,
-    rule: Any = None,
+    rule: Threshold | None = None,
     joints: Sequence[str] = (),
     operations: str = "whole",
     activation: ActivationSettings | None = None,
@@ -94,7 +94,7 @@ def learn_signature(  # noqa: PLR0913  keyword options of the Python API
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)
 
 
-def _refuse_by_hand(rule: Any, budget: Budget | None) -> None:
+def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:
     if budget and set_by_hand(rule):
         raise UsageError(
             f"a safety factor or limits set by hand, and a false-alarm budget {budget} that would set them",

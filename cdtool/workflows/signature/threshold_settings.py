@@ -11,6 +11,7 @@ from cdtool.errors import UsageError, nearest
 from cdtool.motion.progress import ALIGNMENTS
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.fitted_signature import RULES, SIDES
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
@@ -37,7 +38,7 @@ def read_signature(table: Table, default_sides: str) -> Signature:
     return Signature(**settings)
 
 
-def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
+def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
     """The threshold's name and its rule; raises ConfigurationError for an unknown name or key, or a wrong value.
 
     `threshold = "NAME"` takes NAME's default settings, a table [threshold] has `name` and NAME's own fields. The
@@ -69,7 +70,7 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Any]:
         raise table.fault("name", f"'{name}': {fault.message}", fault.hint) from fault
 
 
-def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Any:
+def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Threshold:
     """The rule of that name for a command line: `given` are its settings as KEY=VALUE, `signature` the signature's.
 
     Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
@@ -95,7 +96,7 @@ def _setting(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def set_by_hand(rule: Any) -> bool:
+def set_by_hand(rule: Threshold) -> bool:
     """Whether the rule's limits, or its safety factor, are other than what it has by itself."""
     return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
 

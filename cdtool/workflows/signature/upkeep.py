@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
@@ -154,8 +155,7 @@ def check_signature(  # noqa: PLR0913  keyword options of the Python API
 
 def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
     """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
-    rule: Signature = replace(file.rule, safety_factor=current.safety_factor, force=True)
-    return rule
+    return replace(cast(Signature, file.rule), safety_factor=current.safety_factor, force=True)
 
 
 def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
@@ -235,7 +235,7 @@ def _cut(file: SignatureFile, operations: str | None) -> str:
 
 
 def _with_operation(
-    file: SignatureFile, operation: Operation, machine: Any, detector: Any, guard: tuple[float | None, float, float]
+    file: SignatureFile, operation: Operation, machine: Machine, detector: Any, guard: tuple[float | None, float, float]
 ) -> SignatureFile:
     run = learned_run(operation)
     if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in file.runs):

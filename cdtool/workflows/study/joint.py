@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.machine_file import MachineFile
@@ -62,7 +61,7 @@ def studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> Studie
     if wanted and wanted not in machine.joints:
         raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
     at = machine.joints.index(wanted) if wanted else 0
-    load, motor = _load_inertia(file.machine, at), machine.motor_inertia[at]
+    load, motor = _load_inertia(machine, at), machine.motor_inertia[at]
     key = machine.inertia_key if isinstance(machine, Axis) else "the load's inertia"
     needs = "a study needs the inertias of load and motor"
     if machine.coordinates == "load":
@@ -79,7 +78,7 @@ def studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> Studie
     return StudiedJoint(machine.joints[at], load / lever**2, motor, ratio, machine.viscous_friction[at], lever, rotary)
 
 
-def _load_inertia(machine: Any, at: int) -> float:
+def _load_inertia(machine: Axis | CoupledMachine, at: int) -> float:
     """Without the motor [kg m2, kg]; of coupled joints on the diagonal of M, at home."""
     if isinstance(machine, Axis):
         return machine.load_inertia[at]
