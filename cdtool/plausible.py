@@ -135,11 +135,6 @@ class PlausibleRanges:
         return cls(channels)
 
 
-def impossible(values: FloatArray) -> BoolArray:
-    """True where a value in SI is finite and beyond what any sensor of a machine gives."""
-    return (np.abs(values) >= IMPOSSIBLE) & np.isfinite(values)
-
-
 def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
     """One channel's range; None where no run holds a value, or all hold the same one."""
     medians = [np.array([_quantile(column, 0.5) for column in item.values.T]) for item in series]

@@ -54,9 +54,10 @@ EXAMPLES = {
     "docs/python.md": 13,
     "docs/own-detector.md": 2,
     "docs/comparing.md": 1,
-    "docs/impact.md": 6,
+    "docs/impact.md": 8,
     "docs/transmission.md": 3,
-    "docs/simulators.md": 2,
+    "docs/signature.md": 1,
+    "docs/simulators.md": 3,
     "docs/detectors/friction-ekf.md": 1,
 }
 # Lines of shell blocks that set something up or take long: they are run by CI or by hand, not here.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.formats.source import Column
 from cdtool.recording import Finding, FloatArray
 
 # Above this many bytes, and this many times its own size, a file unpacks to more than any log: it is refused.
@@ -21,8 +20,6 @@ _FREE, _RATIO = 256 * 2**20, 200
 _LARGEST_EXACT = 2**53
 # HDF5's filters that only rearrange or check bytes: shuffle, Fletcher's checksum.
 _NO_PACKERS = (2, 3)
-# A clock that starts later than this [s] counts from an epoch, as in channel_assembly.
-_EPOCH = 1e8
 
 
 def library(module: str, extra: str, path: Path) -> Any:
@@ -76,21 +73,6 @@ def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> 
         if largest > _LARGEST_EXACT:
             findings.append(Finding("integers beyond 2^53 are rounded to float64", name))
     return np.ascontiguousarray(values, dtype=np.float64)
-
-
-def without_epoch(columns: Sequence[Column]) -> tuple[dict[str, Column], float]:
-    """Columns whose own times count from an epoch, shifted to start at 0, and the shift [s]; 0 and as they are else."""
-    starts = [float(c.time[0]) for c in columns if c.time is not None and len(c.time) and np.isfinite(c.time[0])]
-    origin = min(starts, default=0.0)
-    if origin <= _EPOCH:
-        return {column.name: column for column in columns}, 0.0
-    moved = {
-        column.name: Column(
-            column.name, column.values, None if column.time is None else column.time - origin, column.unit
-        )
-        for column in columns
-    }
-    return moved, origin
 
 
 def left_out(name: str, kind: str) -> Finding:

@@ -69,14 +69,6 @@ class CoupledMachine(JointMachine, ABC):
         """g (n, J): what the drives must give to hold the machine."""
         return self.momentum_terms(position, np.zeros_like(position))[2]
 
-    def kinetic_energy(self, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """v'M v / 2 (n,) [J]."""
-        return self.energies(position, speed)[0]
-
-    def potential_energy(self, position: FloatArray) -> FloatArray:
-        """Sum of m g h (n,) [J]; h above the base."""
-        return self.energies(position, np.zeros_like(position))[1]
-
     def contact_torque(
         self, position: FloatArray, force: FloatArray, link: str, point: tuple[float, float, float]
     ) -> FloatArray:

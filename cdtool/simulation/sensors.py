@@ -71,22 +71,6 @@ def resonance(white: Array, deviation: float, frequency: float, damping: float, 
     return np.asarray(lfilter([gain], [1.0, -first, -second], white), dtype=np.float64)
 
 
-def quantise_down(values: Array, step: float) -> Array:
-    """The next lower multiple of `step`, as a resolver counts; `step` = 0 is an ideal sensor."""
-    return np.asarray(np.floor(values / step) * step if step > 0.0 else values, dtype=np.float64)
-
-
-def resolver_speed(position: Array, step: float, frequency: float, period: float) -> Array:
-    """Speed from a resolver: quantised position, difference, two first-order low-passes of `frequency` Hz.
-
-    The first sample has no predecessor and counts as standstill. Units are those of `position` per second.
-    """
-    counted = quantise_down(position, step)
-    speed = np.diff(counted, prepend=counted[0]) / period
-    time_constant = 1.0 / (2.0 * math.pi * frequency)
-    return low_pass(low_pass(speed, time_constant, period), time_constant, period)
-
-
 def measured_torque(torque: Array, white: Array, noise: float, time_constant: float, period: float) -> Array:
     """Torque from the motor current: a low-pass of `time_constant` s over torque + noise white."""
     return low_pass(torque + noise * white, time_constant, period)

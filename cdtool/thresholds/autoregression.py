@@ -35,17 +35,6 @@ def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
     return -polynomial[1:], float(np.sqrt(power / number)) if number else float("nan")
 
 
-def forecast_spread(coefficients: FloatArray, steps: int) -> FloatArray:
-    """Standard deviation (steps,) of the forecast 1, 2 ... steps ahead, that of nu being 1: sqrt(sum psi_j^2)."""
-    order = len(coefficients)
-    impulse = np.zeros(order + steps)
-    impulse[order] = 1.0
-    for k in range(order + 1, order + steps):
-        impulse[k] = coefficients @ impulse[k - order : k][::-1]
-    spread: FloatArray = np.sqrt(np.cumsum(impulse[order:] ** 2))
-    return spread
-
-
 def stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray:
     """Covariance (p, p) of the last p values of e, that of nu being 1: P = F P F' + Q, solved by doubling.
 

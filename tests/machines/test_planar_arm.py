@@ -82,8 +82,8 @@ def test_momentum_velocity_force_and_gravity_make_the_rate_of_the_momentum(arm):
 
 
 def test_velocity_force_is_the_slope_of_the_kinetic_energy_and_gravity_that_of_the_potential(arm):
-    kinetic = slope(lambda q: arm.kinetic_energy(q, SPEED), POSITION)
-    potential = slope(arm.potential_energy, POSITION)
+    kinetic = slope(lambda q: arm.energies(q, SPEED)[0], POSITION)
+    potential = slope(lambda q: arm.energies(q, np.zeros_like(q))[1], POSITION)
     np.testing.assert_allclose(arm.velocity_force(POSITION, SPEED), kinetic, atol=1e-9)
     np.testing.assert_allclose(arm.gravity(POSITION), potential, atol=1e-9)
 

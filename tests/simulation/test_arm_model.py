@@ -14,6 +14,7 @@ from cdtool.errors import UsageError
 from cdtool.simulation import arm_kernel, sensors
 from cdtool.simulation.arm_model import ArmRun, Array, Impact, integrate_arm, simulate_arm_run, specific_force
 from cdtool.simulation.arm_parameters import ArmParameters, Trial
+from tests.simulation.resolver import resolver_speed
 
 ARM = ArmParameters()
 QUIET = replace(
@@ -320,7 +321,7 @@ def test_the_logged_speed_is_what_the_encoder_model_makes_of_the_true_position()
     for joint in (0, 1):
         step = 2.0 * np.pi / 2000.0
         position = run.drive_position[:, joint] * 60.0
-        speed = sensors.resolver_speed(position, step, 17.0, ARM.sample_period)
+        speed = resolver_speed(position, step, 17.0, ARM.sample_period)
         np.testing.assert_allclose(run.motor_speed[:, joint], speed, atol=1e-8)
         counts = run.motor_position[:, joint] / step
         np.testing.assert_allclose(counts, np.rint(counts), atol=1e-6)

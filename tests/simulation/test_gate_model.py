@@ -20,6 +20,7 @@ from cdtool.simulation.gate_model import (
     integrate_gate,
     simulate_gate_run,
 )
+from tests.simulation.resolver import resolver_speed
 
 GATE = GateParameters()
 QUIET = replace(
@@ -305,9 +306,7 @@ def test_the_logged_speed_is_what_the_resolver_model_makes_of_the_true_position(
     samples = 500
     start = np.array([0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
     truth, _ = integrate_gate(GATE, start, np.full(samples, 0.2), np.zeros(samples), (1.0, 0.0, 9.0), "none", 5)
-    speed = sensors.resolver_speed(
-        truth["motor_position"], GATE.resolver_step, GATE.speed_filter_frequency, GATE.sample_period
-    )
+    speed = resolver_speed(truth["motor_position"], GATE.resolver_step, GATE.speed_filter_frequency, GATE.sample_period)
     np.testing.assert_allclose(truth["measured_speed"], speed, atol=1e-12)
     counts = truth["measured_position"] / GATE.resolver_step
     np.testing.assert_allclose(counts, np.rint(counts), atol=1e-6)

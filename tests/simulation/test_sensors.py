@@ -43,7 +43,6 @@ def test_no_sensor_looks_ahead() -> None:
     models: dict[str, Callable[[Array], Array]] = {
         "low_pass": lambda x: sensors.low_pass(x, 0.01, 1e-3),
         "second_order": lambda x: sensors.second_order_low_pass(x, 25.0, 0.8, 1e-3),
-        "resolver": lambda x: sensors.resolver_speed(x, 0.01, 60.0, 1e-3),
         "coloured": lambda x: sensors.coloured_noise(x, 1.0, 60.0, 1e-3),
         "resonance": lambda x: sensors.resonance(x, 1.0, 18.0, 0.06, 1e-3),
     }

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from cdtool.detection import Status
 from cdtool.errors import NothingValidError, UsageError
-from cdtool.thresholds.autoregression import burg, forecast_spread
+from cdtool.thresholds.autoregression import burg
 from cdtool.thresholds.innovation import Innovation
 from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke
 
@@ -51,12 +51,6 @@ def test_burg_leaves_out_stretches_that_are_too_short():
     long = coloured(rng)
     assert burg([long, np.ones(2)], 2)[0] == pytest.approx(burg([long], 2)[0], rel=1e-12)
     assert np.isnan(burg([np.ones(2)], 2)[1])
-
-
-def test_a_forecast_spreads_as_the_impulse_response_says():
-    assert forecast_spread(np.array([0.5]), 3) == pytest.approx(np.sqrt([1.0, 1.25, 1.3125]))
-    impulse = lfilter([1.0], [1.0, -MODEL[0], -MODEL[1]], np.eye(1, 20)[0])
-    assert forecast_spread(np.array(MODEL), 20) == pytest.approx(np.sqrt(np.cumsum(impulse**2)))
 
 
 def test_innovations_of_normal_runs_are_white_and_of_unit_spread(fitted):

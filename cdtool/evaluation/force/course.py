@@ -65,12 +65,6 @@ class ForceCourse:
     def _clock(self) -> FloatArray:
         return self.time if self.clock is None else self.clock
 
-    @property
-    def missing_share(self) -> float:
-        """Share of the time from the onset to the record's end in which samples are missing."""
-        begins, ends = self.holes()
-        return float(np.sum(ends - begins)) / self.end if self.end > 0.0 else 0.0
-
     def holes(self) -> tuple[FloatArray, FloatArray]:
         """Where samples are missing: beginnings and ends [s after the onset]."""
         marks = np.concatenate(([0.0], self.time, [max(self.end, float(self.time[-1]))]))

@@ -104,9 +104,3 @@ def holds_numbers(line: str) -> bool:
 def _is_plain_number(cell: str) -> bool:
     """A number, and neither a stamp nor an address such as 192.168.0.1."""
     return kind(cell) == "N" and (cell.count(".") < 2 or _grouped(cell))
-
-
-def is_number(cell: str, decimal: str) -> bool:
-    """True for a cell that holds a number, infinity, true or false; not for a missing one."""
-    value = number(cell, decimal)
-    return value is not None and cell not in MISSING
