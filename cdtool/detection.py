@@ -150,7 +150,7 @@ class Verdict:
     follows from what came after the alarm.
     """
 
-    outcome: Literal["alarm", "no alarm", "not assessable"]
+    outcome: Literal["alarm", "no alarm", "not_assessable"]
     alarms: tuple[Alarm, ...] = ()
     reason: str = ""
     crossings: tuple[Alarm, ...] = ()

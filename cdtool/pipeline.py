@@ -240,7 +240,7 @@ def _judge_log(
             judgement,
             rows,
         )
-        if verdict.outcome == "not assessable" and (words := detection.other_speed):
+        if verdict.outcome == "not_assessable" and (words := detection.other_speed):
             detection = replace(detection, verdict=replace(verdict, reason=f"{verdict.reason}; {words}"))
         found.append(detection)
     return found
@@ -256,12 +256,12 @@ def _verdict(statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alar
     other = float(np.mean(statistic.status == Status.OTHER_SPEED)) if statistic.status.size else 0.0
     if statistic.valid.any() and other < _ANOTHER_MOTION:
         return Verdict("no alarm", crossings=crossings)
-    return Verdict("not assessable", reason=statistic.why_not())
+    return Verdict("not_assessable", reason=statistic.why_not())
 
 
 def _nothing_learned(operation: Operation, detector: str, signal: Signal) -> Detection:
     nothing = np.full(signal.values.shape, np.nan)
     status = np.where(signal.status == Status.VALID, Status.NO_LIMIT, signal.status).astype(np.uint8)
     unlearned = f"nothing learned: {signal.why_not()}" if signal.shares() else "nothing learned"
-    verdict = Verdict("not assessable", reason=unlearned)
+    verdict = Verdict("not_assessable", reason=unlearned)
     return Detection(operation, detector, replace(signal, status=status), Band(nothing, nothing), verdict, signal)

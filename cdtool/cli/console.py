@@ -94,7 +94,7 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
     facts: list[Fact] = []
     for name, found in logs:
         contacts = [row for rows in found.contact_rows for row in rows if row.outcome != "in_progress"]
-        if all(item.verdict.outcome == "not assessable" for item in found.detections):
+        if all(item.verdict.outcome == "not_assessable" for item in found.detections):
             reasons = dict.fromkeys(item.verdict.reason for item in found.detections)
             words = "; ".join(reasons) or "no operation in it"
         elif contacts and all(row.outcome == "not_assessable" for row in contacts):

@@ -88,7 +88,8 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
             why = f"contact {at} {time:.3f} s{': ' + item.reason if item.reason else ''}"
             rows.append((name, outcome, "-", "-", "-", "-", "-", why))
     if not rows:
-        rows.append((name, detection.verdict.outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
+        outcome = detection.verdict.outcome.replace("_", " ")
+        rows.append((name, outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
     return rows
 
 
@@ -135,7 +136,7 @@ def _show_not_judged(detections: list[Detection]) -> None:
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
         if more := len(not_judged) - len(longest):
             parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
-        if detection.other_speed and detection.verdict.outcome != "not assessable":  # then it is among the reasons
+        if detection.other_speed and detection.verdict.outcome != "not_assessable":  # then it is among the reasons
             parts.append(detection.other_speed)
         share = 1.0 - float(detection.statistic.valid.mean())
         say(f"not judged in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")

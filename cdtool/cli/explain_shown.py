@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Events that are printed and drawn; --json has all.
 SHOWN = 20
 # Its reason names the speeds already.
-_BLIND = "not assessable"
+_BLIND = "not_assessable"
 
 
 def show_explained(explained: Explained) -> None:

@@ -143,7 +143,7 @@ def _detection(operation: Operation, detector: str, said: Triggered, shift: floa
     alarms = tuple(item for i, item in enumerate(crossings) if not i or item.time - crossings[i - 1].time > _HELD)
     signal = Signal(time, values, status, "1", joints=WHOLE_MACHINE)
     band = Band(np.full_like(values, -np.inf), np.full_like(values, 0.5))
-    outcome: Any = "alarm" if alarms else ("no alarm" if signal.valid.any() else "not assessable")
+    outcome: Any = "alarm" if alarms else ("no alarm" if signal.valid.any() else "not_assessable")
     reason = "" if signal.valid.any() else "the trigger file says so"
     return Detection(
         operation, detector, signal, band, Verdict(outcome, alarms, reason, crossings, _released(alarms, crossings))

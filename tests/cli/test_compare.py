@@ -93,7 +93,7 @@ def test_json_holds_every_question_and_is_strict(written, tmp_path):
     by_figure = {item["figure"]: item for item in row["questions"]}
     exact = {"value": 5.0, "low": 5.0, "high": 5.0, "level": 0.95, "reason": ""}
     assert by_figure["latency_ms"]["change"] == exact
-    assert by_figure["missed"]["p"] is None and by_figure["missed"]["outcome"] == "not asked"
+    assert by_figure["missed"]["p"] is None and by_figure["missed"]["outcome"] == "not_asked"
     assert set(by_figure) == {"latency_ms", "missed", "not_assessable", "false_alarms", "force_at_alarm_n"}
 
 

@@ -207,7 +207,7 @@ def with_traces(bench: Path, folder: Path, traces: bytes) -> Path:
 @pytest.mark.parametrize("unit", [b"0,", b"[],", b"999,", b" "], ids=["zeros", "lists", "numbers", "blanks"])
 def test_traces_that_unpack_to_gigabytes_are_refused(bench, tmp_path, unit):
     packer = zlib.compressobj(9, zlib.DEFLATED, 31)
-    content = packer.compress(b'{"schema_version": 2, "traces": [')
+    content = packer.compress(b'{"schema_version": 3, "traces": [')
     for _ in range(600):  # 0.6 GB of text, of 0.6 MB
         content += packer.compress(unit * (2**20 // len(unit)))
     content += packer.flush()

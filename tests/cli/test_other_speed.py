@@ -36,7 +36,7 @@ def test_not_assessable_names_the_speed_measured_and_the_classes_learned(at_spee
     log = at_speed(1.4, range(8200))
     machine = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
     (row,) = json.loads(cdtool("detect", log, *machine, "--json").out)
-    assert row["verdict"] == "not assessable" and row["reason"].startswith("other speed ")
+    assert row["verdict"] == "not_assessable" and row["reason"].startswith("other speed ")
     found = MEASURED.search(row["reason"])
     assert found and float(found[1]) == pytest.approx(0.28, abs=0.005)
     for command in ("detect", "explain"):

@@ -167,7 +167,7 @@ def test_at_rest_the_energy_observer_is_not_applicable_and_says_so(kind, machine
     log = standing(machine, pose, np.full(len(pose), 50.0))
     (operation,) = operations_of(log)
     detection = detect_operation(operation, machine, Energy(), [Limit.given([1.0])], Activation())
-    assert detection.verdict.outcome == "not assessable"
+    assert detection.verdict.outcome == "not_assessable"
     assert detection.verdict.reason == "not applicable 90 %, start-up 10 %"
 
 

@@ -151,7 +151,7 @@ def test_limits_without_spread_cannot_be_set():
 def test_a_detection_without_a_threshold_never_alarms():
     statistic = detection(0).statistic
     nothing = np.full(statistic.values.shape, np.nan)
-    blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not assessable"))
+    blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not_assessable"))
     swept = sweep(blind, [Contact(3.0, 3.1, 0.0)], ACTIVATION, 1.0, MULTIPLES)
     assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
 

@@ -50,7 +50,7 @@ class Question:
     """
 
     figure: Figure
-    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not asked"]
+    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not_asked"]
     old: float
     old_of: float
     new: float
@@ -211,14 +211,14 @@ def _answered(asked: Asked, corrected: float, significance: float, count: int, t
     # What is not asked here would have counted as one more question.
     alpha = significance / (count + math.isnan(asked.p))
     left_open = asked.left_open(alpha)
-    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not asked"]
+    outcome: Literal["worse", "better", "no change shown", "inconclusive", "not_asked"]
     if not math.isnan(asked.complete_p) or corrected < significance:
         # Latency, force, misses, blind contacts, false alarms: less is better of each.
         outcome = "worse" if asked.change.value > 0.0 else "better"
     elif left_open > tolerated:
         outcome = INCONCLUSIVE
     else:
-        outcome = "not asked" if math.isnan(corrected) else NOTHING_SHOWN
+        outcome = "not_asked" if math.isnan(corrected) else NOTHING_SHOWN
     return Question(
         figure=asked.figure,
         outcome=outcome,

@@ -152,7 +152,7 @@ def _would_have_been(row: BuildRow) -> str:
         return _least_alarms(alarms) if alarms else "nothing could be tested"
     if latency.same:
         return "every latency is the same"
-    if latency.outcome == "not asked":
+    if latency.outcome == "not_asked":
         return f"latency: {latency.reason}"
     return f"a change of {figure(latency.detectable)} ms would have been"
 
@@ -166,7 +166,7 @@ def _least_alarms(item: Question) -> str:
 
 
 def _could_show(row: BuildRow) -> bool:
-    return any(item.outcome != "not asked" and math.isfinite(item.detectable) for item in row.questions)
+    return any(item.outcome != "not_asked" and math.isfinite(item.detectable) for item in row.questions)
 
 
 def _counts(item: Question) -> str:

@@ -24,7 +24,9 @@ from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
 from cdtool.recording import Contact, FloatArray
 from cdtool.strict_json import finite, strict_json
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
+# The version before: "not assessable", where results.json has had "not_assessable" since its version 3.
+_SPACED_WORDS = 2
 NO_LIMIT = 1_000_000_000
 
 # Steps over the range of a panel; a plot has fewer pixels.
@@ -58,9 +60,10 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = unpack_json(content)
-        if values["schema_version"] != SCHEMA_VERSION:
+        if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
             raise RecordingError(
-                f"{path}: schema_version is {values['schema_version']}, this cdtool knows {SCHEMA_VERSION}",
+                f"{path}: schema_version is {values['schema_version']}, "
+                f"this cdtool knows {_SPACED_WORDS} and {SCHEMA_VERSION}",
                 "run cdtool benchmark again",
             )
         if results is not None and values["results_sha256"] != _digest(results):
@@ -166,7 +169,8 @@ def _panel(values: dict[str, Any]) -> Panel:
         unit=str(values["unit"]),
         joint=str(values["joint"]),
         course=Course(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
-        verdict=str(values["verdict"]),
+        # A file of the version before has another spelling.
+        verdict="not_assessable" if values["verdict"] == "not assessable" else str(values["verdict"]),
         reason=str(values["reason"]),
         seen=tuple(build(Seen, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),

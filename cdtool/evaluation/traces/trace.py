@@ -99,7 +99,7 @@ class Panel:
     @property
     def blind(self) -> bool:
         """Whether it could judge nothing."""
-        return self.verdict == "not assessable"
+        return self.verdict == "not_assessable"
 
 
 @dataclass(frozen=True)

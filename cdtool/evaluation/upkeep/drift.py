@@ -41,7 +41,7 @@ def audit_drift(
     refused: list[tuple[str, str]] = []
     for operation, signal in pairs:
         detection = judge(operation, "", signal, (signature,), activation)
-        if detection.verdict.outcome == "not assessable":
+        if detection.verdict.outcome == "not_assessable":
             refused.append((operation.name, detection.verdict.reason))
         else:
             detections.append(detection)

@@ -192,7 +192,8 @@ def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
     lines += [f"alarm {label(detector, 18)} {1e3 * time:.0f} ms" for detector, time in alarms[:_ALARMS_TOLD]]
     if len(alarms) > _ALARMS_TOLD:
         lines.append(f"and {len(alarms) - _ALARMS_TOLD} later")
-    for text, lift, size, weight in ((worst.verdict.outcome, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
+    verdict = worst.verdict.outcome.replace("_", " ")
+    for text, lift, size, weight in ((verdict, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
         axes.annotate(
             text,
             (1.0, 1.0),

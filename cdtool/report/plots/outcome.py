@@ -23,7 +23,7 @@ def outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> st
         words.append(f"{counted(extra, 'false alarm')}")
     elif not matches:
         words.append("no alarm" if not alarms else f"{counted(alarms, 'alarm')}")
-    blind = [item for item in found.detections if item.verdict.outcome == "not assessable"]
+    blind = [item for item in found.detections if item.verdict.outcome == "not_assessable"]
     if blind:
         share = f" in {len(blind)} of {len(found.detections)} operations" if len(found.detections) > 1 else ""
         words = [word for word in words if word not in ("no alarm", "not assessable")]

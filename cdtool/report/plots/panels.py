@@ -110,7 +110,7 @@ def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legen
     """
     for detection in detections:
         time = detection.statistic.time
-        if not len(time) or detection.verdict.outcome == "not assessable":
+        if not len(time) or detection.verdict.outcome == "not_assessable":
             continue
         end = float(time[-1])
         held = trigger_spans([alarm.time for alarm in detection.verdict.alarms], detection.verdict.rearmed, end)

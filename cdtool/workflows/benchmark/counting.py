@@ -31,7 +31,7 @@ class Exposure:
         """Count one operation."""
         self.operations += 1
         self.seconds += detection.assessed_seconds
-        self.not_assessable += detection.verdict.outcome == "not assessable"
+        self.not_assessable += detection.verdict.outcome == "not_assessable"
         size = detection.statistic.status.size
         self.samples += size
         for reason, share in detection.statistic.shares().items():

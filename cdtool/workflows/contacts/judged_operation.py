@@ -39,7 +39,7 @@ def not_assessable(operation: Operation, detector: str, unit: str, reason: str, 
     status = np.full(nothing.shape, Status.GAP, dtype=np.uint8)
     signal = Signal(time, nothing, status, unit, joints=recording.joints).watching(watched)
     limits = np.full(signal.values.shape, np.nan)
-    return Detection(operation, detector, signal, Band(limits, limits), Verdict("not assessable", reason=reason))
+    return Detection(operation, detector, signal, Band(limits, limits), Verdict("not_assessable", reason=reason))
 
 
 def contact_rows(

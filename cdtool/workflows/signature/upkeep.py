@@ -243,7 +243,7 @@ def _with_operation(
     detection = detect_operation(operation, machine, detector, file.current, file.activation, file.joints)
     if detection.verdict.outcome == "alarm":
         raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")
-    if detection.verdict.outcome == "not assessable":
+    if detection.verdict.outcome == "not_assessable":
         raise SignatureError(f"not assessable: {detection.verdict.reason}")
     pairs = signatures_in(file)
     if not any(item.motion.matches(operation.motion, SPEED_TOLERANCE) for item, _ in pairs):

@@ -146,7 +146,7 @@ def test_a_build_that_has_become_blind_is_worse():
     found = compare_builds(single(latencies()), single([BLIND] * 30))
     assert found.verdict == "worse"
     assert "nothing is assessable: not assessable 30 of 30, before 0 of 30" in row_of(found).words
-    assert asked(found, "latency_ms").outcome == "not asked"
+    assert asked(found, "latency_ms").outcome == "not_asked"
     assert asked(found, "latency_ms").reason == "no contact has it in both"
 
 

@@ -55,6 +55,19 @@ def test_traces_survive_writing_and_reading_within_a_pixel_and_give_the_same_byt
     assert encode_traces([again]) == path.read_bytes()
 
 
+def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_they_are_read(tmp_path):
+    blind = replace(trace(), panels=(replace(trace().panels[0], verdict="not_assessable", reason="start-up"),))
+    values = json.loads(gzip.decompress(encode_traces([blind])))
+    assert values["schema_version"] == 3 and values["traces"][0]["panels"][0]["verdict"] == "not_assessable"
+    values["schema_version"] = 2
+    values["traces"][0]["panels"][0]["verdict"] = "not assessable"
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(gzip.compress(json.dumps(values).encode(), mtime=0))
+    (read,) = read_traces(path)
+    assert read.panels[0].verdict == "not_assessable" and read.panels[0].blind
+    assert encode_traces([read]) == encode_traces([blind])
+
+
 def test_what_is_above_a_limit_stays_above_it_and_no_limit_stays_none(tmp_path):
     kept = trace()
     course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))

@@ -96,7 +96,7 @@ def free_trace(named: Naming, group: str) -> Trace:
     """The second operation of the impact-free log, with a false alarm and a detector that could judge nothing."""
     panels = (
         _panel(named, "quick", None, (1.0,)),
-        _panel(named, "slow", None, (), verdict="not assessable", reason=named("start-up 100 %")),
+        _panel(named, "slow", None, (), verdict="not_assessable", reason=named("start-up 100 %")),
     )
     return Trace(f"{named('free.csv')}#2", group, 0.0, 4.0, (), -1, (0.0, 4.0), np.empty(0), np.empty(0), panels)
 
@@ -162,7 +162,7 @@ def _force(named: Naming, group: str, log: str) -> ForceResult:
 def _steps(named: Naming) -> tuple[ForceStepResult, ...]:
     return tuple(
         ForceStepResult(named(name), start, most, 900.0 - most, None, verdict, named("why"))
-        for (name, start, most), verdict in zip(STEPS, ("fail", "not assessable"), strict=True)
+        for (name, start, most), verdict in zip(STEPS, ("fail", "not_assessable"), strict=True)
     )
 
 

@@ -208,7 +208,7 @@ def test_the_slower_detector_named_first_makes_the_same_sentence(results):
 def forces(name: str = "reducing gap") -> tuple[tuple[ForceResult, ...], tuple[PointResult, ...]]:
     steps = (
         ForceStepResult(name, 0.0, 400.0, 500.0, 12.0, "fail", f"500 N where 400 N are allowed {name}"),
-        ForceStepResult("static", 0.75, 150.0, None, None, "not assessable", name),
+        ForceStepResult("static", 0.75, 150.0, None, None, "not_assessable", name),
     )
     kept = (ForceStepResult(name, 0.0, 400.0, 300.0, None, "pass"),)
     made = (

@@ -107,7 +107,7 @@ def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simu
     blind = replace(
         detection,
         statistic=replace(detection.statistic, status=status),
-        verdict=Verdict("not assessable", reason="missing samples 100 %"),
+        verdict=Verdict("not_assessable", reason="missing samples 100 %"),
     )
     plot_detected(judged_anew(found, blind), tmp_path / "blind.svg")
     shown = joined(tmp_path / "blind.svg")

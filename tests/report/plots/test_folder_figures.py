@@ -120,7 +120,7 @@ def test_groups_named_alike_or_with_a_path_get_safe_names_of_their_own(evaluated
 
 def test_the_most_telling_trace_has_a_contact_and_most_detectors_that_could_judge(hit, free):
     fewer = replace(hit, panels=hit.panels[:1])
-    blind = replace(hit, panels=(replace(hit.panels[0], verdict="not assessable"), hit.panels[1]))
+    blind = replace(hit, panels=(replace(hit.panels[0], verdict="not_assessable"), hit.panels[1]))
     assert most_telling([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
     assert most_telling([free, fewer]) is fewer
     assert most_telling([free]) is free

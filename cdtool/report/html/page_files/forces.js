@@ -123,7 +123,7 @@ function forcePlan(data, panel, readTrace, openTrace) {
       const words = [
         `${curve.record.recording}, contact ${curve.contact + 1}`,
         `${figure(force)} N at ${figure(time)} ms`,
-        `${curve.verdict}${curve.budget === null ? "" : `: first limit exceeded after ${figure(curve.budget)} ms`}`,
+        `${curve.verdict.replace("_", " ")}${curve.budget === null ? "" : `: first limit exceeded after ${figure(curve.budget)} ms`}`,
         ...late,
         "click: trigger plot",
       ];

@@ -41,7 +41,7 @@ function shownContact(trace) {
 function verdictOf(trace, panel) {
   const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
   const extra = panel.false_alarms.length ? counted(panel.false_alarms.length, "false alarm") : "";
-  const outcome = seen ? seen.outcome : panel.verdict === "not assessable" ? "not_assessable" : "";
+  const outcome = seen ? seen.outcome : panel.verdict === "not_assessable" ? panel.verdict : "";
   if (outcome === "not_assessable") return { words: "not assessable", reason: (seen && seen.reason) || panel.reason };
   if (!seen) return { words: extra || "no alarm", reason: "" };
   const words = outcome === "detected" ? `${figure(1e3 * seen.late)} ms` : "missed";
