@@ -120,7 +120,8 @@ def _not_cached(items: Iterable[Kernel]) -> list[Kernel]:
     """
     import numba
 
-    if numba.config.DISABLE_JIT:
+    config: Any = numba.config
+    if config.DISABLE_JIT:
         return []
     try:
         return [item for item in items if not _is_cached(item)]
