@@ -116,80 +116,137 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     refuse_long_line(text, stream)
-    every = sample_lines(text, stream)
-    lines = [line for line in every if not line.blank and line.number > pins.skip_lines]
-    skipped = [line.number for line in every if not line.blank and line.number <= pins.skip_lines]
-    findings = [Finding(f"{shown_lines(skipped)} skipped, as [csv] says", severity="note")] if skipped else []
-    told = next((line for line in lines if line.separator), None)
-    lines = [line for line in lines if line is not told]
-    mark = comment_mark(lines, pins.comment)
-    comments = [line for line in lines if line.is_comment(mark)]
-    lines = [line for line in lines if not line.is_comment(mark)]
-    if not lines:
-        raise RecordingError(f"{path}: holds no row of numbers", "a header line and rows of numbers are needed")
-    cut = find_separator(
-        path,
-        [x for x in lines if not is_ruler(x.text)] or lines,
-        pins.separator or (told.separator or "" if told else ""),
-        pins.decimal,
-    )
-    separator = cut.separator
-    rows = [(line, split_line(line.text, separator)) for line in lines]
-    wide = [(line, cells) for line, cells in rows if len(cells) == cut.width]
-    lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
-    kinds = column_kinds([cells for _, cells in spread(lower)], cut.width)
-    head = HeadFinder(path, separator, cut.width, kinds, pins).find(lines, comments)
-    data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
-    kinds = column_kinds([cells for _, cells in spread(data)], cut.width)
-    marks = _marks(path, data, kinds, separator, pins)
-    if head.names is None and not pins.separator and not told:
-        named = any(len(line.text.strip(mark).split()) == 1 for line in comments if line.number < head.first.number)
-        refuse_commas_that_may_be_decimal(path, data, kinds, separator, named)
-    if cut.width == 2 and separator == "," and not pins.separator:
-        refuse_one_column_of_decimals(path, rows, head, data)
-    if pins.header is None:  # a pinned header says which table is meant: what stands above is a loss
-        refuse_table_above(path, head, cut.width)
-    findings += _findings(text, head, told)
-    trailing = _trailing(head, kinds, data)
-    below = [x for x in comments if x.number > head.first.number]
-    full = {x.number for x in below if len(split_line(x.text, separator)) == cut.width}
-    layout = pins.time_format if "%" in pins.time_format else ""
-    columns: dict[int, list[str]] = {
-        i: [cells[i] for _, cells in data if cells[i] not in pins.missing]
-        for i, letter in enumerate(kinds)
-        if letter in "TX"
-    }
-    stamped = {i: found for i, cells in columns.items() if (found := _stamped(cells, layout)).layouts}
-    days = [i for i, found in stamped.items() if found.layouts[0].dated]
-    stamped |= {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
-    words = {i: _first_words(data, i) for i, letter in enumerate(kinds) if letter in "TX"}
-    names = head.names[: cut.width - trailing] if head.names is not None else None
+    lines = _sort_lines(path, text, stream, pins)
+    grid = _cut_rows(path, lines, pins)
+    head = grid.head
+    marks = _marks(path, grid.data, grid.kinds, grid.separator, pins)
+    _refuse_other_readings(path, lines, grid, pins)
+    trailing = _trailing(head, grid.kinds, grid.data)
+    names = head.names[: grid.width - trailing] if head.names is not None else None
     return Dialect(
         text=text,
         pins=pins,
-        separator=separator,
+        separator=grid.separator,
         marks=marks,
-        comment=mark,
-        commented=pins.comment is not None or any(line.number not in full for line in comments),
+        comment=lines.mark,
+        commented=pins.comment is not None or _has_comments(lines, grid),
         missing=pins.missing,
         header=tuple(_unique(names)) if names is not None else None,
         header_line=head.header_line,
         units=head.units,
         units_line=head.units_line,
-        header_text=tuple(line.text for line in lines if line.number in (head.header_line, head.units_line)),
+        header_text=tuple(line.text for line in lines.table if line.number in (head.header_line, head.units_line)),
         from_comment=head.from_comment,
         preamble=head.preamble,
         first_line=head.first.number,
-        sampled=len(data),
+        sampled=len(grid.data),
         offset=head.first.start,
-        width=cut.width,
-        kinds=kinds,
+        width=grid.width,
+        kinds=grid.kinds,
         trailing=trailing,
-        blank_is_missing=are_missing(every, head.first.number, cut.width),
-        stamped=stamped,
-        words=words,
-        findings=tuple(findings),
+        blank_is_missing=are_missing(lines.every, head.first.number, grid.width),
+        stamped=_stamped_columns(grid, pins),
+        words={i: _first_words(grid.data, i) for i in grid.not_numbers},
+        findings=tuple(_findings(text, lines, head)),
     )
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """The lines of a sample by what they are: `table` has names and rows, `mark` begins the `comments`.
+
+    `separator` is a line that only names the separator (sep=;), `skipped` are the numbers of those that the machine
+    file says to skip.
+    """
+
+    every: Sequence[Line]
+    table: Sequence[Line]
+    comments: Sequence[Line]
+    mark: str
+    separator: Line | None
+    skipped: Sequence[int]
+
+
+def _sort_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> _Lines:
+    """Sort the lines of the sample; raises RecordingError where none is left for a table."""
+    every = sample_lines(text, stream)
+    filled = [line for line in every if not line.blank]
+    lines = [line for line in filled if line.number > pins.skip_lines]
+    separator = next((line for line in lines if line.separator), None)
+    lines = [line for line in lines if line is not separator]
+    mark = comment_mark(lines, pins.comment)
+    table = [line for line in lines if not line.is_comment(mark)]
+    if not table:
+        raise RecordingError(f"{path}: holds no row of numbers", "a header line and rows of numbers are needed")
+    comments = [line for line in lines if line.is_comment(mark)]
+    return _Lines(
+        every, table, comments, mark, separator, [line.number for line in filled if line.number <= pins.skip_lines]
+    )
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """The sample's lines cut into cells: `rows` are all of them, `data` those below the `head`, `width` cells wide."""
+
+    separator: str
+    width: int
+    rows: Sequence[tuple[Line, list[str]]]
+    data: Sequence[tuple[Line, list[str]]]
+    head: Head
+    kinds: str
+
+    @property
+    def not_numbers(self) -> list[int]:
+        """The columns of stamps and words."""
+        return [i for i, letter in enumerate(self.kinds) if letter in "TX"]
+
+
+def _cut_rows(path: Path, lines: _Lines, pins: TablePins) -> _Grid:
+    """Find separator, width and head; raises RecordingError where there is no table, or one of two readings."""
+    named = lines.separator.separator or "" if lines.separator else ""
+    straight = [line for line in lines.table if not is_ruler(line.text)] or lines.table
+    cut = find_separator(path, straight, pins.separator or named, pins.decimal)
+    rows = [(line, split_line(line.text, cut.separator)) for line in lines.table]
+    wide = [(line, cells) for line, cells in rows if len(cells) == cut.width]
+    lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
+    kinds = column_kinds([cells for _, cells in spread(lower)], cut.width)
+    head = HeadFinder(path, cut.separator, cut.width, kinds, pins).find(lines.table, lines.comments)
+    data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
+    kinds = column_kinds([cells for _, cells in spread(data)], cut.width)
+    return _Grid(cut.separator, cut.width, rows, data, head, kinds)
+
+
+def _refuse_other_readings(path: Path, lines: _Lines, grid: _Grid, pins: TablePins) -> None:
+    """Raise RecordingError where the lines may be another table: its commas decimal marks, or a table above it."""
+    head = grid.head
+    if head.names is None and not pins.separator and not lines.separator:
+        above = [line for line in lines.comments if line.number < head.first.number]
+        named = any(len(line.text.strip(lines.mark).split()) == 1 for line in above)
+        refuse_commas_that_may_be_decimal(path, grid.data, grid.kinds, grid.separator, named)
+    if grid.width == 2 and grid.separator == "," and not pins.separator:
+        refuse_one_column_of_decimals(path, grid.rows, head, grid.data)
+    if pins.header is None:  # a pinned header says which table is meant: what stands above is a loss
+        refuse_table_above(path, head, grid.width)
+
+
+def _has_comments(lines: _Lines, grid: _Grid) -> bool:
+    """Whether the sample has comments that are no rows made comments: above the rows, or of another width."""
+    first = grid.head.first.number
+    return any(
+        line.number <= first or len(split_line(line.text, grid.separator)) != grid.width for line in lines.comments
+    )
+
+
+def _stamped_columns(grid: _Grid, pins: TablePins) -> dict[int, Stamped]:
+    """The columns of dates and times by their number; a time beside a day belongs to it."""
+    layout = pins.time_format if "%" in pins.time_format else ""
+    stamped: dict[int, Stamped] = {}
+    for i in grid.not_numbers:
+        found = _stamped([cells[i] for _, cells in grid.data if cells[i] not in pins.missing], layout)
+        if found.layouts:
+            stamped[i] = found
+    days = [i for i, found in stamped.items() if found.layouts[0].dated]
+    return stamped | {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
 
 
 def spread(rows: Sequence[Any]) -> Sequence[Any]:
@@ -231,13 +288,16 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
     return head.names is None or not head.names[-1]
 
 
-def _findings(text: Text, head: Head, told: Line | None) -> list[Finding]:
+def _findings(text: Text, lines: _Lines, head: Head) -> list[Finding]:
     found = []
+    if lines.skipped:
+        found.append(Finding(f"{shown_lines(lines.skipped)} skipped, as [csv] says", severity="note"))
     shown = _SHOWN_ENCODINGS.get(text.encoding)
     if shown:
         found.append(Finding(f"not valid UTF-8, read as {shown}", severity="note"))
-    if told:
-        found.append(Finding(f"line {told.number} ({told.text.strip()[:12]}) names the separator", severity="note"))
+    if lines.separator:
+        line = lines.separator
+        found.append(Finding(f"line {line.number} ({line.text.strip()[:12]}) names the separator", severity="note"))
     if head.numbers:
         lost = f"{shown_lines(head.numbers)} above the rows skipped though {_holds(head.numbers)} numbers"
         found.append(Finding(f"{lost}; skip_lines in [csv] says that they are no rows", severity="loss"))
