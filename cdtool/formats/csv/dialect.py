@@ -7,22 +7,19 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from cdtool.channels import TablePins
-from cdtool.errors import RecordingError
 from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
+from cdtool.formats.csv.cell_grid import CellGrid, SampleLines, cut_rows, sort_lines
 from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
 from cdtool.formats.csv.doubtful_commas import refuse_commas_that_may_be_decimal, refuse_one_column_of_decimals
 from cdtool.formats.csv.doubtful_points import settled_marks
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.footer import find_footer
-from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
-from cdtool.formats.csv.head_words import column_kinds
-from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines, shown_lines
+from cdtool.formats.csv.head import Head, refuse_table_above
+from cdtool.formats.csv.lines import Line, refuse_long_line, shown_lines
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
 from cdtool.formats.csv.row_kernel import count_lines
-from cdtool.formats.csv.separator import find_separator
 from cdtool.formats.csv.shown_pins import shown_pins
 from cdtool.formats.csv.stamps import Stamped, find_layout
 from cdtool.formats.csv.text import Text
@@ -116,8 +113,8 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     refuse_long_line(text, stream)
-    lines = _sort_lines(path, text, stream, pins)
-    grid = _cut_rows(path, lines, pins)
+    lines = sort_lines(path, text, stream, pins)
+    grid = cut_rows(path, lines, pins)
     head = grid.head
     marks = _marks(path, grid.data, grid.kinds, grid.separator, pins)
     _refuse_other_readings(path, lines, grid, pins)
@@ -151,72 +148,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     )
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """The lines of a sample by what they are: `table` has names and rows, `mark` begins the `comments`.
-
-    `separator` is a line that only names the separator (sep=;), `skipped` are the numbers of those that the machine
-    file says to skip.
-    """
-
-    every: Sequence[Line]
-    table: Sequence[Line]
-    comments: Sequence[Line]
-    mark: str
-    separator: Line | None
-    skipped: Sequence[int]
-
-
-def _sort_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> _Lines:
-    """Sort the lines of the sample; raises RecordingError where none is left for a table."""
-    every = sample_lines(text, stream)
-    filled = [line for line in every if not line.blank]
-    lines = [line for line in filled if line.number > pins.skip_lines]
-    separator = next((line for line in lines if line.separator), None)
-    lines = [line for line in lines if line is not separator]
-    mark = comment_mark(lines, pins.comment)
-    table = [line for line in lines if not line.is_comment(mark)]
-    if not table:
-        raise RecordingError(f"{path}: holds no row of numbers", "a header line and rows of numbers are needed")
-    comments = [line for line in lines if line.is_comment(mark)]
-    return _Lines(
-        every, table, comments, mark, separator, [line.number for line in filled if line.number <= pins.skip_lines]
-    )
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """The sample's lines cut into cells: `rows` are all of them, `data` those below the `head`, `width` cells wide."""
-
-    separator: str
-    width: int
-    rows: Sequence[tuple[Line, list[str]]]
-    data: Sequence[tuple[Line, list[str]]]
-    head: Head
-    kinds: str
-
-    @property
-    def not_numbers(self) -> list[int]:
-        """The columns of stamps and words."""
-        return [i for i, letter in enumerate(self.kinds) if letter in "TX"]
-
-
-def _cut_rows(path: Path, lines: _Lines, pins: TablePins) -> _Grid:
-    """Find separator, width and head; raises RecordingError where there is no table, or one of two readings."""
-    named = lines.separator.separator or "" if lines.separator else ""
-    straight = [line for line in lines.table if not is_ruler(line.text)] or lines.table
-    cut = find_separator(path, straight, pins.separator or named, pins.decimal)
-    rows = [(line, split_line(line.text, cut.separator)) for line in lines.table]
-    wide = [(line, cells) for line, cells in rows if len(cells) == cut.width]
-    lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
-    kinds = column_kinds([cells for _, cells in spread(lower)], cut.width)
-    head = HeadFinder(path, cut.separator, cut.width, kinds, pins).find(lines.table, lines.comments)
-    data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
-    kinds = column_kinds([cells for _, cells in spread(data)], cut.width)
-    return _Grid(cut.separator, cut.width, rows, data, head, kinds)
-
-
-def _refuse_other_readings(path: Path, lines: _Lines, grid: _Grid, pins: TablePins) -> None:
+def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
     """Raise RecordingError where the lines may be another table: its commas decimal marks, or a table above it."""
     head = grid.head
     if head.names is None and not pins.separator and not lines.separator:
@@ -229,7 +161,7 @@ def _refuse_other_readings(path: Path, lines: _Lines, grid: _Grid, pins: TablePi
         refuse_table_above(path, head, grid.width)
 
 
-def _has_comments(lines: _Lines, grid: _Grid) -> bool:
+def _has_comments(lines: SampleLines, grid: CellGrid) -> bool:
     """Whether the sample has comments that are no rows made comments: above the rows, or of another width."""
     first = grid.head.first.number
     return any(
@@ -237,7 +169,7 @@ def _has_comments(lines: _Lines, grid: _Grid) -> bool:
     )
 
 
-def _stamped_columns(grid: _Grid, pins: TablePins) -> dict[int, Stamped]:
+def _stamped_columns(grid: CellGrid, pins: TablePins) -> dict[int, Stamped]:
     """The columns of dates and times by their number; a time beside a day belongs to it."""
     layout = pins.time_format if "%" in pins.time_format else ""
     stamped: dict[int, Stamped] = {}
@@ -247,11 +179,6 @@ def _stamped_columns(grid: _Grid, pins: TablePins) -> dict[int, Stamped]:
             stamped[i] = found
     days = [i for i, found in stamped.items() if found.layouts[0].dated]
     return stamped | {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
-
-
-def spread(rows: Sequence[Any]) -> Sequence[Any]:
-    """At most some hundred rows, over all of the sample."""
-    return rows[:: max(1, len(rows) // (2 * _LOOKED))]
 
 
 def _stamped(cells: list[str], layout: str) -> Stamped:
@@ -288,7 +215,7 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
     return head.names is None or not head.names[-1]
 
 
-def _findings(text: Text, lines: _Lines, head: Head) -> list[Finding]:
+def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
     found = []
     if lines.skipped:
         found.append(Finding(f"{shown_lines(lines.skipped)} skipped, as [csv] says", severity="note"))
