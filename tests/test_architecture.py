@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+# Files that name what is called: code, pages, and what the report's page is made of.
+SHOWS_NAMES = (".py", ".md", ".js", ".j2")
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "mcap", "typer", "rich")
 
 
@@ -49,6 +54,19 @@ def test_imports_run_downward():
 def test_every_module_says_what_it_is():
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         assert path.read_text(encoding="utf-8").startswith('"""'), path
+
+
+def words_of(*folders: Path) -> Counter[str]:
+    files = [file for folder in folders for file in sorted(folder.rglob("*")) if file.suffix in SHOWS_NAMES]
+    return Counter(word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8")))
+
+
+def test_what_is_public_is_used_or_shown_by_more_than_tests():
+    code, shown = words_of(ROOT / "cdtool"), words_of(ROOT / "docs", ROOT / "benchmarks")
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                assert code[node.name] > 1 or shown[node.name], (path, node.name)
 
 
 def test_the_python_api_names_functions_that_exist_and_every_command_has_one():

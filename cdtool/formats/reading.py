@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.dynamics import Machine
-from cdtool.errors import ConfigurationError, RecordingError, UsageError
+from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
 from cdtool.formats.channel_assembly import as_logged
@@ -117,9 +117,9 @@ def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRange
 def read_as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
     """One log, or a folder of its parts, as it is logged; raises RecordingError or ConfigurationError."""
     if not path.is_dir():
-        return _parts_as_logged([path], machine_file, path.stem)
+        return read_parts([path], machine_file, path.stem)
     parts = log_parts(path)
-    logged = _parts_as_logged(parts, machine_file, path.name)
+    logged = read_parts(parts, machine_file, path.name)
     findings = (*lost_parts(path, parts), *logged.recording.findings)
     return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
 
@@ -155,14 +155,8 @@ def has_topics(found: Format) -> bool:
     return bool(getattr(found, "topics", False))
 
 
-def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> Recording:
-    """Files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
-    if not paths:
-        raise UsageError(f"{name}: no file is given", "name the parts of the log")
-    return _parts_as_logged(paths, machine_file, name).on_load_side(machine_file.machine)
-
-
-def _parts_as_logged(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
+def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
+    """Return files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
     parts: list[Recording] = []
     low_pass, factors = 0.0, dict[str, tuple[float, ...]]()
     for path in paths:

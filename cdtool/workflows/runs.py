@@ -14,7 +14,7 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
-from cdtool.formats.reading import LoggedRecording, read_as_logged
+from cdtool.formats.reading import LoggedRecording, read_as_logged, read_recording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
@@ -90,7 +90,7 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     Values outside of the plausible `ranges` are masked, and a loss.
     """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    return _as_logged(Path(log), machine_file).on_load_side(machine_file.machine, ranges)
+    return _with_channels(Path(log), read_recording(Path(log), machine_file, ranges))
 
 
 def load_operations(
@@ -107,9 +107,14 @@ def load_operations(
 
 def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
     logged = read_as_logged(path, machine_file)
-    if not logged.recording.channels:
-        raise RecordingError(f"{path}: no channel is mapped", "write [channels] in the machine file")
+    _with_channels(path, logged.recording)
     return logged
+
+
+def _with_channels(path: Path, recording: Recording) -> Recording:
+    if not recording.channels:
+        raise RecordingError(f"{path}: no channel is mapped", "write [channels] in the machine file")
+    return recording
 
 
 def load_runs(  # noqa: PLR0913  keyword options on how to read, cut and report

@@ -92,7 +92,7 @@ def test_a_machine_file_without_the_needed_section_says_which_to_write(log, tmp_
 
 def test_parts_are_one_recording_whatever_their_order(log, machine):
     parts = [log(rows(40, 10), "3.csv"), log(rows(0, 20), "1.csv"), log(rows(20, 20), "2.csv")]
-    joined = read_parts(parts, machine(), "run")
+    joined = read_parts(parts, machine(), "run").on_load_side(machine().machine)
     whole = read_recording(log(rows(0, 50), "whole.csv"), machine())
     for channel in whole.channels:
         assert np.array_equal(joined[channel].time, whole[channel].time)
@@ -113,7 +113,7 @@ def test_parts_with_an_epoch_each_are_put_on_one_clock(tmp_path, machine):
         '[channels.mcap]\ntorque = { topic = "/joint_states", field = "effort[0]" }\n'
         'speed = { topic = "/joint_states", field = "velocity[0]" }\n'
     )
-    joined = read_parts(paths[::-1], found, "run")
+    joined = read_parts(paths[::-1], found, "run").on_load_side(found.machine)
     assert np.allclose(joined["torque"].time, np.arange(200) / 100, rtol=0, atol=1e-6)
     assert joined.origin == 1.7e9
 
@@ -121,13 +121,13 @@ def test_parts_with_an_epoch_each_are_put_on_one_clock(tmp_path, machine):
 def test_parts_that_overlap_are_refused(log, machine):
     parts = [log(rows(0, 20), "1.csv"), log(rows(19, 20), "2.csv")]
     with pytest.raises(RecordingError, match=r"2\.csv: overlaps the part before it"):
-        read_parts(parts, machine(), "run")
+        read_parts(parts, machine(), "run").on_load_side(machine().machine)
 
 
 def test_parts_that_do_not_hold_the_same_columns_are_refused(log, machine):
     parts = [log(rows(0, 20), "1.csv"), log("t,n_motor\n500,1\n", "2.csv")]
     with pytest.raises(RecordingError, match=r"2\.csv: no column 'i_motor'"):
-        read_parts(parts, machine(), "run")
+        read_parts(parts, machine(), "run").on_load_side(machine().machine)
 
 
 @needs_data("ur10e")
