@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock import HOLD_PERIODS
+from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
 from cdtool.clock.coarse import recent_medians
 from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
@@ -68,6 +68,26 @@ def usual_steps(time: FloatArray) -> FloatArray:
         steps = np.diff(time)
         usual[1:] = recent_medians(steps, float(steps[0]))
     return usual
+
+
+def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
+    """Where a filter has not settled yet behind a gap (n, J): for as long as the gap was, at most `longest` [s].
+
+    A gap is a step of more than 2.5 usual ones between samples that were not `lost` (n, J): two lost ones or more.
+    """
+    result = np.zeros(lost.shape, dtype=bool)
+    if len(time) < 3:
+        return result
+    steps = np.diff(time)
+    usual = np.concatenate((steps[:1], steps[:1], recent_medians(steps, float(steps[0]))[:-1]))
+    for j in range(lost.shape[1]):
+        known = np.where(lost[:, j], np.nan, time)
+        # How long before each sample the last one was that was not lost.
+        since = time - np.fmax.accumulate(np.concatenate(([time[0]], known[:-1])))
+        ends = time + np.minimum(since - usual, longest)
+        behind = (since > GAP_PERIODS * usual) & ~lost[:, j]
+        result[:, j] = time < np.maximum.accumulate(np.where(behind, ends, -np.inf)) - 0.5 * usual
+    return result
 
 
 def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:

@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import GAP_PERIODS, previous_value
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock import previous_value
 from cdtool.clock.lost import lost_samples
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
@@ -21,11 +20,12 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.filters import unsettled
 from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
 from cdtool.dynamics import Gain, JointEquation, Machine
 from cdtool.kernels import read_only
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 10.0
@@ -120,8 +120,8 @@ class FrictionEkf:
             friction[:, j], status[:, j] = of_joint(self, j, len(equations)).estimate(motion, equation)
         late = lost_samples(recording, ("acceleration",), drive.time)
         lost = drive.missing if late is None else drive.missing | late
-        unsettled = _unsettled(drive.time, for_every_joint(lost) if machine.coupled else lost)
-        status[unsettled & (status == Status.VALID)] = Status.GAP
+        behind = unsettled(drive.time, for_every_joint(lost) if machine.coupled else lost, _LONGEST_UNSETTLED)
+        status[behind & (status == Status.VALID)] = Status.GAP
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
     def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
@@ -192,23 +192,3 @@ class FrictionEkf:
         eigenvalues = np.linalg.eigvals(closed)
         poles = np.sort(np.abs(np.log(np.maximum(np.abs(eigenvalues), math.exp(-700.0)) + 0j)) / period)
         return np.asarray(poles.real, dtype=np.float64), float(covariance[0, 0])
-
-
-def _unsettled(time: FloatArray, lost: BoolArray) -> BoolArray:
-    """Where the estimate jumps behind a gap (n, J): for as long as the gap was, at most 10 ms.
-
-    A gap is a step of more than 2.5 usual ones between samples that were not `lost` (n, J): two lost ones or more.
-    """
-    unsettled = np.zeros(lost.shape, dtype=bool)
-    if len(time) < 3:
-        return unsettled
-    steps = np.diff(time)
-    usual = np.concatenate((steps[:1], steps[:1], recent_medians(steps, float(steps[0]))[:-1]))
-    for j in range(lost.shape[1]):
-        known = np.where(lost[:, j], np.nan, time)
-        # How long before each sample the last one was that was not lost.
-        since = time - np.fmax.accumulate(np.concatenate(([time[0]], known[:-1])))
-        ends = time + np.minimum(since - usual, _LONGEST_UNSETTLED)
-        behind = (since > GAP_PERIODS * usual) & ~lost[:, j]
-        unsettled[:, j] = time < np.maximum.accumulate(np.where(behind, ends, -np.inf)) - 0.5 * usual
-    return unsettled

@@ -18,9 +18,12 @@ from scipy.stats import binomtest
 
 from cdtool.activation import Activation
 from cdtool.clock.lost import lost_samples
+from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.formats.reading import read_as_logged
+from cdtool.machine_file import read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.recording import Recording, Series
@@ -35,6 +38,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from damaged_logs import KINDS, Fault, damaged, filled, random_faults
 from lost_evidence import cost_of
 
+ARM_LOGS = Path(__file__).parents[2] / "sample_logs" / "arm"
 CELLS = [(detector, threshold) for detector in DETECTORS.names() for threshold in THRESHOLDS.names()]
 AT_ONCE = Activation(debounce=1)
 LEARNED, OTHERS, JUDGED = 12, 12, 3
@@ -261,3 +265,25 @@ def test_exactly_the_lost_samples_of_a_channel_are_marked_sample_by_sample_and_c
         cut = lost_samples(part, CHANNELS, part["speed"].time)
         marks = np.zeros((len(part["speed"]), 1), dtype=bool) if cut is None else cut
         np.testing.assert_array_equal(marks, lost[: len(marks)])
+
+
+@pytest.mark.parametrize("channel", ["position", "speed"])
+def test_an_arms_energy_is_judged_again_when_what_was_guessed_of_a_long_gap_has_decayed(channel):
+    folder = ARM_LOGS / "trial_2"
+    machine_file = read_machine_file(folder / "machine.toml")
+    machine, detector = machine_file.machine, machine_file.detector("energy")
+    raw = read_as_logged(folder / "free" / "01.csv", machine_file).recording
+
+    def signal(recording: Recording) -> Signal:
+        return run_detector(operations_of(machine.referred_to_load(recording))[0], machine, detector)
+
+    whole = signal(raw)
+    swing = float(np.ptp(whole.values[whole.valid[:, 0]]))
+    for start in np.arange(1.5, 2.5, 0.1):
+        fault = Fault("NaN", start, 37, channel)
+        found = signal(damaged(raw, [fault]))
+        behind = found.valid[:, 0] & (found.time >= start + 0.037) & (found.time < start + 0.2)
+        off = np.abs(found.values[behind] - whole.values[behind])
+        assert float(off.max()) < 0.2 * swing, start
+        # It waits for at most 15 ms.
+        assert found.time[behind][0] < start + 0.037 + 0.0165
