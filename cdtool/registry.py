@@ -7,6 +7,7 @@ or everything is listed, and held against the contract when they are loaded.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -19,14 +20,15 @@ from cdtool.errors import CdtoolError, UsageError, nearest
 class Registry:
     """The table of one kind of class, with its short names, and what a plug-in of that kind must have.
 
-    `contract`: attributes of the class. `settings`: the metadata that each field of a frozen dataclass carries beside
-    its default; None where the class need not be one.
+    `contract`: attributes of the class. `optional`: attributes that it may have, with their types. `settings`: the
+    metadata that each field of a frozen dataclass carries beside its default; None where the class need not be one.
     """
 
     kind: str
     table: dict[str, str]
     short_names: dict[str, str] = field(default_factory=dict)
     contract: tuple[str, ...] = ()
+    optional: Mapping[str, type] = field(default_factory=dict)
     settings: tuple[str, ...] | None = None
 
     def names(self, plugins: bool = False) -> list[str]:
@@ -94,6 +96,9 @@ class Registry:
         for attribute in self.contract:
             if not hasattr(loaded, attribute):
                 return f"lacks the attribute '{attribute}'"
+        for attribute, kind in self.optional.items():
+            if not isinstance(getattr(loaded, attribute, None), kind | None):
+                return f"has an attribute '{attribute}' that is no {kind.__name__}"
         if "name" in self.contract and loaded.name != name:
             return f"is named '{loaded.name}' in its class: both names must be the same"
         short = getattr(loaded, "short_name", "")

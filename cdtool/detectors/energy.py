@@ -17,6 +17,7 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
+from cdtool.detectors.look import OLIVE, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
@@ -40,6 +41,8 @@ class Energy:
     title: ClassVar[str] = "Energy observer"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = False
+    contact_torque: ClassVar[bool] = False
+    look: ClassVar[Look] = Look(OLIVE, "p")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth", "minimum_speed")
