@@ -48,10 +48,10 @@ def contact_force(detection: Detection, machine: Any, contact: ContactPoint) -> 
     if not machine.coupled:
         raise UsageError(f"machine '{machine.name}' has no links to touch", "a planar_arm or urdf_robot is needed")
     if signal.joints != recording.joints or signal.unit != machine.force_unit or not _estimates(detection.detector):
-        known = [name for name in DETECTORS.names() if _estimates(name)]
+        able = [name for name in DETECTORS.names() if _estimates(name)]
         raise UsageError(
             f"{detection.detector} of {', '.join(signal.joints)} is no contact torque of all joints",
-            f"{', '.join(known[:-1])} or {known[-1]} of all joints",
+            f"{', '.join(able[:-1])} or {able[-1]} of all joints",
         )
     position = previous_value(recording["position"], signal.time)
     known = np.isfinite(position).all(axis=1) & signal.valid.all(axis=1)
