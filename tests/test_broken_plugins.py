@@ -292,3 +292,45 @@ def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_
     monkeypatch.setattr("cdtool.workflows.benchmark.benchmark.read_benchmark_file", fault)
     done = cdtool("benchmark", benchmark_file(tmp_path))
     assert done.status == 2 and "ZeroDivisionError" in done.err
+
+
+WRITER = """
+from cdtool.files import write_text
+from cdtool.foreign_files import Kind
+from cdtool.report.writers.base import Writer
+
+class Plugin(Writer):
+    name = "odd"
+    suffixes = (".txt",)
+    kinds = {".txt": Kind(b"cdtool: ", "list of cdtool")}
+
+    def write(self, report, target):
+        write_text(target, "cdtool: " + ", ".join(report.evaluated.results.detectors) + chr(10))
+"""
+
+
+def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path):
+    install(WRITER, group="writers")
+    done = cdtool("benchmark", benchmark_file(tmp_path), "-o", tmp_path / "list.txt", "-o", tmp_path / "results.json")
+    assert done.status == 0 and (tmp_path / "list.txt").read_text(encoding="utf-8") == "cdtool: momentum\n"
+    assert cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt").status == 0
+    (tmp_path / "list.txt").write_text("my own", encoding="utf-8")
+    refused = cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt")
+    assert refused.status == 2 and "holds no list of cdtool" in refused.err
+    listed = json.loads(cdtool("list", "writers", "--json").out)
+    assert listed[-1]["name"] == "odd" and listed[-1]["suffixes"] == [".txt"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('(".txt",)', '("txt",)', "does not load: ConfigurationError"),
+        ('{".txt"', '{".text"', "does not load: ConfigurationError"),
+        ("(Writer)", "", "lacks the attribute 'in_folder'"),
+    ],
+)
+def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, words):
+    assert WRITER.count(old) == 1
+    install(WRITER.replace(old, new), group="writers")
+    listed = cdtool("list", "writers")
+    assert listed.status == 3 and f"writer plug-in 'odd' of package 'odd-things' {words}" in listed.err

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @with_options
-def detect(
+def detect(  # noqa: C901  the whole command, from its options to its exit status
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     options: LogOptions,
     contact_at: Annotated[

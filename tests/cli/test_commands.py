@@ -297,7 +297,7 @@ def test_listing_tells_detectors_with_gains_units_and_defaults():
     assert list(entries) == DETECTORS.names()
     assert entries["momentum"]["short_name"] == "gm"
     assert entries["momentum"]["gains"][0]["default"] == 10.0 and entries["momentum"]["gains"][0]["unit"] == "rad/s"
-    for kind in ("thresholds", "machines", "formats"):
+    for kind in ("thresholds", "machines", "formats", "writers"):
         assert cdtool("list", kind).status == 0
     assert cdtool("list", "detector").status == 2
 

@@ -1,4 +1,4 @@
-"""What holds for the tables of detectors, thresholds, machines and formats."""
+"""What holds for the tables of detectors, thresholds, machines, formats and report writers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 import cdtool.detectors
 import cdtool.formats
 import cdtool.machines
+import cdtool.report.writers
 import cdtool.thresholds
 from tests.contracts.registered import targets_in
 
@@ -15,6 +16,7 @@ REGISTRIES = [
     (cdtool.thresholds, cdtool.thresholds.THRESHOLDS),
     (cdtool.machines, cdtool.machines.MACHINES),
     (cdtool.formats, cdtool.formats.FORMATS),
+    (cdtool.report.writers, cdtool.report.writers.WRITERS),
 ]
 
 
