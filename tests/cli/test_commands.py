@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -296,7 +297,9 @@ def test_listing_tells_detectors_with_gains_units_and_defaults():
     entries = {entry["name"]: entry for entry in json.loads(cdtool("list", "detectors", "--json").out)}
     assert list(entries) == DETECTORS.names()
     assert entries["momentum"]["short_name"] == "gm"
-    assert entries["momentum"]["gains"][0]["default"] == 10.0 and entries["momentum"]["gains"][0]["unit"] == "rad/s"
+    (bandwidth,) = fields(DETECTORS.load("momentum"))
+    (gain,) = entries["momentum"]["gains"]
+    assert (gain["name"], gain["default"], gain["unit"]) == ("bandwidth", bandwidth.default, "rad/s")
     for kind in ("thresholds", "machines", "formats", "writers"):
         assert cdtool("list", kind).status == 0
     assert cdtool("list", "detector").status == 2
