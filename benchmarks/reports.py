@@ -21,7 +21,8 @@ from timing import environment, table
 from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
 from cdtool.evaluation.traces.choice import MOST_KEPT
-from cdtool.report.outputs import Report, write_outputs
+from cdtool.report.outputs import write_outputs
+from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
 
 DETECTORS = ("pure_inertia", "friction_ekf", "momentum", "inertial_momentum", "pure_torque")

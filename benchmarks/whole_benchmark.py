@@ -15,7 +15,8 @@ from time import perf_counter
 
 from timing import environment, table
 
-from cdtool.report.outputs import Report, write_outputs
+from cdtool.report.outputs import write_outputs
+from cdtool.report.writers.base import Report
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
 

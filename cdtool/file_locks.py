@@ -1,4 +1,9 @@
-"""One writer of a target at a time: a lock that dies with its process, and what dead writers left behind."""
+"""One writer of a target at a time: a lock that dies with its process, and what dead writers left behind.
+
+Why not the package filelock: on Unix it leaves the lock file in the folder for good, and where the file system has no
+flock it changes to a lock that outlives its process. Here the file is removed while it is locked, and whoever has
+waited for it checks that the file it has locked still bears the name. A folder of logs keeps nothing of cdtool's.
+"""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
 """Names -> classes, loaded only when asked for.
 
-A folder of the method (formats, machines, detectors, thresholds) has one literal table `name -> "module:Class"`.
-Plug-ins come by entry points of the group `cdtool.<kind>s`; they are looked at only when an unknown name is asked for
-or everything is listed, and held against the contract when they are loaded.
+A folder of the method (formats, machines, detectors, thresholds, report writers) has one literal table
+`name -> "module:Class"`. Plug-ins come by entry points of the group `cdtool.<kind>s`; they are looked at only when an
+unknown name is asked for or everything is listed, and held against the contract when they are loaded.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -19,14 +20,15 @@ from cdtool.errors import CdtoolError, UsageError, nearest
 class Registry:
     """The table of one kind of class, with its short names, and what a plug-in of that kind must have.
 
-    `contract`: attributes of the class. `settings`: the metadata that each field of a frozen dataclass carries beside
-    its default; None where the class need not be one.
+    `contract`: attributes of the class. `optional`: attributes that it may have, with their types. `settings`: the
+    metadata that each field of a frozen dataclass carries beside its default; None where the class need not be one.
     """
 
     kind: str
     table: dict[str, str]
     short_names: dict[str, str] = field(default_factory=dict)
     contract: tuple[str, ...] = ()
+    optional: Mapping[str, type] = field(default_factory=dict)
     settings: tuple[str, ...] | None = None
 
     def names(self, plugins: bool = False) -> list[str]:
@@ -94,19 +96,25 @@ class Registry:
         for attribute in self.contract:
             if not hasattr(loaded, attribute):
                 return f"lacks the attribute '{attribute}'"
+        for attribute, kind in self.optional.items():
+            if not isinstance(getattr(loaded, attribute, None), kind | None):
+                return f"has an attribute '{attribute}' that is no {kind.__name__}"
         if "name" in self.contract and loaded.name != name:
             return f"is named '{loaded.name}' in its class: both names must be the same"
         short = getattr(loaded, "short_name", "")
         if short in self.short_names or short in self.table:
             return f"has the short name '{short}', which belongs to {self.short_names.get(short, short)}"
-        if self.settings is None:
-            return ""
+        return "" if self.settings is None else self._breach_of_settings(loaded, self.settings)
+
+    @staticmethod
+    def _breach_of_settings(loaded: Any, settings: tuple[str, ...]) -> str:
+        """Return what the dataclass of a plug-in lacks; empty where every field has its default and metadata."""
         if not (is_dataclass(loaded) and getattr(loaded, "__dataclass_params__").frozen):  # noqa: B009 - untyped
             return "is no frozen dataclass"
         for item in fields(loaded):
             if item.default is MISSING:
                 return f"has no default for '{item.name}'"
-            if absent := [key for key in self.settings if key not in item.metadata]:
+            if absent := [key for key in settings if key not in item.metadata]:
                 return f"gives no {' and no '.join(absent)} for '{item.name}': make it by cdtool.detectors.base.gain"
         return ""
 
@@ -134,7 +142,7 @@ def plugin_packages() -> dict[str, str]:
     """The installed packages that bring plug-ins, with their versions: what a report has to name."""
     found = {
         point.dist.name: point.dist.version
-        for kind in ("detectors", "thresholds", "machines", "formats")
+        for kind in ("detectors", "thresholds", "machines", "formats", "writers")
         for point in entry_points(group=f"cdtool.{kind}")
         if point.dist is not None
     }

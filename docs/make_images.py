@@ -16,8 +16,8 @@ import tempfile
 from pathlib import Path
 
 from cdtool import benchmark
-from cdtool.report.outputs import Report
 from cdtool.report.plots.folder_figures import write_figures
+from cdtool.report.writers.base import Report
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"

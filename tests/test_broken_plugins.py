@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.detectors import DETECTORS
+from cdtool.detectors.look import Look
+from cdtool.report.plots.style import look_of
 from tests.command import Outcome, cdtool
 
 GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
@@ -20,6 +23,7 @@ from typing import ClassVar
 import numpy as np
 from cdtool.detection import Signal
 from cdtool.detectors.base import gain
+from cdtool.detectors.look import Look
 
 @dataclass(frozen=True)
 class Plugin:
@@ -83,6 +87,13 @@ def test_the_detector_that_the_others_are_made_from_is_fine(install):
         ("(frozen=True)", "", "is no frozen dataclass"),
         ('gain(1.0, "1", "a factor")', "1.0", "gives no unit and no meaning for 'factor'"),
         (' = gain(1.0, "1", "a factor")', "", "has no default for 'factor'"),
+        ("    signed", "    look: ClassVar[str] = 'red'\n    signed", "has an attribute 'look' that is no Look"),
+        ("    signed", "    look = Look('red', 'o')\n    signed", 'does not load: ConfigurationError("the colour of a'),
+        (
+            "    signed",
+            "    look = Look('#ff0000', '*')\n    signed",
+            'does not load: ConfigurationError("the marker of',
+        ),
     ],
 )
 def test_a_package_that_cannot_be_used_is_one_line_that_names_it(install, old, new, words):
@@ -94,10 +105,19 @@ def test_a_package_that_cannot_be_used_is_one_line_that_names_it(install, old, n
     assert done.err.endswith("(repair or uninstall 'odd-things')\n")
 
 
+def test_a_plugin_has_the_look_that_its_class_gives_and_otherwise_one_that_its_name_decides(install):
+    absent = look_of("odd")
+    install(DETECTOR)
+    assert look_of("odd") == absent
+    given = DETECTOR.replace("    signed", "    look = Look('#123456', 's')\n    signed")
+    install(given.replace('"odd"', '"even"'), "even", package="even-things")
+    assert look_of("even") == Look("#123456", "s")
+
+
 def test_the_others_are_listed_beside_a_package_that_cannot_be_used(install):
     install("import no_such_module")
     listed = cdtool("list", "detectors", "--json")
-    assert listed.status == 3 and len(json.loads(listed.out)) == 10
+    assert listed.status == 3 and [entry["name"] for entry in json.loads(listed.out)] == DETECTORS.names()
     assert "left out: odd: detector plug-in 'odd' of package 'odd-things' does not load" in listed.err
     unknown = detect("momentun")
     assert unknown.status == 2 and "unknown detector 'momentun'; " in unknown.err
@@ -163,7 +183,7 @@ def test_a_detector_that_fails_in_some_logs_is_left_out_there_by_name_and_in_all
     install(DETECTOR.replace("torque = recording", 'assert "03" not in recording.name; torque = recording'))
     done = detect("odd", LOG, GATE / "stiff" / "04.csv")
     assert done.status == 3 and "04.csv" in done.out
-    assert "03.csv: detector odd fails: AssertionError() in odd_things_module.py, line 20" in done.err
+    assert "03.csv: detector odd fails: AssertionError() in odd_things_module.py, line 21" in done.err
 
 
 def benchmark_file(folder: Path) -> Path:
@@ -179,7 +199,7 @@ def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(in
     install(new)
     done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "all", "--json")
     results = json.loads(done.out)
-    assert done.status == 0 and len(results["detectors"]) == 10 and "odd" not in results["detectors"]
+    assert done.status == 0 and results["detectors"] == DETECTORS.names()
     (finding,) = [item for item in results["findings"] if item["recording"] == "odd"]
     assert finding["reason"].startswith("left out: ") and "odd" in done.err
 
@@ -272,3 +292,45 @@ def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_
     monkeypatch.setattr("cdtool.workflows.benchmark.benchmark.read_benchmark_file", fault)
     done = cdtool("benchmark", benchmark_file(tmp_path))
     assert done.status == 2 and "ZeroDivisionError" in done.err
+
+
+WRITER = """
+from cdtool.files import write_text
+from cdtool.foreign_files import Kind
+from cdtool.report.writers.base import Writer
+
+class Plugin(Writer):
+    name = "odd"
+    suffixes = (".txt",)
+    kinds = {".txt": Kind(b"cdtool: ", "list of cdtool")}
+
+    def write(self, report, target):
+        write_text(target, "cdtool: " + ", ".join(report.evaluated.results.detectors) + chr(10))
+"""
+
+
+def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path):
+    install(WRITER, group="writers")
+    done = cdtool("benchmark", benchmark_file(tmp_path), "-o", tmp_path / "list.txt", "-o", tmp_path / "results.json")
+    assert done.status == 0 and (tmp_path / "list.txt").read_text(encoding="utf-8") == "cdtool: momentum\n"
+    assert cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt").status == 0
+    (tmp_path / "list.txt").write_text("my own", encoding="utf-8")
+    refused = cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt")
+    assert refused.status == 2 and "holds no list of cdtool" in refused.err
+    listed = json.loads(cdtool("list", "writers", "--json").out)
+    assert listed[-1]["name"] == "odd" and listed[-1]["suffixes"] == [".txt"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('(".txt",)', '("txt",)', "does not load: ConfigurationError"),
+        ('{".txt"', '{".text"', "does not load: ConfigurationError"),
+        ("(Writer)", "", "lacks the attribute 'in_folder'"),
+    ],
+)
+def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, words):
+    assert WRITER.count(old) == 1
+    install(WRITER.replace(old, new), group="writers")
+    listed = cdtool("list", "writers")
+    assert listed.status == 3 and f"writer plug-in 'odd' of package 'odd-things' {words}" in listed.err

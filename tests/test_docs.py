@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from cdtool.channels import ChannelMap
+from cdtool.detectors import DETECTORS
 from cdtool.errors import ConfigurationError
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import CHANNELS
@@ -298,10 +299,14 @@ def test_every_link_and_image_resolves():
 
 
 def test_every_page_and_image_is_reached_and_no_image_is_large():
-    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = {
+        (index.parent / target).resolve()
+        for index in DOCS.rglob("index.md")
+        for target in _LINK.findall(index.read_text(encoding="utf-8"))
+    }
     everything = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     for page in DOCS.rglob("*.md"):
-        assert page.name == "index.md" or f"({page.relative_to(DOCS).as_posix()})" in index, page
+        assert page == DOCS / "index.md" or page.resolve() in listed, page
     images = list((DOCS / "images").iterdir())
     assert images
     for image in images:
@@ -309,9 +314,14 @@ def test_every_page_and_image_is_reached_and_no_image_is_large():
         assert image.stat().st_size < 200_000, image.name
 
 
+def test_the_list_of_detectors_is_made_from_the_registry_and_their_pages():
+    made = runpy.run_path(str(DOCS / "make_detector_index.py"))
+    assert made["FILE"].read_text(encoding="utf-8") == made["index_text"](), "run python docs/make_detector_index.py"
+
+
 def test_every_detector_has_a_page_whose_table_names_each_gain_with_default_and_unit():
     detectors = json.loads(cdtool("list", "detectors", "--json").out)
-    assert len(detectors) >= 10
+    assert len(detectors) >= len(DETECTORS.table)
     for detector in detectors:
         text = (DOCS / "detectors" / f"{detector['name'].replace('_', '-')}.md").read_text(encoding="utf-8")
         assert f"`{detector['name']}`" in text and f"`{detector['short_name']}`" in text

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.detectors import DETECTORS
+
 ROOT = Path(__file__).parents[1]
 GATE = ROOT / "sample_logs" / "gate"
 CONTRACTS = "torque_rate or robust_limit"
@@ -55,7 +57,7 @@ def machine_with(folder: Path, more: str) -> Path:
 
 def test_list_tells_the_plugins_with_gains_units_and_defaults(command):
     entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").stdout)}
-    assert len(entries) == 11
+    assert list(entries) == [*DETECTORS.names(), "torque_rate"]
     assert entries["torque_rate"]["short_name"] == "tr" and entries["torque_rate"]["needs"] == ["torque"]
     (gain,) = entries["torque_rate"]["gains"]
     assert (gain["name"], gain["default"], gain["unit"]) == ("cutoff", 2.0, "Hz")
@@ -129,7 +131,7 @@ def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
     done = command("benchmark", "benchmark.toml", "--detectors", "all", "--json")
     assert done.returncode == 0, done.stderr
     results = json.loads(done.stdout)
-    assert len(results["detectors"]) == 11 and results["detectors"][-1] == "torque_rate"
+    assert results["detectors"] == [*DETECTORS.names(), "torque_rate"]
     (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").stdout)
     assert one["detector"] == "torque_rate"
     only = command("benchmark", "benchmark.toml", "--detectors", "tr")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from pathlib import Path
@@ -14,6 +15,7 @@ from cdtool.activation import Activation
 from cdtool.errors import SignatureError, UsageError
 from cdtool.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.detection_options import DetectionOptions
 from tests.command import cdtool as run
 
 MACHINE = """
@@ -219,3 +221,11 @@ def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
     row = cdtool.benchmark(folder / "lost.toml").results.contacts[0]
     assert (row.detector, row.outcome) == ("momentum", "not_assessable")
     assert "missing samples" in row.reason
+
+
+@pytest.mark.parametrize("call", [cdtool.detect, cdtool.explain])
+def test_detect_and_explain_take_the_fields_of_the_options_as_keywords_and_no_other(call):
+    log, *given = inspect.signature(call).parameters
+    assert log == "log" and given == list(inspect.signature(DetectionOptions).parameters)
+    with pytest.raises(TypeError, match="'limits'"):
+        call("a.csv", "machine.toml", limits=[1.0])

@@ -35,7 +35,8 @@ def benchmark(
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import Report, check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
 
     targets = output or []

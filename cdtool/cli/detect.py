@@ -10,34 +10,9 @@ import typer
 
 from cdtool.cli.console import leave, plain, print_error, print_json, print_not_assessable, print_skipped, progress
 from cdtool.cli.detect_shown import as_rows, show_detected
-from cdtool.cli.options import (
-    BenchmarkOption,
-    DebounceOption,
-    DetectorOption,
-    ForceOption,
-    HysteresisOption,
-    JointsOption,
-    JsonOption,
-    LabelsOption,
-    LatchOption,
-    LimitOption,
-    MachineUnlessBenchmarkOption,
-    MassBeforeCellOption,
-    OnsetAboveOption,
-    OnsetBackToOption,
-    OnsetHoldOption,
-    OnsetSeparationOption,
-    OnsetSigmasOption,
-    OperationsOption,
-    RearmOption,
-    SignatureOption,
-    SynchronisationOption,
-    WindowOption,
-    figure_name,
-    limits_of,
-    listed,
-)
-from cdtool.cli.scoring_options import refuse_beside_benchmark, rules_of
+from cdtool.cli.log_options import LogOptions
+from cdtool.cli.option_groups import with_options
+from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact
@@ -47,31 +22,13 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import Detected
 
 
+@with_options
 def detect(  # noqa: C901  the whole command, from its options to its exit status
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
-    machine: MachineUnlessBenchmarkOption = None,
-    benchmark: BenchmarkOption = None,
-    signature: SignatureOption = None,
-    limit: LimitOption = "",
-    detector: DetectorOption = None,
-    joints: JointsOption = "",
+    options: LogOptions,
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z, m in the link's frame.")
     ] = "",
-    operations: OperationsOption = "",
-    debounce: DebounceOption = None,
-    rearm: RearmOption = None,
-    hysteresis: HysteresisOption = None,
-    latch: LatchOption = None,
-    onset_above: OnsetAboveOption = None,
-    onset_back_to: OnsetBackToOption = None,
-    onset_hold: OnsetHoldOption = None,
-    onset_sigmas: OnsetSigmasOption = None,
-    onset_separation: OnsetSeparationOption = None,
-    labels: LabelsOption = None,
-    synchronisation: SynchronisationOption = None,
-    window: WindowOption = None,
-    mass_before_cell: MassBeforeCellOption = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
     ] = None,
@@ -86,52 +43,12 @@ def detect(  # noqa: C901  the whole command, from its options to its exit statu
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
     from cdtool.files import made_folder
-    from cdtool.machine_file import read_machine_file
-    from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
-    from cdtool.workflows.detection import detect as run
+    from cdtool.workflows.detection import detect_log
     from cdtool.workflows.runs import absent_truth, lost
 
-    limits = limits_of(limit)
-    prepared = None
-    if benchmark is not None:
-        refuse_beside_benchmark(
-            benchmark,
-            machine=machine,
-            limit=limit,
-            joints=joints,
-            operations=operations,
-            debounce=debounce,
-            rearm=rearm,
-            hysteresis=hysteresis,
-            latch=latch,
-            onset_above=onset_above,
-            onset_back_to=onset_back_to,
-            onset_hold=onset_hold,
-            onset_sigmas=onset_sigmas,
-            onset_separation=onset_separation,
-            labels=labels,
-            synchronisation=synchronisation,
-            window=window,
-            mass_before_cell=mass_before_cell,
-        )
-        prepared = prepare_benchmark(benchmark, detector=detector, signature=signature)
-        machine_file = prepared.setup.machine_file
-    elif machine is not None:
-        machine_file = read_machine_file(machine)
-    else:
-        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
-    rules = rules_of(
-        above=onset_above,
-        back_to=onset_back_to,
-        hold=onset_hold,
-        sigmas=onset_sigmas,
-        separation=onset_separation,
-        labels=labels,
-        synchronisation=synchronisation,
-        window=window,
-        mass_before_cell=mass_before_cell,
-    )
+    settings = options.settings()
+    prepared, machine_file = settings.prepared(), settings.machine_file()
     contact = ContactPoint.parse(contact_at) if contact_at else None
     plot_names = _plot_names(plot, logs, force=force)
     done: list[tuple[Path, Detected]] = []
@@ -141,21 +58,7 @@ def detect(  # noqa: C901  the whole command, from its options to its exit statu
     with folder, progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
             try:
-                found = (
-                    run(log, benchmark=prepared)
-                    if prepared
-                    else run(
-                        log,
-                        machine_file,
-                        signature=signature,
-                        detector=detector,
-                        limit=limits,
-                        joints=listed(joints),
-                        operations=operations or "whole",
-                        activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
-                        rules=rules,
-                    )
-                )
+                found = detect_log(log, settings)
                 if contact:
                     made = [summarise_force(item, machine_file.machine, contact) for item in found.detections]
                     forces |= {item.operation: item for item in made}

@@ -9,61 +9,18 @@ import typer
 
 from cdtool.cli.console import leave, plain, print_json, print_not_assessable, print_skipped
 from cdtool.cli.explain_shown import SHOWN, explained_as_json, show_explained
-from cdtool.cli.options import (
-    BenchmarkOption,
-    DebounceOption,
-    DetectorOption,
-    ForceOption,
-    HysteresisOption,
-    JointsOption,
-    JsonOption,
-    LabelsOption,
-    LatchOption,
-    LimitOption,
-    MachineUnlessBenchmarkOption,
-    MassBeforeCellOption,
-    OnsetAboveOption,
-    OnsetBackToOption,
-    OnsetHoldOption,
-    OnsetSeparationOption,
-    OnsetSigmasOption,
-    OperationsOption,
-    RearmOption,
-    SignatureOption,
-    SynchronisationOption,
-    WindowOption,
-    figure_name,
-    limits_of,
-    listed,
-)
-from cdtool.cli.scoring_options import refuse_beside_benchmark, rules_of
+from cdtool.cli.log_options import LogOptions
+from cdtool.cli.option_groups import with_options
+from cdtool.cli.options import ForceOption, JsonOption, figure_name
 
 if TYPE_CHECKING:
     from cdtool.workflows.explaining import Explained
 
 
+@with_options
 def explain(
     log: Annotated[Path, typer.Argument(help="Recording to explain.", metavar="LOG")],
-    machine: MachineUnlessBenchmarkOption = None,
-    benchmark: BenchmarkOption = None,
-    signature: SignatureOption = None,
-    limit: LimitOption = "",
-    detector: DetectorOption = None,
-    joints: JointsOption = "",
-    operations: OperationsOption = "",
-    debounce: DebounceOption = None,
-    rearm: RearmOption = None,
-    hysteresis: HysteresisOption = None,
-    latch: LatchOption = None,
-    onset_above: OnsetAboveOption = None,
-    onset_back_to: OnsetBackToOption = None,
-    onset_hold: OnsetHoldOption = None,
-    onset_sigmas: OnsetSigmasOption = None,
-    onset_separation: OnsetSeparationOption = None,
-    labels: LabelsOption = None,
-    synchronisation: SynchronisationOption = None,
-    window: WindowOption = None,
-    mass_before_cell: MassBeforeCellOption = None,
+    options: LogOptions,
     plot: Annotated[
         Path | None,
         typer.Option("--plot", help="PNG, SVG or PDF to draw the first event into; an existing folder: all events."),
@@ -78,60 +35,13 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
-    from cdtool.workflows.explaining import explain as run
+    from cdtool.workflows.explaining import explain_log
     from cdtool.workflows.runs import lost
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
-    prepared = None
-    if benchmark is not None:
-        refuse_beside_benchmark(
-            benchmark,
-            machine=machine,
-            limit=limit,
-            joints=joints,
-            operations=operations,
-            debounce=debounce,
-            rearm=rearm,
-            hysteresis=hysteresis,
-            latch=latch,
-            onset_above=onset_above,
-            onset_back_to=onset_back_to,
-            onset_hold=onset_hold,
-            onset_sigmas=onset_sigmas,
-            onset_separation=onset_separation,
-            labels=labels,
-            synchronisation=synchronisation,
-            window=window,
-            mass_before_cell=mass_before_cell,
-        )
-        prepared = prepare_benchmark(benchmark, detector=detector, signature=signature)
-    rules = rules_of(
-        above=onset_above,
-        back_to=onset_back_to,
-        hold=onset_hold,
-        sigmas=onset_sigmas,
-        separation=onset_separation,
-        labels=labels,
-        synchronisation=synchronisation,
-        window=window,
-        mass_before_cell=mass_before_cell,
-    )
-    explained = (
-        run(log, benchmark=prepared)
-        if prepared
-        else run(
-            log,
-            machine,
-            signature=signature,
-            limit=limits_of(limit),
-            detector=detector,
-            joints=listed(joints),
-            operations=operations or "whole",
-            activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
-            rules=rules,
-        )
-    )
+    settings = options.settings()
+    explained = explain_log(log, settings)
+    prepared = settings.prepared()
     left_out = prepared.skipped if prepared else ()
     skipped = [*left_out, *lost(explained.found.recording), *explained.found.not_scored]
     print_skipped(skipped, explained.found.warnings, explained.found.notes)

@@ -12,14 +12,14 @@ from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.results import Skipped
 
-_KINDS = ("detectors", "thresholds", "machines", "formats")
+_KINDS = ("detectors", "thresholds", "machines", "formats", "writers")
 
 
 def list_known(
-    kind: Annotated[str, typer.Argument(help="detectors, thresholds, machines or formats.", metavar="KIND")],
+    kind: Annotated[str, typer.Argument(help="detectors, thresholds, machines, formats or writers.", metavar="KIND")],
     as_json: JsonOption = False,
 ) -> None:
-    """List what cdtool knows: detectors with their gains, thresholds, machines, formats; plug-ins too.
+    """List what cdtool knows: detectors with their gains, thresholds, machines, formats, report writers; plug-ins too.
 
     Example: cdtool list detectors --json
     """
@@ -42,9 +42,10 @@ def _registry(kind: str) -> Any:
     from cdtool.detectors import DETECTORS
     from cdtool.formats import FORMATS
     from cdtool.machines import MACHINES
+    from cdtool.report.writers import WRITERS
     from cdtool.thresholds import THRESHOLDS
 
-    return {"detectors": DETECTORS, "thresholds": THRESHOLDS, "machines": MACHINES, "formats": FORMATS}[kind]
+    return dict(zip(_KINDS, (DETECTORS, THRESHOLDS, MACHINES, FORMATS, WRITERS), strict=True))[kind]
 
 
 def _entry(kind: str, name: str) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def _entry(kind: str, name: str) -> dict[str, Any]:
     if kind == "detectors":
         entry |= {"short_name": loaded.short_name, "title": loaded.title, "needs": list(loaded.needs)}
         entry["gains"] = [{"name": item.name, "default": item.default, **item.metadata} for item in fields(loaded)]
-    elif kind == "formats":
+    elif kind in ("formats", "writers"):
         entry["suffixes"] = list(loaded.suffixes)
     elif is_dataclass(loaded):
         entry["settings"] = [

@@ -24,7 +24,8 @@ def report(
 
     Example: cdtool report results.json -o report.html -o summary.md -o junit.xml
     """
-    from cdtool.report.outputs import Report, check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.writers.base import Report
     from cdtool.workflows.reporting import load_report
 
     targets = output or []

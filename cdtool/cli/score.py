@@ -36,7 +36,8 @@ def score(
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import Report, check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.writers.base import Report
     from cdtool.workflows.score_triggers import score as run
 
     targets = output or []

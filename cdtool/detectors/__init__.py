@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
+from cdtool.detectors.look import Look
 from cdtool.registry import Registry
+
+# Name: (short name, class). A short name is repeated here so that `-d kmo` imports one detector, not all of them: the
+# kernels of every imported module are compiled before work begins.
+_TABLE = {
+    "pure_torque": ("pt", "cdtool.detectors.pure_torque:PureTorque"),
+    "pure_inertia": ("pi", "cdtool.detectors.pure_inertia:PureInertia"),
+    "momentum": ("gm", "cdtool.detectors.momentum:Momentum"),
+    "inertial_momentum": ("igm", "cdtool.detectors.inertial_momentum:InertialMomentum"),
+    "friction_ekf": ("feekf", "cdtool.detectors.friction_ekf:FrictionEkf"),
+    "direct": ("dd", "cdtool.detectors.direct:Direct"),
+    "desired_dynamics": ("ddd", "cdtool.detectors.desired_dynamics:DesiredDynamics"),
+    "energy": ("eo", "cdtool.detectors.energy:Energy"),
+    "velocity": ("vo", "cdtool.detectors.velocity:Velocity"),
+    "kalman_momentum": ("kmo", "cdtool.detectors.kalman_momentum:KalmanMomentum"),
+}
 
 DETECTORS = Registry(
     kind="detector",
-    table={
-        "pure_torque": "cdtool.detectors.pure_torque:PureTorque",
-        "pure_inertia": "cdtool.detectors.pure_inertia:PureInertia",
-        "momentum": "cdtool.detectors.momentum:Momentum",
-        "inertial_momentum": "cdtool.detectors.inertial_momentum:InertialMomentum",
-        "friction_ekf": "cdtool.detectors.friction_ekf:FrictionEkf",
-        "direct": "cdtool.detectors.direct:Direct",
-        "desired_dynamics": "cdtool.detectors.desired_dynamics:DesiredDynamics",
-        "energy": "cdtool.detectors.energy:Energy",
-        "velocity": "cdtool.detectors.velocity:Velocity",
-        "kalman_momentum": "cdtool.detectors.kalman_momentum:KalmanMomentum",
-    },
-    short_names={
-        "pt": "pure_torque",
-        "pi": "pure_inertia",
-        "gm": "momentum",
-        "igm": "inertial_momentum",
-        "feekf": "friction_ekf",
-        "dd": "direct",
-        "ddd": "desired_dynamics",
-        "eo": "energy",
-        "vo": "velocity",
-        "kmo": "kalman_momentum",
-    },
+    table={name: target for name, (_, target) in _TABLE.items()},
+    short_names={short: name for name, (short, _) in _TABLE.items()},
     contract=("name", "short_name", "title", "needs", "signed", "unit", "signal"),
+    optional={"look": Look, "contact_torque": bool},
     settings=("unit", "meaning"),
 )

@@ -11,6 +11,7 @@ from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
+from cdtool.detectors.look import GREY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -38,6 +39,8 @@ class DesiredDynamics:
     title: ClassVar[str] = "Derivation from desired dynamics"
     needs: ClassVar[tuple[str, ...]] = ("torque", "position", "reference_position")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(GREY, "P")
 
     def __post_init__(self) -> None:
         require_positive(self, "cutoff", "tracking_limit")

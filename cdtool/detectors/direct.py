@@ -16,6 +16,7 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.filters import longest_gap, low_pass, settling_time, started_at
+from cdtool.detectors.look import BROWN, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
@@ -38,6 +39,8 @@ class Direct:
     title: ClassVar[str] = "Direct derivation"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(BROWN, "X")
 
     def __post_init__(self) -> None:
         require_positive(self, "cutoff")

@@ -18,6 +18,7 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.filters import unsettled
+from cdtool.detectors.look import OLIVE, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
@@ -45,6 +46,8 @@ class Energy:
     title: ClassVar[str] = "Energy observer"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = False
+    contact_torque: ClassVar[bool] = False
+    look: ClassVar[Look] = Look(OLIVE, "p")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth", "minimum_speed")

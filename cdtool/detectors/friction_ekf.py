@@ -23,6 +23,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.filters import unsettled
 from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
+from cdtool.detectors.look import RED, Look
 from cdtool.dynamics import Gain, JointEquation, Machine
 from cdtool.kernels import read_only
 from cdtool.recording import FloatArray, Recording
@@ -79,6 +80,8 @@ class FrictionEkf:
     title: ClassVar[str] = "Friction-estimating EKF"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
     signed: ClassVar[bool] = False
+    contact_torque: ClassVar[bool] = False
+    look: ClassVar[Look] = Look(RED, "o")
 
     def __post_init__(self) -> None:
         require_positive(

@@ -21,6 +21,7 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.look import ORANGE, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -52,6 +53,8 @@ class InertialMomentum:
     title: ClassVar[str] = "Inertial generalized momenta"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(ORANGE, "v")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth", "crossover", "damping")

@@ -18,6 +18,7 @@ from cdtool.detectors.base import (
     single,
 )
 from cdtool.detectors.filters import usual_steps
+from cdtool.detectors.look import NAVY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -53,6 +54,8 @@ class KalmanMomentum:
     title: ClassVar[str] = "Kalman filter on the momentum"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(NAVY, ">")
 
     def __post_init__(self) -> None:
         require_positive(self, "sigma_speed", "sigma_torque", "contact_drift")

@@ -14,6 +14,7 @@ from cdtool.detectors.base import (
     observe_momentum,
     require_positive,
 )
+from cdtool.detectors.look import VIOLET, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
@@ -35,6 +36,8 @@ class Momentum:
     title: ClassVar[str] = "Generalized momentum observer"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(VIOLET, "D")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth")

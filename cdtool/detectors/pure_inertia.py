@@ -9,6 +9,7 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.detectors.look import GREEN, Look
 from cdtool.dynamics import Machine
 from cdtool.recording import Recording
 
@@ -26,6 +27,8 @@ class PureInertia:
     title: ClassVar[str] = "Pure inertia"
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = False
+    look: ClassVar[Look] = Look(GREEN, "^")
 
     def unit(self, machine: Machine) -> str:
         """m/s2 or rad/s2."""

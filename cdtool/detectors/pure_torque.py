@@ -9,6 +9,7 @@ import numpy as np
 
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.detectors.look import BLUE, Look
 from cdtool.dynamics import Machine
 from cdtool.recording import Recording
 
@@ -26,6 +27,8 @@ class PureTorque:
     title: ClassVar[str] = "Pure torque"
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = False
+    look: ClassVar[Look] = Look(BLUE, "s")
 
     def unit(self, machine: Machine) -> str:
         """N or N m."""

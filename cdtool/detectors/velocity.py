@@ -16,6 +16,7 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
+from cdtool.detectors.look import SKY, Look
 from cdtool.detectors.velocity_kernel import observe_velocity
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
@@ -40,6 +41,8 @@ class Velocity:
     title: ClassVar[str] = "Velocity observer"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
+    contact_torque: ClassVar[bool] = True
+    look: ClassVar[Look] = Look(SKY, "<")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.clock import previous_value
+from cdtool.detectors import DETECTORS
 from cdtool.dynamics import Machine, has_links
 from cdtool.errors import UsageError
 from cdtool.pipeline import Detection
@@ -46,16 +47,22 @@ def contact_force(detection: Detection, machine: Machine, contact: ContactPoint)
     signal, recording = detection.statistic, detection.operation.recording
     if not has_links(machine):
         raise UsageError(f"machine '{machine.name}' has no links to touch", "a planar_arm or urdf_robot is needed")
-    if signal.joints != recording.joints or signal.unit != machine.force_unit or detection.detector == "pure_torque":
+    if signal.joints != recording.joints or signal.unit != machine.force_unit or not _estimates(detection.detector):
+        able = [name for name in DETECTORS.names() if _estimates(name)]
         raise UsageError(
             f"{detection.detector} of {', '.join(signal.joints)} is no contact torque of all joints",
-            "momentum, inertial_momentum, velocity, direct, desired_dynamics or kalman_momentum of all joints",
+            f"{', '.join(able[:-1])} or {able[-1]} of all joints",
         )
     position = previous_value(recording["position"], signal.time)
     known = np.isfinite(position).all(axis=1) & signal.valid.all(axis=1)
     force: FloatArray = np.full((len(signal.time), 3), np.nan)
     force[known] = machine.contact_force(position[known], signal.values[known], contact.link, contact.point)
     return Series(signal.time, force, "N")
+
+
+def _estimates(detector: str) -> bool:
+    """Return whether a detector's signal is the contact torque; a plug-in whose class says nothing counts as one."""
+    return bool(getattr(DETECTORS.load(detector), "contact_torque", True))
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from cdtool.activation import Activation, ActivationSettings
+from cdtool.activation import Activation
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import ContactResult, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
-from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.motion.applicable import HOLD
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
@@ -24,10 +22,11 @@ from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
 from cdtool.workflows.contacts.matched_log import match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
+from cdtool.workflows.detection_options import DetectionOptions, by_keywords
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
 from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
@@ -66,39 +65,19 @@ class Detected:
         return self.detections[0].statistic.joints if self.detections else self.recording.joints
 
 
-def detect(  # noqa: PLR0913  keyword options of the Python API
-    log: str | Path,
-    machine: str | Path | MachineFile | None = None,
-    *,
-    benchmark: str | Path | PreparedBenchmark | None = None,
-    signature: str | Path | None = None,
-    detector: str | None = None,
-    limit: Sequence[float] = (),
-    joints: Sequence[str] = (),
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
-    rules: ScoringRules | None = None,
-) -> Detected:
-    """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one a joint).
+def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
+    """Alarms of one detector in one log, against a signature file or hand-set limits (one, or one per joint).
 
-    With limits, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
-    `activation`: settings other than the signature's, or than the default's. `rules`: when contacts begin and for how
-    long an alarm belongs to one. With `benchmark` all of that, the machine and the threshold come from there; a
-    signature file takes the threshold's place.
-    Raises UsageError where neither or both are given, SignatureError where the signature does not belong,
+    What can be set is in `DetectionOptions`; `cdtool.detect` takes its fields as keywords.
+    Raises UsageError where neither or both thresholds are given, SignatureError where the signature does not belong,
     RecordingError where the log cannot be read.
     """
-    if benchmark is not None:
-        if machine is not None or limit or joints or operations != "whole" or activation or rules:
-            raise UsageError("settings are given together with a benchmark file", "all of them come from there")
-        if isinstance(benchmark, PreparedBenchmark):
-            return _detect_prepared(Path(log), benchmark)
-        return _detect_prepared(Path(log), prepare_benchmark(benchmark, detector=detector, signature=signature))
-    if machine is None:
-        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+    if benchmark := options.prepared():
+        return _detect_prepared(Path(log), benchmark)
+    machine_file = options.machine_file()
+    signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
     if (signature is None) == (not limit):
         raise UsageError("one threshold is needed: a signature or a limit", "give --signature FILE or --limit VALUE")
-    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
@@ -122,16 +101,16 @@ def detect(  # noqa: PLR0913  keyword options of the Python API
         thresholds = (Limit.given(limit),)
         raised_by = Activation()
         described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
-    stored_one, raised_by = raised_by, raised_by.changed(activation or {})
+    stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with another activation than that of the file"
-    recording, parts = load_operations(Path(log), machine_file, operations, ranges=ranges)
-    rules = rules or ScoringRules()
+    recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges)
+    rules = options.rules or ScoringRules()
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
     contacts = any_contacts(recording, rules)
     matched = match_log(
-        recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait, operations
+        recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait, options.operations
     )
     return Detected(
         recording,
@@ -149,6 +128,9 @@ def detect(  # noqa: PLR0913  keyword options of the Python API
         tuple(notes),
         rules.onset.described,
     )
+
+
+detect = by_keywords(DetectionOptions, detect_log)
 
 
 def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cdtool.activation import ActivationSettings
-from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
-from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.pipeline import Detection
-from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
-from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.detection import Detected, detect
+from cdtool.workflows.detection import Detected, detect_log
+from cdtool.workflows.detection_options import DetectionOptions, by_keywords
 from cdtool.workflows.detector_inputs import inputs_of
 
 
@@ -31,43 +26,17 @@ class Explained:
         return [(detection, item) for detection, items in pairs for item in items]
 
 
-def explain(  # noqa: PLR0913  keyword options of the Python API
-    log: str | Path,
-    machine: str | Path | MachineFile | None = None,
-    *,
-    benchmark: str | Path | PreparedBenchmark | None = None,
-    signature: str | Path | None = None,
-    detector: str | None = None,
-    limit: Sequence[float] = (),
-    joints: Sequence[str] = (),
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
-    rules: ScoringRules | None = None,
-) -> Explained:
+def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
     """Why each alarm of one detector in one log came, and why each contact was missed.
 
-    Arguments and errors are those of `cdtool.workflows.detection.detect`.
+    Options and errors are those of `cdtool.workflows.detection.detect_log`.
     """
-    if benchmark is not None and not isinstance(benchmark, PreparedBenchmark):
-        benchmark = prepare_benchmark(benchmark, detector=detector, signature=signature)
-    if benchmark is not None:
-        machine_file = benchmark.setup.machine_file
-    elif machine is None:
-        raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+    if benchmark := options.prepared():
+        options, machine_file = DetectionOptions(benchmark=benchmark), benchmark.setup.machine_file
     else:
-        machine_file = machine = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    found = detect(
-        log,
-        machine,
-        benchmark=benchmark,
-        signature=signature,
-        detector=detector,
-        limit=limit,
-        joints=joints,
-        operations=operations,
-        activation=activation,
-        rules=rules,
-    )
+        machine_file = options.machine_file()
+        options = replace(options, machine=machine_file)
+    found = detect_log(log, options)
     explanations = tuple(
         explain_operation(
             detection, matching, found.activation, inputs_of(detection.detector, machine_file), found.normals
@@ -75,3 +44,6 @@ def explain(  # noqa: PLR0913  keyword options of the Python API
         for detection, matching in zip(found.detections, found.matchings, strict=True)
     )
     return Explained(found, explanations)
+
+
+explain = by_keywords(DetectionOptions, explain_log)

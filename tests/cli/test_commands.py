@@ -6,18 +6,19 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from cdtool.detectors import DETECTORS
+from cdtool.exit_status import STATUSES_OF
 from tests.command import cdtool
 
-COMMANDS = (("info",), ("learn-signature",), ("detect",), ("benchmark",), ("simulate", "gate"), ("list",))
 
-
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", STATUSES_OF)
 def test_every_help_holds_an_example_and_ends_with_0(command):
-    done = cdtool(*command, "--help")
+    done = cdtool(*command.split(), "--help")
     assert done.status == 0
     assert "Example: cdtool" in done.out
 
@@ -294,13 +295,12 @@ def test_an_unknown_output_is_refused_before_any_work(gate_folder, tmp_path):
 
 def test_listing_tells_detectors_with_gains_units_and_defaults():
     entries = {entry["name"]: entry for entry in json.loads(cdtool("list", "detectors", "--json").out)}
-    assert set(entries) == {
-        *("pure_torque", "pure_inertia", "momentum", "inertial_momentum", "friction_ekf"),
-        *("direct", "desired_dynamics", "energy", "velocity", "kalman_momentum"),
-    }
+    assert list(entries) == DETECTORS.names()
     assert entries["momentum"]["short_name"] == "gm"
-    assert entries["momentum"]["gains"][0]["default"] == 10.0 and entries["momentum"]["gains"][0]["unit"] == "rad/s"
-    for kind in ("thresholds", "machines", "formats"):
+    (bandwidth,) = fields(DETECTORS.load("momentum"))
+    (gain,) = entries["momentum"]["gains"]
+    assert (gain["name"], gain["default"], gain["unit"]) == ("bandwidth", bandwidth.default, "rad/s")
+    for kind in ("thresholds", "machines", "formats", "writers"):
         assert cdtool("list", kind).status == 0
     assert cdtool("list", "detector").status == 2
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import cdtool.detectors
 from cdtool.detection import WHOLE_MACHINE, Status
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
+from cdtool.report.plots.style import look_of
 from tests.motions import moving
 from tests.robots import JOINTS as ROBOT_JOINTS
 from tests.robots import six_joint_robot
@@ -71,16 +70,6 @@ def changed(recording: Recording, channel: str, values: np.ndarray) -> Recording
     return replace(recording, channels={**recording.channels, channel: replace(series, values=values)})
 
 
-def test_every_file_of_the_folder_with_a_detector_is_registered():
-    folder = Path(cdtool.detectors.__file__).parent
-    helpers = {"__init__", "base", "contract", "filters"}
-    modules = {path.stem for path in folder.glob("*.py") if not path.stem.endswith("_kernel")} - helpers
-    assert modules == set(DETECTORS.table)
-    for name, target in DETECTORS.table.items():
-        assert target.split(":")[0] == f"cdtool.detectors.{name}"
-        assert DETECTORS.load(name).name == name
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_a_frozen_dataclass_whose_gains_have_default_unit_and_meaning(name):
     detector = DETECTORS.load(name)
@@ -91,6 +80,17 @@ def test_it_is_a_frozen_dataclass_whose_gains_have_default_unit_and_meaning(name
     assert DETECTORS.canonical(detector.short_name) == name
     assert set(detector.needs) <= set(CHANNELS) - set(GROUND_TRUTH)
     assert detector.__doc__ and len(detector.__doc__) > 80
+
+
+@pytest.mark.parametrize("name", DETECTORS.table)
+def test_the_short_name_in_the_table_is_that_of_the_class(name):
+    assert [short for short, full in DETECTORS.short_names.items() if full == name] == [DETECTORS.load(name).short_name]
+
+
+def test_no_two_detectors_of_cdtool_have_the_same_colour():
+    looks = [DETECTORS.load(name).look for name in DETECTORS.table]
+    assert len({look.colour for look in looks}) == len(looks)
+    assert all(look_of(name) is look for name, look in zip(DETECTORS.table, looks, strict=True))
 
 
 @pytest.mark.parametrize("name", NAMES)

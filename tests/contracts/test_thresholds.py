@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import is_dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import cdtool.thresholds
 from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import CHANNELS, GROUND_TRUTH
@@ -25,26 +23,6 @@ NAMES = THRESHOLDS.names(plugins=True)
 def pairs(gate, simulated):
     recordings = [simulated("none", seed) for seed in range(10, 22)]
     return [(recording.without_ground_truth(), Momentum().signal(recording, gate)) for recording in recordings]
-
-
-def test_every_file_of_the_folder_with_a_threshold_is_registered():
-    folder = Path(cdtool.thresholds.__file__).parent
-    helpers = {"__init__", "base", "sample_rate", "signature_curve", "fitted_signature", "guarded_update"} | {
-        "contract",
-        "stored",
-        "common_class",
-        "settings",
-        "stretches",
-        "first_order",
-        "statistic_limit",
-        "trend_table",
-        "autoregression",
-        "whitening",
-        "sequential",
-        "normal_motion",
-        "normal_curves",
-    }
-    assert {path.stem for path in folder.glob("*.py")} - helpers == set(THRESHOLDS.table)
 
 
 @pytest.mark.parametrize("name", NAMES)

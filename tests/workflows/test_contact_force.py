@@ -11,6 +11,7 @@ import pytest
 from cdtool.activation import Activation
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
+from cdtool.detectors.pure_torque import PureTorque
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
@@ -71,6 +72,9 @@ def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
     with pytest.raises(UsageError, match="energy of whole machine is no contact torque"):
         contact_force(detected(arm, recording, Energy()), arm, POINT)
+    with pytest.raises(UsageError, match="is no contact torque") as refused:
+        contact_force(detected(arm, recording, PureTorque()), arm, POINT)
+    assert "direct, desired_dynamics, velocity or kalman_momentum" in str(refused.value)
     operation = operations_of(recording)[0]
     one = detect_operation(operation, arm, Momentum(), (Limit.given([1.0]),), Activation(5), watched=("arm",))
     with pytest.raises(UsageError, match="momentum of arm is no contact torque of all joints"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,12 +11,14 @@ from cdtool.evaluation.force.traced import TracedForce, force_profiles, traced_f
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.markdown.markdown import Image
-from cdtool.report.outputs import Report, slug
 from cdtool.report.plots.amoc_plot import plot_amoc
 from cdtool.report.plots.force_plot import ForceCurve, ForcePanel, plot_forces
 from cdtool.report.plots.latency_plot import plot_latencies
 from cdtool.report.plots.survival_plot import plot_survival
 from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.writers.base import Report
+
+_LONGEST_NAME = 40
 
 
 def write_figures(report: Report, folder: Path) -> list[Image]:
@@ -87,3 +91,15 @@ def _write_triggers(results: Results, traces: Sequence[Trace], folder: Path) -> 
             images.append(Image(name, f"{trace.recording}: all detectors", group))
             plot_triggers(trace, folder / name)
     return images
+
+
+def slug(name: str, taken: set[str]) -> str:
+    """A file name's part for a group or detector: letters, digits, hyphens; unlike any in `taken`, and added to it."""
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    base = re.sub(r"[^a-z0-9]+", "-", letters.lower())[:_LONGEST_NAME].strip("-") or "unnamed"
+    found, number = base, 1
+    while found in taken:
+        number += 1
+        found = f"{base}-{number}"
+    taken.add(found)
+    return found

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
 from zlib import crc32
 
 from cdtool.detection import Status
-
-# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8.
-_RED, _GREEN, _BLUE, _VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
-_ORANGE, _SKY, _BROWN = "#E69F00", "#56B4E9", "#8C613C"
-_NAVY, _OLIVE = "#332288", "#7A7A00"
+from cdtool.detectors import DETECTORS
+from cdtool.detectors.look import BLUE, BROWN, GREY, RED, SKY, Look
+from cdtool.errors import CdtoolError
 
 FORCE = "black"
 LIMIT = "0.25"
 BAND = "#DCE6EE"
 UNJUDGED = "0.72"
 # From far below the mean to far above it, pale in the middle; told apart by the colour-blind and, by hue, in print.
-DEVIATION_COLOURS = ("#003F6B", _BLUE, "#9CCBE6", "#F7F7F7", "#F2B48A", _RED, "#7A2E00")
+DEVIATION_COLOURS = ("#003F6B", BLUE, "#9CCBE6", "#F7F7F7", "#F2B48A", RED, "#7A2E00")
 ONSET_DASHES = (0, (6, 2, 1.5, 2))
 # The reason not to judge, told apart without colour.
 HATCHES = {
@@ -30,29 +28,16 @@ HATCHES = {
 }
 
 
-@dataclass(frozen=True)
-class Look:
-    """Colour and marker of a detector."""
-
-    colour: str
-    marker: str
-
-
-_KNOWN = {
-    "friction_ekf": Look(_RED, "o"),
-    "pure_inertia": Look(_GREEN, "^"),
-    "pure_torque": Look(_BLUE, "s"),
-    "momentum": Look(_VIOLET, "D"),
-    "inertial_momentum": Look(_ORANGE, "v"),
-    "kalman_momentum": Look(_NAVY, ">"),
-    "velocity": Look(_SKY, "<"),
-    "energy": Look(_OLIVE, "p"),
-    "direct": Look(_BROWN, "X"),
-    "desired_dynamics": Look("0.35", "P"),
-}
-_OTHERS = (Look(_SKY, "P"), Look(_BROWN, "X"), Look("0.35", "p"), Look(_SKY, "<"), Look(_BROWN, ">"))
+_OTHERS = (Look(SKY, "P"), Look(BROWN, "X"), Look(GREY, "p"), Look(SKY, "<"), Look(BROWN, ">"))
 
 
 def look_of(detector: str) -> Look:
-    """The look of a detector; one that is not known here keeps a look that its name decides."""
-    return _KNOWN.get(detector) or _OTHERS[crc32(detector.encode("utf-8", "replace")) % len(_OTHERS)]
+    """Return the look that the detector's class gives; that of any other name depends on nothing but the name.
+
+    Others are plug-ins without a look, and names in results of detectors that are not installed here.
+    """
+    look = None
+    if detector in DETECTORS.table or detector in DETECTORS.names(plugins=True):
+        with suppress(CdtoolError):
+            look = getattr(DETECTORS.load(detector), "look", None)
+    return look or _OTHERS[crc32(detector.encode("utf-8", "replace")) % len(_OTHERS)]

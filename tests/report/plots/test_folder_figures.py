@@ -12,8 +12,8 @@ from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.report.outputs import Report
 from cdtool.report.plots.folder_figures import most_telling, write_figures
+from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept
 from tests.report.conftest import Bench, contact

@@ -1,0 +1,120 @@
+"""The options of the commands that run one detector over logs: by hand, or all of them from a benchmark file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdtool.cli.options import (
+    BenchmarkOption,
+    DebounceOption,
+    DetectorOption,
+    HysteresisOption,
+    JointsOption,
+    LabelsOption,
+    LatchOption,
+    LimitOption,
+    MachineUnlessBenchmarkOption,
+    MassBeforeCellOption,
+    OnsetAboveOption,
+    OnsetBackToOption,
+    OnsetHoldOption,
+    OnsetSeparationOption,
+    OnsetSigmasOption,
+    OperationsOption,
+    RearmOption,
+    SignatureOption,
+    SynchronisationOption,
+    WindowOption,
+    limits_of,
+    listed,
+)
+from cdtool.errors import UsageError
+
+if TYPE_CHECKING:
+    from cdtool.workflows.contacts.scoring_rules import ScoringRules
+    from cdtool.workflows.detection_options import DetectionOptions
+
+# What a benchmark file does not settle: which of its detectors, and another threshold.
+_WITH_BENCHMARK = ("benchmark", "detector", "signature")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogOptions:
+    """The options as given on the command line; None or empty: not given."""
+
+    machine: MachineUnlessBenchmarkOption = None
+    benchmark: BenchmarkOption = None
+    signature: SignatureOption = None
+    limit: LimitOption = ""
+    detector: DetectorOption = None
+    joints: JointsOption = ""
+    operations: OperationsOption = ""
+    debounce: DebounceOption = None
+    rearm: RearmOption = None
+    hysteresis: HysteresisOption = None
+    latch: LatchOption = None
+    onset_above: OnsetAboveOption = None
+    onset_back_to: OnsetBackToOption = None
+    onset_hold: OnsetHoldOption = None
+    onset_sigmas: OnsetSigmasOption = None
+    onset_separation: OnsetSeparationOption = None
+    labels: LabelsOption = None
+    synchronisation: SynchronisationOption = None
+    window: WindowOption = None
+    mass_before_cell: MassBeforeCellOption = None
+
+    def settings(self) -> DetectionOptions:
+        """Return the settings of a detection, with the machine or benchmark file read.
+
+        Raises UsageError for a value outside its range, for neither machine nor benchmark file, and for a setting
+        that is given together with the benchmark file that holds it; and what reading these files raises.
+        """
+        from cdtool.machine_file import read_machine_file
+        from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
+        from cdtool.workflows.detection_options import DetectionOptions
+
+        limits = limits_of(self.limit)
+        if self.benchmark is not None:
+            self._refuse_beside(self.benchmark)
+            prepared = prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
+            return DetectionOptions(benchmark=prepared)
+        if self.machine is None:
+            raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+        return DetectionOptions(
+            read_machine_file(self.machine),
+            signature=self.signature,
+            detector=self.detector,
+            limit=limits,
+            joints=listed(self.joints),
+            operations=self.operations or "whole",
+            activation={
+                "debounce": self.debounce,
+                "rearm": self.rearm,
+                "hysteresis": self.hysteresis,
+                "latch": self.latch,
+            },
+            rules=self._rules(),
+        )
+
+    def _refuse_beside(self, benchmark: Path) -> None:
+        for item in fields(self):
+            if item.name not in _WITH_BENCHMARK and getattr(self, item.name) not in (None, ""):
+                option = f"--{item.name.replace('_', '-')}"
+                raise UsageError(
+                    f"{option} is given together with --benchmark", f"write it in {benchmark}, or leave one out"
+                )
+
+    def _rules(self) -> ScoringRules:
+        from cdtool.evaluation.truth.labels import read_labels
+        from cdtool.evaluation.truth.onset import OnsetRule
+        from cdtool.workflows.contacts.scoring_rules import ScoringRules
+
+        onset = {name: getattr(self, f"onset_{name}") for name in ("above", "back_to", "hold", "sigmas", "separation")}
+        rules = {name: getattr(self, name) for name in ("window", "synchronisation", "mass_before_cell")}
+        return ScoringRules(
+            onset=OnsetRule(**{name: value for name, value in onset.items() if value is not None}),
+            labels=read_labels(self.labels) if self.labels else None,
+            **{name: value for name, value in rules.items() if value is not None},
+        )

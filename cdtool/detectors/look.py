@@ -1,0 +1,32 @@
+"""How a detector looks in every figure: its colour, safe for the colour-blind, and its marker, for grey print."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from cdtool.errors import ConfigurationError, nearest
+
+# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and four more.
+RED, GREEN, BLUE, VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
+ORANGE, SKY, BROWN = "#E69F00", "#56B4E9", "#8C613C"
+NAVY, OLIVE, GREY = "#332288", "#7A7A00", "#595959"
+
+# The markers that both the figures and the HTML page can draw, by matplotlib's names.
+MARKERS = ("o", "s", "D", "^", "v", "<", ">", "p", "P", "X")
+
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour (`#rrggbb`) and marker (one of `MARKERS`) of a detector; raises ConfigurationError for any other."""
+
+    colour: str
+    marker: str
+
+    def __post_init__(self) -> None:
+        if not _COLOUR.fullmatch(self.colour):
+            raise ConfigurationError(f"the colour of a detector is '{self.colour}'", "write it as #rrggbb")
+        if self.marker not in MARKERS:
+            raise ConfigurationError(f"the marker of a detector is '{self.marker}'", nearest(self.marker, MARKERS))

@@ -1,0 +1,24 @@
+"""The latencies as a figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from cdtool.foreign_files import FIGURES, Kind
+from cdtool.report.plots.figures import SUFFIXES
+from cdtool.report.writers.base import Report, Writer
+
+
+class Figure(Writer):
+    """PNG, SVG or PDF: the latencies of every detector in every group."""
+
+    name: ClassVar[str] = "figure"
+    suffixes: ClassVar[tuple[str, ...]] = SUFFIXES
+    kinds: ClassVar[dict[str, Kind]] = FIGURES
+
+    def write(self, report: Report, target: Path) -> None:
+        """Draw it; raises CdtoolError."""
+        from cdtool.report.plots.latency_plot import plot_latencies
+
+        plot_latencies(report.evaluated, target)

@@ -1,0 +1,25 @@
+"""The report as one HTML page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from cdtool.files import write_text
+from cdtool.foreign_files import Kind
+from cdtool.report.writers.base import Report, Writer
+
+
+class Html(Writer):
+    """HTML: one page with tables, plots and the viewer of traces; it loads nothing."""
+
+    name: ClassVar[str] = "html"
+    suffixes: ClassVar[tuple[str, ...]] = (".html",)
+    in_folder: ClassVar[str] = "report.html"
+    kinds: ClassVar[dict[str, Kind]] = {".html": Kind(b"<title>Collision detection", "HTML report of cdtool")}
+
+    def write(self, report: Report, target: Path) -> None:
+        """Write it; raises CdtoolError."""
+        from cdtool.report.html.page import to_html
+
+        write_text(target, to_html(report.evaluated, report.traces))

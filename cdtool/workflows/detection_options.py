@@ -1,0 +1,78 @@
+"""How one detector runs over a log: the settings that `cdtool.detect` and `cdtool.explain` take."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar, cast
+
+from cdtool.activation import ActivationSettings
+from cdtool.errors import UsageError
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+
+_Given = ParamSpec("_Given")
+_Options = TypeVar("_Options")
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class DetectionOptions:
+    """The machine and the threshold, or a benchmark file that holds them and every other setting.
+
+    `signature` or `limit` (one number, or one per joint) is the threshold; `detector` is needed with a limit. With a
+    limit, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
+    `operations`: whole, motion or trigger. `activation`: settings other than the signature's, or than the default's.
+    `rules`: when contacts begin, and for how long an alarm belongs to one.
+
+    With `benchmark` all of that comes from there; `detector` then chooses one of its detectors, and a signature file
+    takes the threshold's place.
+    """
+
+    machine: str | Path | MachineFile | None = None
+    _: KW_ONLY
+    benchmark: str | Path | PreparedBenchmark | None = None
+    signature: str | Path | None = None
+    detector: str | None = None
+    limit: Sequence[float] = ()
+    joints: Sequence[str] = ()
+    operations: str = "whole"
+    activation: ActivationSettings | None = None
+    rules: ScoringRules | None = None
+
+    def prepared(self) -> PreparedBenchmark | None:
+        """Return the benchmark, read and learned, or None; raises UsageError for settings given beside it."""
+        if self.benchmark is None:
+            return None
+        by_hand = self.limit or self.joints or self.operations != "whole" or self.activation or self.rules
+        if self.machine is not None or by_hand:
+            raise UsageError("settings are given together with a benchmark file", "all of them come from there")
+        if isinstance(self.benchmark, PreparedBenchmark):
+            return self.benchmark
+        return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
+
+    def machine_file(self) -> MachineFile:
+        """Return the machine file, read; raises UsageError where none is given."""
+        if isinstance(self.benchmark, PreparedBenchmark):
+            return self.benchmark.setup.machine_file
+        if self.machine is None:
+            raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+        return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
+
+
+def by_keywords(
+    options: Callable[_Given, _Options], run: Callable[[str | Path, _Options], _Result]
+) -> Callable[Concatenate[str | Path, _Given], _Result]:
+    """Return `run` for those who call it with the fields of its options: `detect(log, machine, detector="gm")`."""
+
+    @wraps(run)
+    def call(log: str | Path, *fields: _Given.args, **more: _Given.kwargs) -> _Result:
+        return run(log, options(*fields, **more))
+
+    log, *_ = inspect.signature(run).parameters.values()
+    vars(call)["__signature__"] = inspect.Signature([log, *inspect.signature(options).parameters.values()])
+    return cast("Callable[Concatenate[str | Path, _Given], _Result]", call)

@@ -1,0 +1,75 @@
+"""What holds for every registered report writer, those of installed plug-ins included."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from cdtool.errors import UsageError
+from cdtool.foreign_files import refuse_other_kind
+from cdtool.report.outputs import check_outputs, write_outputs
+from cdtool.report.writers import WRITERS, known_suffixes, writer_of
+from cdtool.report.writers.base import Report
+from tests.report.hostile import HOSTILE
+from tests.report.html.html_case import case
+
+NAMES = WRITERS.names(plugins=True)
+SUFFIXES = [(name, suffix) for name in NAMES for suffix in WRITERS.load(name).suffixes]
+
+
+@pytest.fixture(scope="module", params=["plain names", "hostile names"])
+def report(request) -> Report:
+    evaluated, traces = case(str if request.param == "plain names" else lambda name: name + "".join(HOSTILE.values()))
+    provenance = {"tool": "cdtool", **evaluated.results.provenance}
+    del provenance["force_profiles"]  # in the page's case they name no profile, which figures need
+    return Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
+
+
+@pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
+def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_bytes(name, suffix, report, tmp_path):
+    assert type(writer_of(tmp_path / f"report{suffix.upper()}")) is WRITERS.load(name)
+    contents = []
+    for folder in ("a", "b", "a"):  # the third replaces the first
+        target = tmp_path / folder / f"report{suffix}"
+        target.parent.mkdir(exist_ok=True)
+        assert write_outputs(report, [target]) == [target]
+        files = WRITERS.load(name)().files(target)
+        assert set(files) == set(target.parent.iterdir())
+        contents.append([path.read_bytes() for path in files])
+        for path in files:
+            refuse_other_kind(path, WRITERS.load(name).kinds[path.suffix])
+    assert all(contents[0]) and contents[0] == contents[1] == contents[2]
+
+
+@pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
+def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
+    for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
+        path.write_bytes(b"written by hand")
+        with pytest.raises(UsageError, match="already exists and holds no"):
+            check_outputs([tmp_path / f"report{suffix}"])
+        check_outputs([tmp_path / f"report{suffix}"], force=True)
+        path.unlink()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_says_what_it_writes(name):
+    writer = WRITERS.load(name)
+    assert writer.__doc__ and (writer.suffixes or writer.in_folder)
+    assert set(writer.suffixes) <= set(known_suffixes())
+
+
+def test_a_folder_holds_what_every_writer_with_content_writes_there(report, tmp_path):
+    write_outputs(report, [tmp_path / "all"])
+    writers = [WRITERS.load(name)() for name in WRITERS.table]
+    wanted = {writer.in_folder for writer in writers if writer.in_folder and writer.has_content(report)}
+    names = {path.name for path in (tmp_path / "all").iterdir()}
+    assert len(wanted) > 4 and wanted <= names
+    write_outputs(report, [tmp_path / "all"])  # all of it is known as its own
+    assert {path.name for path in (tmp_path / "all").iterdir()} == names
+
+
+def test_an_unknown_suffix_names_those_that_can_be_written(tmp_path):
+    with pytest.raises(UsageError) as refused:
+        check_outputs([tmp_path / "report.xyz"])
+    assert all(suffix in str(refused.value) for suffix in known_suffixes())
