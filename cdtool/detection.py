@@ -50,7 +50,7 @@ class Signal:
     always opposes the motion. `joints` names the columns: the machine's joints, those of them that are watched, or one
     name for a signal of the whole machine. A detector may leave it empty: then they are the recording's joints.
     `notes`: what a user should know of how the signal came about. `lost` (n, J): where an input of the detector had
-    no sample, so that the value rests on a held one; None where no input lost a sample.
+    no sample, so that the value rests on a held one, or on what was guessed of a gap; None where no input lost one.
     """
 
     time: FloatArray

@@ -199,6 +199,8 @@ def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, w
     recording = operation.whole.without_ground_truth()
     signal = checked_signal(detector, recording, machine)
     lost = _lost_inputs(detector, recording, machine, signal)
+    if signal.lost is not None:
+        lost = signal.lost if lost is None else lost | signal.lost
     return replace(signal, joints=signal.joints or recording.joints, lost=lost).watching(watched)
 
 

@@ -35,7 +35,7 @@ class Energy:
     for the whole machine; joints that are not coupled have one each. Start-up 3 / k. Not applicable below
     `minimum_speed` (the norm of all speeds): a contact takes no power from a machine at rest. Fails: a force across the
     motion; a slow joint beside fast ones; friction that the machine file does not know. Behind a gap of coupled joints
-    the power of the gap is a guess: the observer waits as long as the gap was, at most 15 ms.
+    the power of the gap is a guess: as long as the gap was, at most 15 ms, the signal rests on it (`Signal.lost`).
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
@@ -71,10 +71,9 @@ class Energy:
         alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing, drive.coupled)
         ready = np.full(energy.shape[1], -np.inf)
         residual, status = observe_momentum(alone, power, energy, self.bandwidth, ready)
-        if machine.coupled:
-            behind = unsettled(drive.time, missing, _LONGEST_UNSETTLED)
-            status[behind & (status == Status.VALID)] = Status.GAP
+        lost = unsettled(drive.time, missing, _LONGEST_UNSETTLED) if machine.coupled else None
+        lost = lost if lost is not None and lost.any() else None
         slow = speed < per_joint(self.minimum_speed, speed.shape[1])
         status[(status == Status.VALID) & slow] = Status.NOT_APPLICABLE
         names = WHOLE_MACHINE if machine.coupled else ()
-        return Signal(drive.time, residual, status, self.unit(machine), self.signed, names)
+        return Signal(drive.time, residual, status, self.unit(machine), self.signed, names, lost=lost)
