@@ -2,7 +2,7 @@
 
 A folder of the method (formats, machines, detectors, thresholds, report writers) has one literal table
 `name -> "module:Class"`. Plug-ins come by entry points of the group `cdtool.<kind>s`; they are looked at only when an
-unknown name is asked for or everything is listed, and held against the contract when they are loaded.
+unknown name is asked for or everything is listed, and checked against the contract when they are loaded.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _FITS = 0.9
 # Share of a column's variance that inertia and friction must explain for it to be the drive's.
 _DRIVES = 0.6
 _MOST_UNNAMED = 48
-# Correlations from which on one stream follows another as a set value, and where a name tells of set values too.
+# From these correlations on, one stream is taken as the set value of another; the second where its name says so too.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
 _BY_COURSE = "its course alone tells it"
 # A name of one letter speaks for a quantity less than this.
@@ -175,7 +175,7 @@ def _references(channels: Channels) -> None:
 
 
 def _ground_truth(channels: Channels) -> None:
-    """The load cell, labels and triggers; a load cell's name weighs more than one that tells of any force."""
+    """The load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
     named = [(*word_for("force", _full(stream)), stream) for stream in singles if not is_something_else(stream.name)]
     named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
@@ -199,7 +199,7 @@ def _ground_truth(channels: Channels) -> None:
 
 
 def _full(stream: Stream) -> str:
-    """A topic's name tells of a load cell, too."""
+    """Return topic and name of a stream: the topic may name a load cell, too."""
     return f"{stream.topic} {label(stream)}"
 
 
@@ -247,7 +247,7 @@ def _named_for(channels: Channels, quantity: str, reference: bool = False) -> li
 
 
 def _unnamed_for(channels: Channels, quantity: str) -> list[Stream]:
-    """The free streams that a quantity may be by their course: no name or unit tells of another, or of a force.
+    """Return the free streams that may be a quantity by their shape: no name or unit means another one, or a force.
 
     A load cell is ground truth: nothing makes an input of it.
     """
@@ -260,7 +260,7 @@ def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[
 
 
 def _is_other(quantity: str, stream: Stream) -> bool:
-    """True for a stream whose name tells of another quantity, or of a load cell."""
+    """Return whether the name of a stream means another quantity, or a load cell."""
     name = label(stream)
     if is_something_else(stream.name) or _is_sensor_of_force(stream):
         return True
