@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.formats.reading import LoggedRecording, read_as_logged
+from cdtool.ingest.reading import LoggedRecording, read_as_logged
 from cdtool.machine_file import read_machine_file
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import MEASURED, Series

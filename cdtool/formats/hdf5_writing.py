@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Parts, Written, stored
 from cdtool.formats.held_signals import held_signals
-from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.source import Column
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container.definitions import Stream
@@ -19,7 +20,7 @@ from cdtool.formats.mcap.fields import parse_field
 from cdtool.formats.mcap.gathering import Gathering
 from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.pieces import Piece, Pieces, joined
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.source import Column, Source
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.part_pieces import FoundParts
-from cdtool.formats.reading import choose_format
 from cdtool.formats.source import Column
+from cdtool.ingest.channel_pieces import ChannelPieces
+from cdtool.ingest.logged import read_logged
+from cdtool.ingest.part_pieces import FoundParts
+from cdtool.ingest.reading import choose_format
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
-from cdtool.workflows.channel_pieces import ChannelPieces
-from cdtool.workflows.logged import read_logged
 
 # Rows of the longest clock that are handed on at once.
 _ROWS = 1 << 16

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.mcap_writing import exact_pieces, exact_times
-from cdtool.formats.part_pieces import in_time_order, log_pieces
 from cdtool.formats.pieces import Piece, Pieces, read_pieces
-from cdtool.formats.source import Column, Format, split_unit
+from cdtool.formats.source import Column, Format
 from cdtool.formats.time_order import by_time, values_of
+from cdtool.ingest.clock_guess import find_clock
+from cdtool.ingest.log_figures import ClockFigures, LogFigures
+from cdtool.ingest.part_pieces import in_time_order, log_pieces
 from cdtool.recording import FloatArray
-from cdtool.workflows.clock_guess import find_clock
-from cdtool.workflows.log_figures import ClockFigures, LogFigures
 
 
 @dataclass(frozen=True)

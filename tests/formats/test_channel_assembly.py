@@ -7,7 +7,7 @@ import pytest
 
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 
 RATIO = 2.0e-3
 

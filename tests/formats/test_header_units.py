@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cdtool.channels import ChannelSource
-from cdtool.formats.header_units import channel_unit_findings
-from cdtool.formats.reading import read_recording
 from cdtool.formats.source import Column
+from cdtool.ingest.header_units import channel_unit_findings
+from cdtool.ingest.reading import read_recording
 
 LOAD = """
 [machine]

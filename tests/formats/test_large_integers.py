@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cdtool.formats.csv import Csv
 from cdtool.formats.large_integers import rounded_integers
 from cdtool.formats.pieces import joined
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 from tests.formats.conftest import COLUMNS
 
 EPOCH = 1_700_000_000_123_456_789

@@ -8,7 +8,7 @@ import pytest
 from cdtool.clock import clean_time
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 from tests.formats.test_channel_assembly import gate_columns, table, told
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.parts import lost_parts
-from cdtool.formats.reading import log_parts, read_recording, survey
+from cdtool.ingest.parts import lost_parts
+from cdtool.ingest.reading import log_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
 
 START = 1_700_000_000

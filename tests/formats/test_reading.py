@@ -7,7 +7,7 @@ import pytest
 
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.reading import choose_format, read_parts, read_recording, survey
+from cdtool.ingest.reading import choose_format, read_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
 from tests.data_folder import data, needs_data
 from tests.formats.conftest import TOPICS

@@ -15,9 +15,9 @@ import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins, TimeSource
 from cdtool.errors import RecordingError, UsageError
-from cdtool.formats.own_clocks import OWN_CLOCK
+from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.source import Column, Source, column_key, wanted_keys
+from cdtool.formats.source import Column, Source
 from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:

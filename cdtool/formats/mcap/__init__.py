@@ -12,6 +12,7 @@ from typing import ClassVar
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.large_integers import rounding_finding
 from cdtool.formats.mcap.columns import UndecodableError
 from cdtool.formats.mcap.columns.uniform import UniformTaker
@@ -26,7 +27,7 @@ from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.taken import Bound
 from cdtool.formats.mcap.topic_survey import TopicSurvey
 from cdtool.formats.pieces import Pieces, joined
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.source import Column, Source
 from cdtool.recording import Finding
 
 __all__ = ["Mcap"]

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns import Picked
 from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
@@ -25,7 +26,7 @@ from cdtool.formats.mcap.gathering import in_order, tally
 from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
 from cdtool.formats.mcap_writing import EXACT_TIME, exact_times
 from cdtool.formats.pieces import Piece, Pieces
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.source import Column, Source
 from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 

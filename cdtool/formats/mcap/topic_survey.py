@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
-from cdtool.formats.distribution import Distribution
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.columns.gathered import ABSENT, Gathered, Picked, UndecodableError

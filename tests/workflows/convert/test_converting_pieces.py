@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.formats import time_order
 from cdtool.formats.csv import text
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 from cdtool.workflows.convert.converting import convert
 from tests.workflows.convert.test_converting import SEVERAL_CLOCKS, needs, table
 

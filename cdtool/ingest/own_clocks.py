@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.formats.header_units import unit_findings
-from cdtool.formats.source import Column, Source, find_key, wanted_keys
-
-# What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
-OWN_CLOCK = "time"
-
-
-def asked_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
-    """The columns that a map asks for (all without one); the container's own clock is none of them."""
-    if wanted is None:
-        return list(names)
-    if wanted.time.column == OWN_CLOCK and OWN_CLOCK not in names:
-        wanted = replace(wanted, time=TimeSource())
-    return wanted_keys(path, wanted, names)
+from cdtool.formats.column_names import OWN_CLOCK, find_key
+from cdtool.formats.source import Column, Source
+from cdtool.ingest.header_units import unit_findings
 
 
 def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:

@@ -12,24 +12,24 @@ from typing import Any
 import numpy as np
 
 from cdtool.channels import ChannelSource
+from cdtool.clock.clean_pieces import CleanPieces, Gaps
 from cdtool.clock.stamps import missing_findings
+from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
-from cdtool.formats.channel_assembly import (
+from cdtool.formats.mcap.mapped_pieces import MappedLog
+from cdtool.formats.pieces import Piece, Run
+from cdtool.formats.source import Column, Source
+from cdtool.formats.time_order import Lateness, by_time
+from cdtool.ingest.channel_assembly import (
     apart_findings,
     check_width,
     in_si,
     stuck_findings,
 )
-from cdtool.formats.distribution import Distribution
-from cdtool.formats.mcap.mapped_pieces import MappedLog
-from cdtool.formats.part_gaps import PartSpan
-from cdtool.formats.pieces import Piece, Run
-from cdtool.formats.reading import only_held
-from cdtool.formats.source import Column, Source
-from cdtool.formats.time_order import Lateness, by_time
+from cdtool.ingest.part_gaps import PartSpan
+from cdtool.ingest.reading import only_held
 from cdtool.machine_file import MachineFile
 from cdtool.recording import MEASURED, Finding, FloatArray
-from cdtool.workflows.clean_pieces import CleanPieces, Gaps
 
 
 class LoggedChannel:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.formats.parts import joined_sources, lost_findings
 from cdtool.formats.pieces import Piece, Pieces, Run, header, read_pieces
-from cdtool.formats.reading import choose_format, has_topics, log_parts
 from cdtool.formats.source import Format, Source
+from cdtool.ingest.parts import joined_sources, lost_findings
+from cdtool.ingest.reading import choose_format, has_topics, log_parts
 from cdtool.recording import Finding
 
 # Opens a file of a format, for some of its columns or all.

@@ -13,11 +13,12 @@ from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
-from cdtool.formats.channel_assembly import as_logged
+from cdtool.formats.column_names import is_absent
 from cdtool.formats.csv.text import read_sample
-from cdtool.formats.own_clocks import with_own_clocks
-from cdtool.formats.parts import joined_recordings, joined_sources, lost_parts
-from cdtool.formats.source import Format, Source, is_absent
+from cdtool.formats.source import Format, Source
+from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.own_clocks import with_own_clocks
+from cdtool.ingest.parts import joined_recordings, joined_sources, lost_parts
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording

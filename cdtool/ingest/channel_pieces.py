@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.part_gaps import gaps_between
-from cdtool.formats.part_pieces import FoundParts
-from cdtool.formats.parts import not_alike, of_part, overlapping
 from cdtool.formats.pieces import Piece
 from cdtool.formats.source import Column
 from cdtool.formats.time_order import by_time
+from cdtool.ingest.logged_file import LoggedChannel, LoggedFile
+from cdtool.ingest.part_gaps import gaps_between
+from cdtool.ingest.part_pieces import FoundParts
+from cdtool.ingest.parts import not_alike, of_part, overlapping
 from cdtool.machine_file import MachineFile
 from cdtool.recording import GROUND_TRUTH, Finding
-from cdtool.workflows.logged_file import LoggedChannel, LoggedFile
 
 
 class ChannelPieces:

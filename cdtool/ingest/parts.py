@@ -12,8 +12,8 @@ import numpy as np
 
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import RecordingError
-from cdtool.formats.part_gaps import PartSpan, gaps_between
 from cdtool.formats.source import Column, Source
+from cdtool.ingest.part_gaps import PartSpan, gaps_between
 from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
 
 _METADATA = "metadata.yaml"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.formats.distribution import Distribution
+from cdtool.distribution import Distribution
 from cdtool.formats.pieces import Piece, Pieces, Run
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time

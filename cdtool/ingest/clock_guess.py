@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.clock.clean_pieces import CleanPieces, gaps_in
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
 from cdtool.clock.wild import EDGE_ROWS, leading_wild
-from cdtool.formats.distribution import Distribution
+from cdtool.distribution import Distribution
 from cdtool.formats.source import Column, Source
+from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit
-from cdtool.workflows.clean_pieces import CleanPieces, gaps_in
-from cdtool.workflows.log_figures import ClockFigures, ColumnFigures
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # Median step -> unit: log rates of 2 Hz to 2 MHz in each of them.

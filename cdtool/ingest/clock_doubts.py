@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from cdtool.formats.distribution import Distribution
+from cdtool.distribution import Distribution
 from cdtool.formats.source import Column, Source
+from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
+from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.recording import Finding
-from cdtool.workflows.clock_guess import Reread, TableClock, is_clock_name
-from cdtool.workflows.log_figures import ClockFigures, ColumnFigures
 
 # As in clock/stamps.py: above this share of repeated stamps a clock is coarse.
 _COARSE_SHARE = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cdtool.formats.reading import choose_format
+from cdtool.ingest.reading import choose_format
 
 
 def element_names(path: Path, topic: str) -> tuple[str, ...]:

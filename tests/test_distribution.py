@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cdtool.formats.distribution import Distribution
+from cdtool.distribution import Distribution
 
 FINITE = st.floats(-1e12, 1e12, allow_subnormal=False)
 

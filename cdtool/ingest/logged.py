@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.errors import RecordingError
-from cdtool.formats.channel_assembly import as_logged
-from cdtool.formats.part_pieces import FoundParts
-from cdtool.formats.parts import joined_recordings
-from cdtool.formats.reading import mapped_source
 from cdtool.formats.source import Source
+from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.part_pieces import FoundParts
+from cdtool.ingest.parts import joined_recordings
+from cdtool.ingest.reading import mapped_source
 from cdtool.machine_file import MachineFile
 from cdtool.recording import Recording
 
