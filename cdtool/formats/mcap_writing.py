@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.columns import Piece
 from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, Written, need_clocks, stored
-from cdtool.formats.pieces import Piece, Pieces, Run
+from cdtool.formats.pieces import Pieces, Run
 from cdtool.formats.source import Format, Source
 from cdtool.recording import FloatArray
 

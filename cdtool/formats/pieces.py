@@ -5,34 +5,19 @@ A format that can hand its columns over so has a method `pieces`; the columns of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from cdtool.formats.source import Column, Format, Source
+from cdtool.columns import Column, Piece
+from cdtool.formats.source import Format, Source
 from cdtool.formats.written_origin import with_written_origin
 from cdtool.recording import FloatArray
 
 # What a format cuts its pieces to: 8 MiB of float64, all columns together.
 VALUES_A_PIECE = 1 << 20
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Some rows (`rows` = n) of the columns that share one clock, in the file's order.
-
-    `time` (n,) [s] counts from the source's `origin` [s]; None where the columns are a table, whose clock is one of
-    them or not known. `values` are (n,) or (n, k) by column; a column of this clock that is not among them has no
-    value in these rows. Messages of a topic (`clock` is its name) are in the order of their times within a piece.
-    """
-
-    clock: str
-    time: FloatArray | None
-    values: Mapping[str, FloatArray]
-    rows: int
-    origin: float = 0.0
 
 
 # At their end pieces give the source: its columns have names, units and widths, but no rows.

@@ -8,20 +8,8 @@ from pathlib import Path
 from typing import ClassVar, Protocol
 
 from cdtool.channels import ChannelMap
-from cdtool.recording import Finding, FloatArray
-
-
-@dataclass(frozen=True)
-class Column:
-    """One stream of numbers: `values` (n,) or (n, k) as the file has them.
-
-    `time` (n,) in seconds where the format carries a time for each message, else None (a table: the clock is a column).
-    """
-
-    name: str
-    values: FloatArray
-    time: FloatArray | None = None
-    unit: str | None = None
+from cdtool.columns import Column
+from cdtool.recording import Finding
 
 
 @dataclass(frozen=True)

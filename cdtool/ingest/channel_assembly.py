@@ -17,10 +17,11 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
+from cdtool.columns import Column
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.column_names import find_key
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.formats.written_origin import with_written_origin
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.plain_text import counted

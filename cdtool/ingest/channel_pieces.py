@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Column, Piece
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.pieces import Piece
-from cdtool.formats.source import Column
 from cdtool.formats.time_order import by_time
 from cdtool.ingest.logged_file import LoggedChannel, LoggedFile
 from cdtool.ingest.part_gaps import gaps_between

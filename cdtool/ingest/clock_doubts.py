@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from cdtool.columns import Column
 from cdtool.distribution import Distribution
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.recording import Finding

@@ -11,8 +11,9 @@ import numpy as np
 from cdtool.clock.clean_pieces import CleanPieces, gaps_in
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
 from cdtool.clock.wild import EDGE_ROWS, leading_wild
+from cdtool.columns import Column
 from cdtool.distribution import Distribution
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit

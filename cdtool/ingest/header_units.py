@@ -10,9 +10,10 @@ import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch, contradicted_by_steps
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.formats.column_names import find_key, split_unit
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.recording import Finding
 from cdtool.units import RAW_UNITS, Unit, find_unit
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.columns import Piece
 from cdtool.distribution import Distribution
-from cdtool.formats.pieces import Piece, Pieces, Run
+from cdtool.formats.pieces import Pieces, Run
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.recording import FloatArray

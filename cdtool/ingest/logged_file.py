@@ -14,11 +14,12 @@ import numpy as np
 from cdtool.channels import ChannelSource
 from cdtool.clock.clean_pieces import CleanPieces, Gaps
 from cdtool.clock.stamps import missing_findings
+from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.mapped_pieces import MappedLog
-from cdtool.formats.pieces import Piece, Run
-from cdtool.formats.source import Column, Source
+from cdtool.formats.pieces import Run
+from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.ingest.channel_assembly import (
     apart_findings,

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.column_names import OWN_CLOCK, find_key
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.ingest.header_units import unit_findings
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Piece
 from cdtool.errors import RecordingError
-from cdtool.formats.pieces import Piece, Pieces, Run, header, read_pieces
+from cdtool.formats.pieces import Pieces, Run, header, read_pieces
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.parts import joined_sources, lost_findings
 from cdtool.ingest.reading import choose_format, has_topics, log_parts

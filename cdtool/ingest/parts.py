@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.bounded_loading import read_bytes
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.ingest.part_gaps import PartSpan, gaps_between
 from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
 

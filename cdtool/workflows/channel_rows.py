@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.source import Column
 from cdtool.ingest.channel_pieces import ChannelPieces
 from cdtool.ingest.logged import read_logged
 from cdtool.ingest.part_pieces import FoundParts

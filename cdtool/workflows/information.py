@@ -20,7 +20,7 @@ from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
-    from cdtool.formats.source import Column
+    from cdtool.columns import Column
     from cdtool.ingest.log_figures import ClockFigures, LogFigures
 
 

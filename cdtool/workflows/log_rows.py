@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Column, Piece
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.mcap_writing import exact_pieces, exact_times
-from cdtool.formats.pieces import Piece, Pieces, read_pieces
-from cdtool.formats.source import Column, Format
+from cdtool.formats.pieces import Pieces, read_pieces
+from cdtool.formats.source import Format
 from cdtool.formats.time_order import by_time, values_of
 from cdtool.ingest.clock_guess import find_clock
 from cdtool.ingest.log_figures import ClockFigures, LogFigures

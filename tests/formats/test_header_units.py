@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.channels import ChannelSource
-from cdtool.formats.source import Column
+from cdtool.columns import Column
 from cdtool.ingest.header_units import channel_unit_findings
 from cdtool.ingest.reading import read_recording
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.formats import time_order
-from cdtool.formats.mcap.schemas import DEFINITIONS
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.channel_pieces import ChannelPieces
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.messages.schemas import DEFINITIONS
 from cdtool.workflows.channel_rows import ChannelRows, channel_rows
 from cdtool.workflows.convert.converting import convert
 

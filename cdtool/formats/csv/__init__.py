@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins, TimeSource
+from cdtool.columns import Column
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:

@@ -11,23 +11,24 @@ from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.formats.column_names import with_topics
-from cdtool.formats.large_integers import rounding_finding
-from cdtool.formats.mcap.columns import UndecodableError
-from cdtool.formats.mcap.columns.uniform import UniformTaker
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
-from cdtool.formats.mcap.decoders import Decoders
-from cdtool.formats.mcap.fields import parse_field
-from cdtool.formats.mcap.gathering import Gathering
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
-from cdtool.formats.mcap.taken import Bound
-from cdtool.formats.mcap.topic_survey import TopicSurvey
+from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
+from cdtool.large_integers import rounding_finding
+from cdtool.messages.columns import UndecodableError
+from cdtool.messages.decoders import Decoders
+from cdtool.messages.fields import parse_field
+from cdtool.messages.gathering import Gathering
+from cdtool.messages.taken import Bound
+from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.recording import Finding
 
 __all__ = ["Mcap"]

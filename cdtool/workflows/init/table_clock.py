@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.clock.plausible_unit import contradicted_by_epoch
-from cdtool.formats.source import Column, Source
+from cdtool.columns import Column
+from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit

@@ -18,7 +18,7 @@ def shuffled(path: Path) -> Path:
     """Two topics whose messages are up to 30 late, of which every tenth stands on the time of the one before it."""
     from mcap.writer import Writer
 
-    from cdtool.formats.mcap.schemas import DEFINITIONS
+    from cdtool.messages.schemas import DEFINITIONS
 
     random = np.random.default_rng(11)
     stamps = np.arange(1, 501) * 10**6
