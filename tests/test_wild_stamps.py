@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, epoch_start
 from cdtool.clock.clean_pieces import CleanPieces
-from cdtool.clock.wild import EPOCH
+from cdtool.clock.stamps import EPOCH
 from cdtool.errors import RecordingError
 from cdtool.workflows.detection import detect
 from cdtool.workflows.information import info

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS
-from cdtool.clock.stamps import FAR_OFF
-from cdtool.clock.wild import WildStamps
+from cdtool.clock.stamps import FAR_OFF, WildStamps
 from cdtool.distribution import Distribution
 from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, Finding, FloatArray

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdtool.clock.clean_pieces import CleanPieces, gaps_in
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
-from cdtool.clock.wild import EDGE_ROWS, leading_wild
+from cdtool.clock.stamps import EDGE_ROWS, leading_wild
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.formats.source import Source
