@@ -13,7 +13,6 @@ import numpy as np
 
 from cdtool.columns import Column, Piece
 from cdtool.formats.source import Format, Source
-from cdtool.formats.written_origin import with_written_origin
 from cdtool.recording import FloatArray
 
 # What a format cuts its pieces to: 8 MiB of float64, all columns together.
@@ -38,8 +37,7 @@ class Run:
 def read_pieces(found: Format, path: Path, keys: Collection[str] | None = None) -> Pieces:
     """All numeric columns of a file piece by piece, or at least those of `keys`; raises RecordingError."""
     reader: Callable[..., Pieces] | None = getattr(found, "pieces", None)
-    source = yield from (reader(path, keys) if reader is not None else as_pieces(found.columns(path)))
-    return with_written_origin(source)
+    return (yield from (reader(path, keys) if reader is not None else as_pieces(found.columns(path))))
 
 
 def as_pieces(source: Source) -> Pieces:

@@ -22,7 +22,6 @@ from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.column_names import find_key
 from cdtool.formats.source import Source
-from cdtool.formats.written_origin import with_written_origin
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.plain_text import counted
 from cdtool.plausible import IMPOSSIBLE
@@ -36,7 +35,7 @@ def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recordi
 
     The columns are taken out of the source one after another: none is longer in memory than it is needed.
     """
-    work = _Assembly(with_written_origin(source), channels)
+    work = _Assembly(source, channels)
     series = {}
     for number, item in enumerate(channels.sources):
         series[item.channel] = work.series(item)
