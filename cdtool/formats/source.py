@@ -14,7 +14,7 @@ from cdtool.recording import Finding
 
 @dataclass(frozen=True)
 class Source:
-    """A file's columns. `origin` [s] has been taken off every `Column.time`, and off a table's stamps where it is not 0.
+    """A file's columns. `origin` [s] has been taken off every `Column.time`, or off the stamps of a table.
 
     `names` are all columns of the file in its order, read or not; `first_row` is the file's line of the first sample
     (0: not known).

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource
-from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
@@ -19,6 +18,7 @@ from cdtool.formats.source import Format, Source
 from cdtool.ingest.channel_assembly import as_logged
 from cdtool.ingest.own_clocks import with_own_clocks
 from cdtool.ingest.parts import joined_recordings, joined_sources, lost_parts
+from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Finding, Recording
@@ -88,23 +88,6 @@ def survey(path: Path) -> Source:
     if path.is_dir():
         return joined_sources(path, [choose_format(part).columns(part) for part in log_parts(path)])
     return choose_format(path).columns(path)
-
-
-@dataclass(frozen=True)
-class LoggedRecording:
-    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers."""
-
-    recording: Recording
-    factors: Mapping[str, tuple[float, ...]]
-    speed_low_pass: float
-
-    def on_load_side(
-        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
-    ) -> Recording:
-        """The recording on the load side, made without the values that are outside of the plausible ranges."""
-        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
-        recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
-        return recording
 
 
 def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
