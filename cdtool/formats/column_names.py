@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
-from cdtool.channels import ChannelMap, TimeSource
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError, nearest
-from cdtool.recording import GROUND_TRUTH
+from cdtool.formats.source import Source
+from cdtool.recording import GROUND_TRUTH, Finding
 
 # What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
 OWN_CLOCK = "time"
+# How a note about ground truth begins that is mapped and not in a log.
+ABSENT = "is not in this log"
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
 
@@ -98,6 +102,44 @@ def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> Channel
                 f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
             )
     return replace(wanted, sources=held)
+
+
+def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return the map with the file's own names of its columns (`keys`), without the ground truth that it does not hold.
+
+    Absent ground truth is noted in the source. The clock that a container itself knows is no column. Raises
+    RecordingError where a column is missing, or is there several times.
+    """
+    names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
+    absent = [
+        item
+        for item in channels.sources
+        if item.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _asked(item, channels))
+    ]
+    time = channels.time
+    own = time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
+    if time.column is not None and not own:
+        time = replace(time, key=find_key(source.path, "time", time.column, names))
+    sources = tuple(
+        replace(item, keys=tuple(find_key(source.path, item.channel, key, names) for key in _asked(item, channels)))
+        for item in channels.sources
+        if item not in absent
+    )
+    what = "topic" if channels.topics else "column"
+    notes = [
+        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
+    ]
+    return replace(source, findings=(*source.findings, *notes)), replace(channels, time=time, sources=sources)
+
+
+def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
+    """What the machine file calls the columns of a channel."""
+    return (item.described,) if channels.topics else item.columns
+
+
+def _meant(item: ChannelSource, names: Sequence[str]) -> str:
+    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def _alike(column: str, names: Sequence[str]) -> list[str]:

@@ -17,10 +17,8 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
-from cdtool.columns import Column
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.formats.column_names import find_key
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.plain_text import counted
@@ -31,7 +29,7 @@ Counts = npt.NDArray[np.int64]
 
 
 def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
-    """The channels in SI as the machine logs them, not yet referred to the load side.
+    """The channels in SI as the machine logs them, not yet referred to the load side; the map's columns are resolved.
 
     The columns are taken out of the source one after another: none is longer in memory than it is needed.
     """
@@ -78,7 +76,6 @@ class _Assembly:
         self.source = source
         self.channels = channels
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
-        self._names = source.names or tuple(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
         self.gaps: set[str] = set()  # what was said of the table's clock is not repeated for each channel
@@ -89,21 +86,21 @@ class _Assembly:
 
     def drop(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
         """Forget the columns of a channel that no later one is made of."""
-        needed = {key for other in later for key in self._keys(other)}
-        for key in self._keys(item):
+        needed = {key for other in later for key in other.keys}
+        for key in item.keys:
             if key not in needed:
                 self.columns.pop(key, None)
 
     def series(self, item: ChannelSource) -> Series:
         """One channel: its values in SI at its own times."""
         if self.table is None:
-            column = self._column(item.channel, item.described)
+            column = self.columns[item.keys[0]]
             stamps = column.time if column.time is not None else np.empty(0)
             clock = self._clean(stamps, f"{item.channel} time", sampled=item.channel != "event")
             values = column.values
         else:
             clock = self.table
-            parts = [self._column(item.channel, column).values for column in item.columns]
+            parts = [self.columns[key].values for key in item.keys]
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         if not len(clock.time):
             raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
@@ -119,7 +116,7 @@ class _Assembly:
         if time.column is None:
             rows = {len(column.values) for column in self.columns.values()}
             return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
-        column = self._column("time", time.column)
+        column = self.columns[time.key]
         self.findings += check_clock_unit(self.source.path, time, column, self.origin)
         self.findings += time_unit_findings(time, column, self.origin)
         start = epoch_start(column.values, time.factor)
@@ -147,13 +144,6 @@ class _Assembly:
             raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
         self.findings += [replace(found, channel=clock) for found in clean.findings]
         return clean
-
-    def _keys(self, item: ChannelSource) -> list[str]:
-        columns = item.columns if self.table is not None else (item.described,)
-        return [find_key(self.source.path, item.channel, column, self._names) for column in columns]
-
-    def _column(self, channel: str, column: str | int) -> Column:
-        return self.columns[find_key(self.source.path, channel, column, self._names)]
 
     def _kept(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
         table = values.reshape(len(values), -1)

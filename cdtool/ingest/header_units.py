@@ -12,7 +12,7 @@ from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch, contradicted_by_steps
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats.column_names import find_key, split_unit
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import Finding
 from cdtool.units import RAW_UNITS, Unit, find_unit
@@ -27,14 +27,12 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
     """A warning for each channel whose columns' units contradict the machine file, in kind or by a factor.
 
     An explicit scale that leads from the header's unit to the channel's is no contradiction; a header without a unit,
-    with one that is not known, or with "1", says nothing. Raises RecordingError where a column is not in the file.
+    with one that is not known, or with "1", says nothing. The map's columns are resolved (resolve_columns).
     """
-    names = source.names or tuple(source.columns)
-    found = []
+    findings = []
     for item in channels.sources:
-        columns = [source.columns[find_key(source.path, item.channel, column, names)] for column in item.columns]
-        found += channel_unit_findings(item, columns)
-    return found
+        findings += channel_unit_findings(item, [source.columns[key] for key in item.keys])
+    return findings
 
 
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:

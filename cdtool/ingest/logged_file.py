@@ -17,6 +17,7 @@ from cdtool.clock.stamps import missing_findings
 from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.mcap.mapped_pieces import MappedLog
 from cdtool.formats.pieces import Run
 from cdtool.formats.source import Source
@@ -28,7 +29,6 @@ from cdtool.ingest.channel_assembly import (
     stuck_findings,
 )
 from cdtool.ingest.part_gaps import PartSpan
-from cdtool.ingest.reading import only_held
 from cdtool.machine_file import MachineFile
 from cdtool.recording import MEASURED, Finding, FloatArray
 
@@ -114,7 +114,7 @@ class LoggedFile:
         self._columns: Mapping[str, list[Column]] = {name: [column] for name, column in source.columns.items()}
         if not (self._is_sorted and self._log.settled):
             self._survey_in_order()
-        source, held = only_held(source, machine_file.topics)
+        source, held = resolve_columns(source, machine_file.topics)
         self.channels = {item.channel: self.channels[item.channel] for item in held.sources}
         self.origin, self._told = source.origin, source.findings
         for channel in self.channels.values():

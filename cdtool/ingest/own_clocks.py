@@ -9,7 +9,7 @@ import numpy as np
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.formats.column_names import OWN_CLOCK, find_key
+from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import unit_findings
 
@@ -17,8 +17,9 @@ from cdtool.ingest.header_units import unit_findings
 def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
     """A source whose columns bring times, and its map, so that each channel becomes one column with a clock.
 
-    A table comes back as it is. Raises RecordingError where a channel's columns have different clocks or none, and
-    ConfigurationError where the machine file gives the clock another unit than s.
+    The map's columns are resolved (resolve_columns). A table comes back as it is. Raises RecordingError where a
+    channel's columns have different clocks or none, and ConfigurationError where the machine file gives the clock
+    another unit than s.
     """
     if channels.topics or not any(column.time is not None for column in source.columns.values()):
         return source, channels
@@ -31,7 +32,7 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
             'time = { column = "time", unit = "s" }',
         )
     joined = {item.channel: _joined(source, item) for item in channels.sources}
-    sources = tuple(replace(item, columns=(item.channel,)) for item in channels.sources)
+    sources = tuple(replace(item, columns=(item.channel,), keys=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
     # What each column says of its unit: the joined ones have none.
     findings = (*source.findings, *unit_findings(source, channels))
@@ -40,7 +41,7 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
 
 
 def _joined(source: Source, item: ChannelSource) -> Column:
-    parts = [source.columns[find_key(source.path, item.channel, column, source.names)] for column in item.columns]
+    parts = [source.columns[key] for key in item.keys]
     time = parts[0].time
     for part in parts:
         if part.time is None or time is None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import codecs
 from collections.abc import Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
-from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.channels import ChannelMap
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
 from cdtool.formats import FORMATS
-from cdtool.formats.column_names import is_absent
+from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.channel_assembly import as_logged
@@ -21,10 +20,8 @@ from cdtool.ingest.parts import joined_recordings, joined_sources, lost_parts
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import GROUND_TRUTH, Finding, Recording
+from cdtool.recording import Recording
 
-# How a note about ground truth begins that is mapped and not in a log.
-ABSENT = "is not in this log"
 _KNOWN_CONTENTS = {
     b"\x89PNG": "a PNG image",
     b"\xff\xd8\xff": "a JPEG image",
@@ -126,12 +123,12 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
     """
     found = choose_format(path)
     channels = _map(found, machine_file, path)
-    source, held = only_held(found.columns(path, channels), channels)
+    source, resolved = resolve_columns(found.columns(path, channels), channels)
     if found.name == "mcap":
         from cdtool.formats.mcap_writing import with_exact_times
 
-        source = with_exact_times(found, source, held)
-    return with_own_clocks(source, held)
+        source = with_exact_times(found, source, resolved)
+    return with_own_clocks(source, resolved)
 
 
 def has_topics(found: Format) -> bool:
@@ -162,30 +159,6 @@ def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
             f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
         )
     return channels
-
-
-def only_held(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """The map without the ground truth that a file does not hold, which is noted."""
-    names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
-    absent = [
-        item
-        for item in channels.sources
-        if item.channel in GROUND_TRUTH
-        and any(is_absent(column, names) for column in ((item.described,) if channels.topics else item.columns))
-    ]
-    if not absent:
-        return source, channels
-    what = "topic" if channels.topics else "column"
-    told = [
-        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
-    ]
-    kept = tuple(item for item in channels.sources if item not in absent)
-    return replace(source, findings=(*source.findings, *told)), replace(channels, sources=kept)
-
-
-def _meant(item: ChannelSource, names: Sequence[str]) -> str:
-    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def _is_table(found: Format, path: Path) -> bool:

@@ -217,7 +217,7 @@ def lost(recording: Recording) -> list[Skipped]:
 
 def absent_truth(recording: Recording) -> list[Finding]:
     """The notes about ground truth that the machine file maps and the log does not hold."""
-    from cdtool.ingest.reading import ABSENT
+    from cdtool.formats.column_names import ABSENT
 
     return [
         item
