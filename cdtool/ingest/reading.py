@@ -124,10 +124,6 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
     found = choose_format(path)
     channels = _map(found, machine_file, path)
     source, resolved = resolve_columns(found.columns(path, channels), channels)
-    if found.name == "mcap":
-        from cdtool.formats.mcap_writing import with_exact_times
-
-        source = with_exact_times(found, source, resolved)
     return with_own_clocks(source, resolved)
 
 

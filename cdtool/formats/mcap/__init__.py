@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import ClassVar
@@ -18,6 +19,7 @@ from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
+from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
@@ -49,7 +51,9 @@ class Mcap:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self.pieces(path), sort=True) if wanted is None else _wanted(path, wanted)
+        if wanted is None:
+            return joined(self.pieces(path), sort=True)
+        return with_exact_times(_wanted(path, wanted), wanted, partial(_wanted, path))
 
     def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
         """All numeric fields, some MiB of the file at a time; raises RecordingError."""
@@ -73,6 +77,10 @@ class Mcap:
                 else:
                     columns[item.name] = item
         return _source(path, log, columns, findings + jumps.findings(), log.origin)
+
+    def exact_pieces(self, path: Path) -> Pieces:
+        """What `pieces` gives; of a log that cdtool converted with the times that were written."""
+        return with_exact_pieces(self.pieces(path), path)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""

@@ -18,7 +18,7 @@ from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
-from cdtool.formats.mcap_writing import EXACT_TIME, exact_times
+from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times
 from cdtool.formats.pieces import Pieces
 from cdtool.formats.source import Source
 from cdtool.messages.batch import Batch
