@@ -133,14 +133,11 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     # A header's clock may be another one (simulated time): its own first stamp is its origin.
     stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
     origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
-    columns: dict[str, Column] = {}
-    for source in wanted.sources:
-        if f"{source.topic} {source.field}" not in columns:
-            topic, index = topics[source.topic], texts[source.topic].index(source.field)
-            column, found = topic.column(index, origin)
-            columns[column.name] = column
-            findings += [*found, *rounding_finding(column.name, topic.rounded(index))]
-    return _source(path, log, columns, findings, origin)
+    asked = dict.fromkeys((source.topic, texts[source.topic].index(source.field)) for source in wanted.sources)
+    gathered = [(*topics[name].column(index, origin), topics[name].rounded(index)) for name, index in asked]
+    for column, field_findings, rounded in gathered:
+        findings += [*field_findings, *rounding_finding(column.name, rounded)]
+    return _source(path, log, {column.name: column for column, _, _ in gathered}, findings, origin)
 
 
 def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
