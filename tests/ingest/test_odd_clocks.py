@@ -9,7 +9,7 @@ from cdtool.clock import clean_time
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import read_recording
-from tests.formats.test_channel_assembly import gate_columns, table, told
+from tests.ingest.test_channel_assembly import gate_columns, table, told
 
 
 def test_what_is_dropped_behind_a_clocks_restart_is_a_loss(log, machine):
