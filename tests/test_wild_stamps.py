@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, epoch_start
-from cdtool.clock.clean_pieces import CleanPieces
-from cdtool.clock.stamps import EPOCH
+from cdtool.clock.stamps import EPOCH, CleanPieces
 from cdtool.errors import RecordingError
 from cdtool.workflows.detection import detect
 from cdtool.workflows.information import info

@@ -6,15 +6,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from cdtool.clock.stamps import COARSE_SHARE
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.recording import Finding
-
-# As in clock/stamps.py: above this share of repeated stamps a clock is coarse.
-_COARSE_SHARE = 0.2
 
 
 def clock_doubts(
@@ -66,6 +64,6 @@ def _doubt(steps: Distribution) -> str:
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
         return f"all of its {steps.count + 1} stamps are the same: the clock stands still"
-    if repeated > _COARSE_SHARE:
+    if repeated > COARSE_SHARE:
         return f"{100.0 * repeated:.3g} % of its stamps repeat: a coarse clock"
     return ""

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.clock.clean_pieces import CleanPieces, gaps_in
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
-from cdtool.clock.stamps import EDGE_ROWS, leading_wild
+from cdtool.clock.stamps import EDGE_ROWS, CleanPieces, gaps_in, leading_wild
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.formats.source import Source

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.channels import ChannelSource
-from cdtool.clock.clean_pieces import CleanPieces, Gaps
-from cdtool.clock.stamps import missing_findings
+from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
 from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
