@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
+from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.formats.source import Format, Source
 from cdtool.recording import FloatArray
@@ -21,6 +23,25 @@ VALUES_A_PIECE = 1 << 20
 
 # At their end pieces give the source: its columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
+
+
+class MappedLog(Protocol):
+    """The columns of a map piece by piece, as often as is asked for; each column is a clock of its own.
+
+    `settled`: the times of the last pass count from the origin that its source has.
+    """
+
+    settled: bool
+
+    def pieces(self) -> Pieces:
+        """The columns from the first row on; raises RecordingError."""
+        ...
+
+
+def mapped_log(found: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
+    """The columns that `wanted` names of a file that need not fit into memory; None where the format has none such."""
+    opened: Callable[[Path, ChannelMap], MappedLog] | None = getattr(found, "mapped", None)
+    return None if opened is None else opened(path, wanted)
 
 
 class Run:

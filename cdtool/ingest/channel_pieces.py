@@ -1,14 +1,15 @@
-"""The mapped channels of MCAP files as `cdtool convert` writes them, piece by piece: as logged, in SI."""
+"""The mapped channels of files of messages as `cdtool convert` writes them, piece by piece: as logged, in SI."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.columns import Column, Piece
 from cdtool.formats.groups import Group, Part
+from cdtool.formats.pieces import MappedLog
 from cdtool.formats.time_order import by_time
 from cdtool.ingest.logged_file import LoggedChannel, LoggedFile
 from cdtool.ingest.part_gaps import gaps_between
@@ -19,15 +20,17 @@ from cdtool.recording import GROUND_TRUTH, Finding
 
 
 class ChannelPieces:
-    """The channels of an MCAP file, or of those that are parts of one log, which need not fit into memory.
+    """The channels of a file of messages, or of those that are parts of one log, which need not fit into memory.
 
-    `folder` is where parts are. They become what joined_recordings makes of them; raises RecordingError as it does.
+    `logs` give the mapped fields of each file, `folder` is where parts are. They become what joined_recordings makes of
+    them; raises RecordingError as it does.
     """
 
-    def __init__(self, files: Sequence[Path], machine_file: MachineFile, folder: FoundParts | None = None) -> None:
-        self._files = sorted(
-            (LoggedFile(path, machine_file) for path in files), key=lambda file: file.origin + file.start
-        )
+    def __init__(
+        self, logs: Mapping[Path, MappedLog], machine_file: MachineFile, folder: FoundParts | None = None
+    ) -> None:
+        files = [LoggedFile(path, machine_file, log) for path, log in logs.items()]
+        self._files = sorted(files, key=lambda file: file.origin + file.start)
         self._folder, self._joints = folder, machine_file.topics.joints
         self.origin = self._files[0].origin
         self.is_coarse = any(file.is_coarse for file in self._files)

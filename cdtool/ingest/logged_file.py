@@ -1,4 +1,4 @@
-"""The mapped channels of an MCAP file as logged, in SI, piece by piece: what channel_assembly makes of columns."""
+"""The mapped channels of a file of messages as logged, in SI, piece by piece: as channel_assembly makes them."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.formats.column_names import resolve_columns
-from cdtool.formats.mcap.mapped_pieces import MappedLog
-from cdtool.formats.pieces import Run
+from cdtool.formats.pieces import MappedLog, Run
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.ingest.channel_assembly import (
@@ -97,15 +96,15 @@ class LoggedChannel:
 
 
 class LoggedFile:
-    """An MCAP file that is read once for its figures, twice where its messages do not stand in the order of time.
+    """A file of messages that is read once for its figures, twice where they do not stand in the order of time.
 
     `channels` hold the figures, `late` [s] by how much any sample stands behind later ones. Gaps are known once
-    `pieces` has been run through. Raises RecordingError.
+    `pieces` has been run through. `log` gives the mapped fields of the file at `path`. Raises RecordingError.
     """
 
-    def __init__(self, path: Path, machine_file: MachineFile) -> None:
+    def __init__(self, path: Path, machine_file: MachineFile, log: MappedLog) -> None:
         self.path, self._items, self._joints = path, machine_file.topics.sources, machine_file.topics.joints
-        self._log = MappedLog(path, machine_file.topics)
+        self._log = log
         self._is_sorted = True
         self.channels = self._new()
         source, lateness = self._survey()

@@ -61,9 +61,9 @@ def choose_format(path: Path) -> Format:
     formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
     by_suffix = [item for item in formats if suffix in item.suffixes]
     # Almost any text can pass for a table: one that claims to be of another format must hold numbers.
-    claimed = by_suffix and all(item.name != "csv" for item in by_suffix)
+    claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
     for item in [*by_suffix, *formats]:
-        if item.sniff(path) and not (claimed and item.name == "csv" and not _is_table(item, path)):
+        if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
             return item
     wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
     start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
@@ -155,6 +155,10 @@ def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
             f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
         )
     return channels
+
+
+def _sniffs_any_text(found: Format) -> bool:
+    return bool(getattr(found, "sniffs_any_text", False))
 
 
 def _is_table(found: Format, path: Path) -> bool:

@@ -39,6 +39,7 @@ class Csv:
 
     name: ClassVar[str] = "csv"
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat", ".lvm")
+    sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """True if the file starts as text that is no markup."""

@@ -20,6 +20,7 @@ from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
+from cdtool.formats.mcap.mapped_pieces import MappedFields
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
@@ -81,6 +82,10 @@ class Mcap:
     def exact_pieces(self, path: Path) -> Pieces:
         """What `pieces` gives; of a log that cdtool converted with the times that were written."""
         return with_exact_pieces(self.pieces(path), path)
+
+    def mapped(self, path: Path, wanted: ChannelMap) -> MappedFields:
+        """The fields that `wanted` names of a log that need not fit into memory; raises RecordingError."""
+        return MappedFields(path, wanted)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""

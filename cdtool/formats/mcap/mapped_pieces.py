@@ -33,7 +33,7 @@ from cdtool.recording import Finding, FloatArray
 
 
 @dataclass
-class MappedLog:
+class MappedFields:
     """An MCAP file that is read piece by piece as often as is asked for; each field is a clock of its own.
 
     The times count from the `origin` [ns] that the pass before has found; `settled`: the last pass counted from it.
