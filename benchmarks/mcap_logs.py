@@ -18,7 +18,7 @@ import numpy.typing as npt
 from mcap.writer import CompressionType, Writer
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.mcap.schemas import DEFINITIONS
+from cdtool.messages.schemas import DEFINITIONS
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 10**9

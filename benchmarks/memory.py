@@ -22,8 +22,8 @@ from memory_logs import MACHINE_CHANNELS, write_log
 from timing import main, table
 
 import cdtool
-from cdtool.formats.channel_assembly import as_logged
-from cdtool.formats.reading import mapped_source
+from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.reading import mapped_source
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
 

@@ -7,7 +7,8 @@
   public function is recorded, up to where the machine refers the channels to the load side. A stay is a run of calls
   into one module, a return is a stay in a module that was left before. A call counts where it enters a module from
   another one; every call does, also those of the second channel. The package of one format is one module, because its
-  caller knows only its contract; `every module` counts the modules inside it, too. `UTILITIES` are passed over. Only
+  caller knows only its contract, and so is `messages`, by which formats decode; `every module` counts the modules
+  inside them, too. `UTILITIES` are passed over. Only
   the main thread is recorded.
 * **Import cycles.** Groups of modules that import one another, directly or through others; imports for the type checker
   count. Imports inside functions close further cycles, which are counted separately.
@@ -58,8 +59,10 @@ UTILITIES: Mapping[str, str] = {
     "cdtool.channels": "a value: what the machine file maps",
     "cdtool.recording": "a value: what has been read so far",
 }
-# Packages whose modules are each a format, and where a walk ends: the channels are there, the method begins.
+# Packages whose modules are each a format, the one by which they decode messages, and where a walk ends: the channels
+# are there, the method begins.
 FORMATS = "cdtool.formats"
+MESSAGES = "cdtool.messages"
 METHOD = "cdtool.machines"
 
 
@@ -337,8 +340,10 @@ def _is_below(name: str, package: str) -> bool:
     return name == package or name.startswith(f"{package}.")
 
 
-def room_of(module: str, formats: str = FORMATS) -> str:
-    """The module, or the package of one format that it belongs to."""
+def room_of(module: str, formats: str = FORMATS, messages: str = MESSAGES) -> str:
+    """The module, or the package of one format or of messages that it belongs to."""
+    if _is_below(module, messages):
+        return messages
     return ".".join(module.split(".")[: formats.count(".") + 2]) if _is_below(module, formats) else module
 
 

@@ -36,6 +36,7 @@ class ChannelSource:
     """Where one channel comes from, and how its numbers become SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: at the ends of `valid_range` the sensor saturates, below `least` and above `most` it gives none.
+    `keys` are the columns under the names that a file has for them, once its names are known (resolve_columns).
     """
 
     channel: str
@@ -50,6 +51,7 @@ class ChannelSource:
     least: float = -math.inf
     most: float = math.inf
     duty: Duty | None = None
+    keys: tuple[str, ...] = ()
 
     @property
     def described(self) -> str:
@@ -64,6 +66,7 @@ class TimeSource:
     """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
 
     With both a column and a rate the column counts samples: a gap in it is a gap in time. `unit` is the column's.
+    `key` is the column under the name that a file has for it, once its names are known (resolve_columns).
     """
 
     column: str | int | None = None
@@ -71,6 +74,7 @@ class TimeSource:
     unit: str = ""
     rate: float | None = None
     clock: Literal["log", "publish", "header"] = "log"
+    key: str = ""
 
 
 @dataclass(frozen=True)

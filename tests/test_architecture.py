@@ -32,7 +32,7 @@ def test_importing_cdtool_loads_nothing_heavy():
     [
         "cdtool.workflows.benchmark.benchmark",
         "cdtool.detectors.friction_ekf",
-        "cdtool.formats.reading",
+        "cdtool.ingest.reading",
         "cdtool.report.outputs",
     ],
 )

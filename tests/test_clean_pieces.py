@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, gap_findings
+from cdtool.clock.stamps import CleanPieces, gaps_in
 from cdtool.recording import Series
-from cdtool.workflows.clean_pieces import CleanPieces, gaps_in
 
 
 @st.composite

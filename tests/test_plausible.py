@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.formats.reading import LoggedRecording, read_as_logged
+from cdtool.ingest.reading import read_as_logged
+from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import read_machine_file
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import MEASURED, Series

@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.clock.plausible_unit import contradicted_by_epoch, contradicted_by_steps
 from cdtool.errors import RecordingError
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
 from tests.command import cdtool

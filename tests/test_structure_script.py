@@ -190,11 +190,12 @@ def test_a_stay_is_a_change_of_module_and_a_return_is_a_stay_where_one_was_befor
 
 def test_the_package_of_a_format_is_one_room_and_the_modules_beside_it_are_not(script):
     def room(name: str) -> str:
-        return script.room_of(name, "pkg.formats")
+        return script.room_of(name, "pkg.formats", "pkg.messages")
 
     assert room("pkg.formats.csv.table") == room("pkg.formats.csv") == "pkg.formats.csv"
     assert room("pkg.formats.mcap.container.log") == "pkg.formats.mcap"
     assert room("pkg.formats.source") == "pkg.formats.source"
+    assert room("pkg.messages.columns.cdr") == room("pkg.messages.fields") == room("pkg.messages") == "pkg.messages"
     assert room("pkg.clock.stamps") == "pkg.clock.stamps" and room("pkg.formats") == "pkg.formats"
     inside = [("", "pkg.a"), ("pkg.a", "pkg.formats.csv"), ("pkg.formats.csv", "pkg.formats.csv.table")]
     back = [("pkg.formats.csv.table", "pkg.clock"), ("pkg.formats.csv", "pkg.formats.csv.table")]

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, epoch_start
-from cdtool.clock.wild import EPOCH
+from cdtool.clock.stamps import EPOCH, CleanPieces
 from cdtool.errors import RecordingError
-from cdtool.workflows.clean_pieces import CleanPieces
 from cdtool.workflows.detection import detect
 from cdtool.workflows.information import info
 

@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from cdtool.clock.coarse import recent_medians
-from cdtool.clock.stamps import GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
-from cdtool.clock.wild import EPOCH
+from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series
 

@@ -1,9 +1,16 @@
-"""Formats of recordings, by name; `reading.py` chooses one by suffix and content.
+"""Formats of recordings, by name; `cdtool/ingest/reading.py` chooses one by suffix and content.
 
 A format is a class that follows `source.Format`: `name`, `suffixes`, `sniff(path)` and `columns(path, wanted)`. It may
-also have `topics` (True where it holds messages of topics, which [channels.mcap] maps), `pieces` (a file that need not
-fit into memory, see `pieces.py`) and `element_names` (see `element_names.py`). What a column means (channel, unit,
-scale) is the same for all of them: see `channel_assembly.py`. Writers are functions that follow `groups.Writer`.
+also have
+
+* `topics`: True where it holds messages of topics, which [channels.mcap] maps;
+* `pieces`: the columns of a file that need not fit into memory (`pieces.py`), `exact_pieces`: the same with the times
+  that cdtool convert wrote, `mapped`: those of a map (`pieces.mapped_log`);
+* `element_names` (`cdtool/ingest/element_names.py`);
+* `sniffs_any_text`: True where almost any text passes for a file of it.
+
+What a column means (channel, unit, scale) is the same for all of them: see `cdtool/ingest/channel_assembly.py`. Writers
+are functions that follow `groups.Writer`.
 """
 
 from __future__ import annotations

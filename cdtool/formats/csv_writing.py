@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
+from cdtool.columns import Column
+from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.groups import Group, Part, Parts, Written, one_table, stored
-from cdtool.formats.own_clocks import OWN_CLOCK
-from cdtool.formats.source import Column
 
 _ROWS = 2**14
 

@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
+from cdtool.columns import Column
 from cdtool.errors import UsageError
-from cdtool.formats.source import Column
 from cdtool.recording import FloatArray
 
 # What the metadata of a converted file begin with.

@@ -14,6 +14,7 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.cf_attributes import Packing, times_since
+from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import (
     check_chunks,
     check_size,
@@ -22,11 +23,10 @@ from cdtool.formats.container_checks import (
     one_line_errors,
 )
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.own_clocks import asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.plain_text import first_of
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit

@@ -9,10 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.formats import mat_hdf5
+from cdtool.formats.column_names import wanted_keys
 from cdtool.formats.mat_check import MAGIC, check_whole
-from cdtool.formats.source import Column, Source, wanted_keys
+from cdtool.formats.source import Source
 from cdtool.recording import Finding
 
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))

@@ -8,21 +8,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, Written, need_clocks, stored
-from cdtool.formats.pieces import Piece, Pieces, Run
-from cdtool.formats.source import Format, Source
+from cdtool.formats.mcap.exact_times import EXACT_TIME, METADATA, PACKAGE
 from cdtool.recording import FloatArray
 
-METADATA = "cdtool.converted"
-EXACT_TIME = "time_s"
-_PACKAGE = "cdtool_msgs/msg"
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _SECOND = 10**9
 _ROWS = 2**14
@@ -58,52 +52,6 @@ def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provena
         ]
         for group, names in zip(groups, fields, strict=True)
     ]
-
-
-def exact_times(path: Path) -> dict[str, str] | None:
-    """The metadata of a file that cdtool converted, else None: its topics then hold exact times."""
-    from mcap.reader import make_reader
-
-    try:
-        with path.open("rb") as file:
-            for record in make_reader(file).iter_metadata():
-                if record.name == METADATA:
-                    return dict(record.metadata)
-    except Exception:  # a damaged file holds no metadata that could be relied on
-        return None
-    return None
-
-
-def with_exact_times(found: Format, source: Source, channels: ChannelMap) -> Source:
-    """The source, with the times that were written where cdtool converted the file: its stamps are whole nanoseconds.
-
-    They count from the first message on, so that a log whose clock began at 5 s would else begin at 0 s.
-    """
-    made = any(text.startswith(f"{_PACKAGE}/") for text in source.details.values())
-    told = exact_times(source.path) if made else None
-    if told is None:
-        return source
-    topics = dict.fromkeys(item.topic for item in channels.sources)
-    clocks = tuple(ChannelSource("event", topic=topic, field=EXACT_TIME) for topic in topics)
-    exact = found.columns(source.path, replace(channels, sources=clocks))
-    columns = {}
-    for name, column in source.columns.items():
-        clock = exact.columns.get(f"{name.partition(' ')[0]} {EXACT_TIME}")
-        if clock is None or len(clock.values) != len(column.values):
-            return source
-        columns[name] = replace(column, time=clock.values)
-    return replace(source, columns=columns, origin=float(told.get("cdtool.origin_s", "0")))
-
-
-def exact_pieces(pieces: Pieces, origin: float) -> Pieces:
-    """The pieces of a converted file with the times that were written, which are columns no more."""
-    run = Run(pieces)
-    for piece in run:
-        time = piece.values.get(f"{piece.clock} {EXACT_TIME}")
-        values = {name: column for name, column in piece.values.items() if not name.endswith(f" {EXACT_TIME}")}
-        yield Piece(piece.clock, piece.time if time is None else time, values, piece.rows, origin)
-    columns = {name: item for name, item in run.source.columns.items() if not name.endswith(f" {EXACT_TIME}")}
-    return replace(run.source, columns=columns, origin=origin)
 
 
 def _start(groups: Sequence[Group], origin: float) -> int:
@@ -149,7 +97,7 @@ def _definition(group: Group, names: Sequence[str]) -> str:
 
 
 def _type_name(group: Group) -> str:
-    return f"{_PACKAGE}/{re.sub(r'[^A-Za-z0-9]', '', group.name.title())}"
+    return f"{PACKAGE}/{re.sub(r'[^A-Za-z0-9]', '', group.name.title())}"
 
 
 def _field_names(names: Sequence[str]) -> list[str]:

@@ -19,9 +19,9 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
 from cdtool.formats.groups import Group, Parts, Written, need_clocks, stored
-from cdtool.formats.own_clocks import asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.columns import Column
+from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Part, Parts, Written, need_clocks, stored
-from cdtool.formats.own_clocks import OWN_CLOCK
 from cdtool.formats.parquet import OWN_CLOCKS
-from cdtool.formats.source import Column
 from cdtool.recording import BoolArray, FloatArray
 
 # What is written at once: so many numbers, 8 MiB of them, but no fewer rows.

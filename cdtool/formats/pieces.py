@@ -5,38 +5,43 @@ A format that can hand its columns over so has a method `pieces`; the columns of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from cdtool.formats.source import Column, Format, Source
-from cdtool.formats.written_origin import with_written_origin
+from cdtool.channels import ChannelMap
+from cdtool.columns import Column, Piece
+from cdtool.formats.source import Format, Source
 from cdtool.recording import FloatArray
 
 # What a format cuts its pieces to: 8 MiB of float64, all columns together.
 VALUES_A_PIECE = 1 << 20
 
 
-@dataclass(frozen=True)
-class Piece:
-    """Some rows (`rows` = n) of the columns that share one clock, in the file's order.
-
-    `time` (n,) [s] counts from the source's `origin` [s]; None where the columns are a table, whose clock is one of
-    them or not known. `values` are (n,) or (n, k) by column; a column of this clock that is not among them has no
-    value in these rows. Messages of a topic (`clock` is its name) are in the order of their times within a piece.
-    """
-
-    clock: str
-    time: FloatArray | None
-    values: Mapping[str, FloatArray]
-    rows: int
-    origin: float = 0.0
-
-
 # At their end pieces give the source: its columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
+
+
+class MappedLog(Protocol):
+    """The columns of a map piece by piece, as often as is asked for; each column is a clock of its own.
+
+    `settled`: the times of the last pass count from the origin that its source has.
+    """
+
+    settled: bool
+
+    def pieces(self) -> Pieces:
+        """The columns from the first row on; raises RecordingError."""
+        ...
+
+
+def mapped_log(found: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
+    """The columns that `wanted` names of a file that need not fit into memory; None where the format has none such."""
+    opened: Callable[[Path, ChannelMap], MappedLog] | None = getattr(found, "mapped", None)
+    return None if opened is None else opened(path, wanted)
 
 
 class Run:
@@ -53,8 +58,7 @@ class Run:
 def read_pieces(found: Format, path: Path, keys: Collection[str] | None = None) -> Pieces:
     """All numeric columns of a file piece by piece, or at least those of `keys`; raises RecordingError."""
     reader: Callable[..., Pieces] | None = getattr(found, "pieces", None)
-    source = yield from (reader(path, keys) if reader is not None else as_pieces(found.columns(path)))
-    return with_written_origin(source)
+    return (yield from (reader(path, keys) if reader is not None else as_pieces(found.columns(path))))
 
 
 def as_pieces(source: Source) -> Pieces:

@@ -10,16 +10,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.container_checks import check_size, library, one_line_errors
-from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.container.definitions import Stream
-from cdtool.formats.mcap.container.records import Channel, Schema
-from cdtool.formats.mcap.fields import parse_field
-from cdtool.formats.mcap.gathering import Gathering
-from cdtool.formats.mcap.topic_survey import TopicSurvey
-from cdtool.formats.pieces import Piece, Pieces, joined
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.source import Source
+from cdtool.messages.batch import Batch
+from cdtool.messages.fields import parse_field
+from cdtool.messages.gathering import Gathering
+from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
 
@@ -73,6 +73,32 @@ class Rosbag:
         if not self.sniff(path):
             raise RecordingError(f"{path}: is no ROS bag", "see cdtool list formats")
         return _Bag(path)
+
+
+@dataclass(frozen=True)
+class _Schema:
+    """A message definition of the bag."""
+
+    name: str
+    encoding: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """A connection of the bag."""
+
+    id: int
+    topic: str
+    message_encoding: str
+
+
+@dataclass(frozen=True)
+class _Stream:
+    """A connection with its message definition."""
+
+    channel: _Channel
+    schema: _Schema
 
 
 @dataclass
@@ -135,7 +161,7 @@ class _Bag:
                 findings += found
         return columns, findings
 
-    def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[Stream, Batch]]:
+    def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[_Stream, Batch]]:
         """The messages of the topics that are asked for, batch by batch."""
         from rosbags.highlevel import AnyReader
 
@@ -199,8 +225,8 @@ def _typestore() -> Any:
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-def _stream(connection: Any) -> Stream:
-    """A connection as MCAP would describe it."""
+def _stream(connection: Any) -> _Stream:
+    """A connection and how its messages are decoded."""
     definition = connection.msgdef
     ros1 = not hasattr(connection.ext, "serialization_format")
     kind = {"IDL": "ros2idl"}.get(definition.format.name, "ros1msg" if ros1 else "ros2msg")
@@ -208,8 +234,8 @@ def _stream(connection: Any) -> Stream:
     if not text:
         text, _ = _typestore().generate_msgdef(connection.msgtype, ros_version=1 if ros1 else 2)
     encoding = "ros1" if ros1 else connection.ext.serialization_format
-    channel = Channel(connection.id % 2**16, 1, connection.topic, encoding, {})
-    return Stream(channel, Schema(1, connection.msgtype, kind, text.encode()), covered=True)
+    channel = _Channel(connection.id % 2**16, connection.topic, encoding)
+    return _Stream(channel, _Schema(connection.msgtype, kind, text.encode()))
 
 
 def _batch(rows: list[tuple[int, bytes]]) -> Batch:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.pieces import VALUES_A_PIECE, Piece
-from cdtool.formats.source import Column
+from cdtool.columns import Column, Piece
+from cdtool.formats.pieces import VALUES_A_PIECE
 from cdtool.recording import FloatArray
 
 # Reads the rows from one to before another.

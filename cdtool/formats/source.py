@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Protocol
 
 from cdtool.channels import ChannelMap
-from cdtool.errors import RecordingError, nearest
-from cdtool.recording import GROUND_TRUTH, Finding, FloatArray
-
-# `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
-_BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
-
-
-@dataclass(frozen=True)
-class Column:
-    """One stream of numbers: `values` (n,) or (n, k) as the file has them.
-
-    `time` (n,) in seconds where the format carries a time for each message, else None (a table: the clock is a column).
-    """
-
-    name: str
-    values: FloatArray
-    time: FloatArray | None = None
-    unit: str | None = None
+from cdtool.columns import Column
+from cdtool.recording import Finding
 
 
 @dataclass(frozen=True)
 class Source:
-    """A file's columns. `origin` [s] has been taken off every `Column.time` (an epoch's start; 0 for a table).
+    """A file's columns. `origin` [s] has been taken off every `Column.time`, or off the stamps of a table.
 
     `names` are all columns of the file in its order, read or not; `first_row` is the file's line of the first sample
     (0: not known).
@@ -60,82 +43,3 @@ class Format(Protocol):
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
         ...
-
-
-def split_unit(name: str) -> tuple[str, str | None]:
-    """`torque [Nm]` -> ("torque", "Nm"); a name without a unit comes back whole, with None."""
-    match = _BRACKET.match(name)
-    if match is None:
-        return name, None
-    unit = (match["square"] if match["square"] is not None else match["round"]).strip()
-    if unit in ("", ":") or unit.isdigit():
-        return name, None
-    return match["name"], unit
-
-
-def column_key(column: str | int, names: Sequence[str]) -> str | None:
-    """The name of a column given by number (from 0), by name, or by its name without the unit if that is unique."""
-    if isinstance(column, int):
-        return names[column] if column < len(names) else None
-    if column in names:
-        return column
-    short = [name for name in names if split_unit(name)[0] == column]
-    return short[0] if len(short) == 1 else None
-
-
-def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[str]:
-    """The names of the columns that a channel map asks for, each once, in the file's order; raises RecordingError.
-
-    Ground truth may be absent: the load cell is fitted for impact tests only.
-    """
-    asked: list[tuple[str, str | int]] = []
-    if wanted.time.column is not None:
-        asked.append(("time", wanted.time.column))
-    asked += [
-        (source.channel, column)
-        for source in wanted.sources
-        for column in source.columns
-        if not (source.channel in GROUND_TRUTH and is_absent(column, names))
-    ]
-    keys = {find_key(path, channel, column, names) for channel, column in asked}
-    return [name for name in names if name in keys]
-
-
-def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) -> str:
-    """The name of one column; raises RecordingError naming file, channel, column and the nearest known ones."""
-    key = column_key(column, names)
-    if key is not None:
-        return key
-    if isinstance(column, int):
-        raise RecordingError(
-            f"{path}: no column {column} (channel '{channel}')",
-            f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
-        )
-    same = _alike(column, names)
-    if len(same) > 1:
-        raise RecordingError(
-            f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
-            f"give its number instead: {' or '.join(same)}",
-        )
-    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names))
-
-
-def is_absent(column: str | int, names: Sequence[str]) -> bool:
-    """True where no column has that name or number; one that is there several times is not absent."""
-    return column_key(column, names) is None and (isinstance(column, int) or not _alike(column, names))
-
-
-def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> ChannelMap:
-    """The map without the ground truth that no message of a log holds; raises RecordingError for any other channel."""
-    held = tuple(item for item in wanted.sources if item.topic in known or item.channel not in GROUND_TRUTH)
-    for item in held:
-        if item.topic not in known:
-            raise RecordingError(
-                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
-            )
-    return replace(wanted, sources=held)
-
-
-def _alike(column: str, names: Sequence[str]) -> list[str]:
-    """The numbers of the columns of one name, whatever their units."""
-    return [str(i) for i, name in enumerate(names) if column in (name.partition("#")[0], split_unit(name)[0])]

@@ -14,16 +14,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import OWN_CLOCK, asked_keys
 from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
 from cdtool.formats.groups import Group, Part, Parts, Written, stored
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.library_lines import collected_lines
-from cdtool.formats.own_clocks import OWN_CLOCK, asked_keys
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
-from cdtool.formats.source import Column, Source
+from cdtool.formats.source import Source
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.plain_text import first_of
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.pieces import Piece
-from cdtool.formats.source import Column
+from cdtool.columns import Column, Piece
 from cdtool.recording import FloatArray
 
 # Rows are handed on once so many wait, or twice as many as had to be left waiting before.

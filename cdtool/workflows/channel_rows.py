@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.channels import ChannelMap
+from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.part_pieces import FoundParts
-from cdtool.formats.reading import choose_format
-from cdtool.formats.source import Column
+from cdtool.formats.pieces import MappedLog, mapped_log
+from cdtool.ingest.channel_pieces import ChannelPieces
+from cdtool.ingest.logged import read_logged
+from cdtool.ingest.part_pieces import FoundParts
+from cdtool.ingest.reading import choose_format
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
-from cdtool.workflows.channel_pieces import ChannelPieces
-from cdtool.workflows.logged import read_logged
 
 # Rows of the longest clock that are handed on at once.
 _ROWS = 1 << 16
@@ -51,7 +53,7 @@ class ChannelRows:
 
 
 def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelPieces:
-    """The channels of a log or of its folder of parts: of MCAP files in pieces, of others in memory.
+    """The channels of a log or of its folder of parts: in pieces where the format can, else in memory.
 
     A coarse clock is made a straight line as a whole, and the torque of a duty needs the speed beside it: they are held
     in memory, too. Raises RecordingError or ConfigurationError.
@@ -60,11 +62,23 @@ def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelP
     files = (log,) if folder is None else folder.filled
     mapped = machine_file.topics.sources
     plain = bool(mapped) and not any(item.duty for item in mapped)
-    if files and plain and all(choose_format(path).name == "mcap" for path in files):
-        pieces = ChannelPieces(files, machine_file, folder)
+    logs = _mapped_logs(files, machine_file.topics) if plain else {}
+    if logs:
+        pieces = ChannelPieces(logs, machine_file, folder)
         if not pieces.is_coarse:
             return pieces
     return ChannelRows(log, machine_file)
+
+
+def _mapped_logs(files: Sequence[Path], channels: ChannelMap) -> dict[Path, MappedLog]:
+    """Each file's mapped fields; none at all where the format of one of them has none that come in pieces."""
+    logs: dict[Path, MappedLog] = {}
+    for path in files:
+        log = mapped_log(choose_format(path), path, channels)
+        if log is None:
+            return {}
+        logs[path] = log
+    return logs
 
 
 def _header(name: str, series: Series) -> Column:

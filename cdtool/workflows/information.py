@@ -20,8 +20,8 @@ from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
-    from cdtool.formats.source import Column
-    from cdtool.workflows.log_figures import ClockFigures, LogFigures
+    from cdtool.columns import Column
+    from cdtool.ingest.log_figures import ClockFigures, LogFigures
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,10 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
 def _survey(log: Path) -> Info:
     from cdtool.formats.csv import TableSource
-    from cdtool.formats.part_pieces import in_time_order, log_pieces
-    from cdtool.workflows.clock_doubts import clock_doubts
-    from cdtool.workflows.clock_guess import find_clock
-    from cdtool.workflows.log_figures import LogFigures
+    from cdtool.ingest.clock_doubts import clock_doubts
+    from cdtool.ingest.clock_guess import find_clock
+    from cdtool.ingest.log_figures import LogFigures
+    from cdtool.ingest.part_pieces import in_time_order, log_pieces
 
     figures = LogFigures(partial(log_pieces, log), in_time_order(log))
     source = figures.source
@@ -103,8 +103,8 @@ def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.formats.csv import TableSource
-    from cdtool.formats.parts import joined_details
-    from cdtool.workflows.logged import read_logged
+    from cdtool.ingest.logged import read_logged
+    from cdtool.ingest.parts import joined_details
 
     read = read_logged(log, machine_file)
     files, low_pass = read.files, read.speed_low_pass

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Column, Piece
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.mcap_writing import exact_pieces, exact_times
-from cdtool.formats.part_pieces import in_time_order, log_pieces
-from cdtool.formats.pieces import Piece, Pieces, read_pieces
-from cdtool.formats.source import Column, Format, split_unit
+from cdtool.formats.pieces import Pieces, read_pieces
+from cdtool.formats.source import Format
 from cdtool.formats.time_order import by_time, values_of
+from cdtool.ingest.clock_guess import find_clock
+from cdtool.ingest.log_figures import ClockFigures, LogFigures
+from cdtool.ingest.part_pieces import in_time_order, log_pieces
 from cdtool.recording import FloatArray
-from cdtool.workflows.clock_guess import find_clock
-from cdtool.workflows.log_figures import ClockFigures, LogFigures
 
 
 @dataclass(frozen=True)
@@ -122,10 +123,9 @@ class LogRows:
 
 
 def _opened(found: Format, path: Path, keys: Collection[str] | None) -> Pieces:
-    """A file's pieces; of an MCAP file that cdtool itself converted with the exact times: a message's are whole ns."""
-    pieces = read_pieces(found, path, keys)
-    told = exact_times(path) if found.name == "mcap" else None
-    return pieces if told is None else exact_pieces(pieces, float(told.get("cdtool.origin_s", "0")))
+    """A file's pieces, with exact times where the format rounds them and cdtool itself converted the file."""
+    exact: Callable[[Path], Pieces] | None = getattr(found, "exact_pieces", None)
+    return read_pieces(found, path, keys) if exact is None else exact(path)
 
 
 def _without_units(columns: Collection[Column]) -> list[tuple[Column, Column]]:

@@ -14,7 +14,8 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
-from cdtool.formats.reading import LoggedRecording, read_as_logged, read_recording
+from cdtool.ingest.reading import read_as_logged, read_recording
+from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
@@ -216,7 +217,7 @@ def lost(recording: Recording) -> list[Skipped]:
 
 def absent_truth(recording: Recording) -> list[Finding]:
     """The notes about ground truth that the machine file maps and the log does not hold."""
-    from cdtool.formats.reading import ABSENT
+    from cdtool.formats.column_names import ABSENT
 
     return [
         item

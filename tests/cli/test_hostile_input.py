@@ -35,7 +35,7 @@ CHILD = """
 import resource, sys, time
 from cdtool.cli.app import main
 from cdtool.cli.console import print_error
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 import cdtool.tables, cdtool.kernels
 before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
 try:

@@ -11,7 +11,7 @@ import pytest
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.formats import FORMATS
-from cdtool.formats.reading import has_topics
+from cdtool.ingest.reading import has_topics
 from cdtool.machines import MACHINES
 from cdtool.registry import Registry
 

@@ -22,7 +22,7 @@ from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.formats.reading import read_as_logged
+from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, judge, run_detector

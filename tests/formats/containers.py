@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.formats.channel_assembly import as_logged
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.reading import mapped_source
+from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.reading import mapped_source
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
 

@@ -15,7 +15,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.arrow_check import check_batches
 from cdtool.formats.container_checks import check_chunks
 from cdtool.formats.parquet_check import check_pages
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 from tests.formats import bombs
 
 SECONDS, MIB = 5.0, 300
@@ -24,7 +24,7 @@ CHILD = """
 import json, resource, sys, time
 from pathlib import Path
 from cdtool.errors import RecordingError
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 for plain in sys.argv[2:]:
     survey(Path(plain))
 before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()

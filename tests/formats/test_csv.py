@@ -5,8 +5,8 @@ import math
 import pytest
 
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import column_key
 from cdtool.formats.csv import Csv
-from cdtool.formats.source import column_key
 
 
 def read(path, wanted=None):

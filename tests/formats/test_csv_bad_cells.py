@@ -7,7 +7,7 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
-from cdtool.formats.reading import choose_format, read_recording
+from cdtool.ingest.reading import choose_format, read_recording
 
 SECONDS = '[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 1, unit = "rad/s" }\n'
 STAMPS = ["23:59:58.5", "23:59:59.0", "23:59:59.5"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import joined
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 

@@ -9,7 +9,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.stamps import NS, unwrapped
 from cdtool.formats.pieces import joined
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 from tests.formats.conftest import COLUMNS
 
 SECONDS = COLUMNS.replace('"ms"', '"s"')

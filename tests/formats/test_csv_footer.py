@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 
 FOOTERS = {
     "a sum": ["Sum,7"],

@@ -7,7 +7,7 @@ import pytest
 
 import cdtool
 from cdtool.errors import RecordingError
-from cdtool.formats.reading import choose_format, read_recording, survey
+from cdtool.ingest.reading import choose_format, read_recording, survey
 
 HEAD = """LabVIEW Measurement\t
 Writer_Version\t2

@@ -13,7 +13,7 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.last_line import is_whole
 from cdtool.formats.csv.pins import read_pins
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS
 from tests.formats.csv_cases import cases

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import joined
-from cdtool.formats.reading import read_recording
+from cdtool.ingest.reading import read_recording
 
 OWN = """[channels]
 time = { column = "time", unit = "s" }

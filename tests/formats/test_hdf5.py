@@ -5,7 +5,7 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.formats.hdf5 import Hdf5
-from cdtool.formats.reading import read_recording, survey
+from cdtool.ingest.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
 
 h5py = pytest.importorskip("h5py")

@@ -6,7 +6,7 @@ from scipy.io import savemat
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mat import Mat
-from cdtool.formats.reading import read_recording, survey
+from cdtool.ingest.reading import read_recording, survey
 from tests.data_folder import data, needs_data
 
 

@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mat import Mat
-from cdtool.formats.reading import choose_format, read_recording, survey
+from cdtool.ingest.reading import choose_format, read_recording, survey
 from cdtool.machine_file import read_machine_file
 from tests.formats.bombs import with_mat_header
 

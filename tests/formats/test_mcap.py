@@ -7,8 +7,8 @@ import pytest
 
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.fields import FieldMissingError, parse_field
 from cdtool.formats.mcap.write import Stream
+from cdtool.messages.fields import FieldMissingError, parse_field
 from tests.data_folder import DATA, data, needs_data
 from tests.formats.mcap_files import JOINTS, START, STREAMS, TIME, N, by_hand, wanted, written
 

@@ -15,7 +15,7 @@ from mcap_ros2.writer import Writer as Ros2Writer
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap
-from tests.formats.mcap_columns.ros_messages import definitions
+from tests.messages.ros_messages import definitions
 
 NAME = "test_msgs/msg/Thing"
 TOPIC = "/thing"

@@ -5,7 +5,7 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mdf import Mdf
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 
 asammdf = pytest.importorskip("asammdf")
 

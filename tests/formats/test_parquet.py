@@ -5,7 +5,7 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.formats.parquet import Parquet
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 
 pa = pytest.importorskip("pyarrow")
 feather = pytest.importorskip("pyarrow.feather")

@@ -12,15 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.formats import slices
 from cdtool.formats.csv import text
-from cdtool.formats.pieces import Piece, Pieces, Run, as_pieces, joined, read_pieces
-from cdtool.formats.reading import choose_format
-from cdtool.formats.source import Column, Source
+from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
+from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
+from cdtool.ingest.log_figures import LogFigures
+from cdtool.ingest.reading import choose_format
 from cdtool.workflows.convert.converting import convert
-from cdtool.workflows.log_figures import LogFigures
 from tests.formats.containers import two_clocks
 
 LIBRARIES = {".parquet": "pyarrow", ".feather": "pyarrow", ".h5": "h5py", ".mf4": "asammdf", ".tdms": "nptdms"}

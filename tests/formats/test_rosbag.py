@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.formats.reading import read_recording, survey
 from cdtool.formats.rosbag import Rosbag
+from cdtool.ingest.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
 
 pytest.importorskip("rosbags")

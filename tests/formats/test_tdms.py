@@ -7,8 +7,8 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.formats.library_lines import collected_lines
-from cdtool.formats.reading import survey
 from cdtool.formats.tdms import Tdms
+from cdtool.ingest.reading import survey
 
 nptdms = pytest.importorskip("nptdms")
 

@@ -13,7 +13,8 @@ import atheris
 def modules() -> list[str]:
     """All modules of the readers."""
     root = Path(__file__).parents[2]
-    files = (file.relative_to(root).with_suffix("") for file in sorted(root.glob("cdtool/formats/**/*.py")))
+    found = [file for room in ("formats", "messages", "ingest") for file in sorted(root.glob(f"cdtool/{room}/**/*.py"))]
+    files = (file.relative_to(root).with_suffix("") for file in found)
     return [".".join(file.parts).removesuffix(".__init__") for file in files]
 
 
@@ -22,7 +23,7 @@ def main() -> None:
     name = sys.argv.pop(1)
     # numba cannot compile what is instrumented; what is imported later would not be instrumented.
     kernels = [module for module in modules() if module.endswith("_kernel")]
-    with atheris.instrument_imports(include=["cdtool.formats"], exclude=kernels):
+    with atheris.instrument_imports(include=["cdtool.formats", "cdtool.messages", "cdtool.ingest"], exclude=kernels):
         for module in modules():
             import_module(module)
         from tests.fuzz.targets import TARGETS

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins, TimeSource
+from cdtool.columns import Column
 from cdtool.errors import RecordingError, UsageError
-from cdtool.formats.own_clocks import OWN_CLOCK
+from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.source import Column, Source, column_key, wanted_keys
+from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class Csv:
 
     name: ClassVar[str] = "csv"
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat", ".lvm")
+    sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """True if the file starts as text that is no markup."""
@@ -85,6 +87,7 @@ def _survey(path: Path, dialect: Dialect) -> TableSource:
 def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
     from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
     from cdtool.formats.csv.table import read_table
+    from cdtool.formats.csv.written_origin import written_origin
 
     names, time = dialect.names, wanted.time
     clock = column_key(time.column, names) if time.column is not None else None
@@ -105,11 +108,13 @@ def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
     asked = [key for key in keys if key != clock]
     columns, origin, told = own_clocks(path, dialect, clocks, asked, table.values)
     table.values, table.findings = {}, [*table.findings, *told]
+    origin = origin or written_origin(path)
     return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
 
 
 def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
     from cdtool.formats.csv.several_clocks import told_unit
+    from cdtool.formats.csv.written_origin import written_origin
 
     columns = {
         key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
@@ -119,7 +124,7 @@ def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
         path=path,
         format=Csv.name,
         columns=columns,
-        origin=table.origin,
+        origin=table.origin or written_origin(path),
         findings=(*dialect.findings, *table.findings),
         details=dialect.details,
         names=dialect.names,

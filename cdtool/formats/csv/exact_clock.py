@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdtool.clock.wild import EPOCH, leading_wild
+from cdtool.clock.stamps import EPOCH, leading_wild
 from cdtool.formats.csv.blank_lines import filled
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_arrays import Rows

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.decimal_kernel import POWERS, as_float, float_bits, powers_of_five
-from cdtool.formats.decimal_kernel import UNDECIDED as TOO_CLOSE
+from cdtool.decimal_kernel import POWERS, as_float, float_bits, powers_of_five
+from cdtool.decimal_kernel import UNDECIDED as TOO_CLOSE
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 

@@ -11,9 +11,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.decimal_kernel import POWERS
 from cdtool.formats.csv.number_kernel import BYTES, FLOATS, Bytes, Words, quick_number, read_number
 from cdtool.formats.csv.stamp_kernel import PROGRAMS, Programs, read_stamp
-from cdtool.formats.decimal_kernel import POWERS
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 

@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.clock import EPOCH
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.source import Column, split_unit
 from cdtool.plain_text import counted, first_of
 from cdtool.recording import Finding, FloatArray
 from cdtool.units import find_unit

@@ -20,7 +20,7 @@ from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import Finding, FloatArray
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.columns import Piece
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.odd_lines import OddLines
 from cdtool.formats.csv.row_arrays import Rows
@@ -17,8 +18,7 @@ from cdtool.formats.csv.several_clocks import Clocks, clock_findings
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
 from cdtool.formats.csv.table import Asked, Table, end_findings, no_numbers
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.pieces import Piece
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
 
 

@@ -6,27 +6,32 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats.large_integers import rounding_finding
-from cdtool.formats.mcap.columns import UndecodableError
-from cdtool.formats.mcap.columns.uniform import UniformTaker
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
-from cdtool.formats.mcap.decoders import Decoders
-from cdtool.formats.mcap.fields import parse_field
-from cdtool.formats.mcap.gathering import Gathering
+from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
+from cdtool.formats.mcap.mapped_pieces import MappedFields
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
-from cdtool.formats.mcap.taken import Bound
-from cdtool.formats.mcap.topic_survey import TopicSurvey
+from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.source import Source
+from cdtool.large_integers import rounding_finding
+from cdtool.messages.columns import UndecodableError
+from cdtool.messages.decoders import Decoders
+from cdtool.messages.fields import parse_field
+from cdtool.messages.gathering import Gathering
+from cdtool.messages.taken import Bound
+from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.recording import Finding
 
 __all__ = ["Mcap"]
@@ -47,7 +52,9 @@ class Mcap:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self.pieces(path), sort=True) if wanted is None else _wanted(path, wanted)
+        if wanted is None:
+            return joined(self.pieces(path), sort=True)
+        return with_exact_times(_wanted(path, wanted), wanted, partial(_wanted, path))
 
     def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
         """All numeric fields, some MiB of the file at a time; raises RecordingError."""
@@ -71,6 +78,14 @@ class Mcap:
                 else:
                     columns[item.name] = item
         return _source(path, log, columns, findings + jumps.findings(), log.origin)
+
+    def exact_pieces(self, path: Path) -> Pieces:
+        """What `pieces` gives; of a log that cdtool converted with the times that were written."""
+        return with_exact_pieces(self.pieces(path), path)
+
+    def mapped(self, path: Path, wanted: ChannelMap) -> MappedFields:
+        """The fields that `wanted` names of a log that need not fit into memory; raises RecordingError."""
+        return MappedFields(path, wanted)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""
@@ -123,14 +138,11 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     # A header's clock may be another one (simulated time): its own first stamp is its origin.
     stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
     origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
-    columns: dict[str, Column] = {}
-    for source in wanted.sources:
-        if f"{source.topic} {source.field}" not in columns:
-            topic, index = topics[source.topic], texts[source.topic].index(source.field)
-            column, found = topic.column(index, origin)
-            columns[column.name] = column
-            findings += [*found, *rounding_finding(column.name, topic.rounded(index))]
-    return _source(path, log, columns, findings, origin)
+    asked = dict.fromkeys((source.topic, texts[source.topic].index(source.field)) for source in wanted.sources)
+    gathered = [(*topics[name].column(index, origin), topics[name].rounded(index)) for name, index in asked]
+    for column, field_findings, rounded in gathered:
+        findings += [*field_findings, *rounding_finding(column.name, rounded)]
+    return _source(path, log, {column.name: column for column, _, _ in gathered}, findings, origin)
 
 
 def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:

@@ -11,27 +11,29 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
-from cdtool.formats.mcap.batch import Batch
-from cdtool.formats.mcap.columns import Picked
-from cdtool.formats.mcap.columns.gathered import ABSENT, OTHER_JOINTS
+from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.definitions import Stream
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
-from cdtool.formats.mcap.decoders import Decoders
-from cdtool.formats.mcap.fields import Field, FieldMissingError, missing, parse_field
-from cdtool.formats.mcap.gathering import in_order, tally
-from cdtool.formats.mcap.stamp_order import StampOrders, Stamps
-from cdtool.formats.mcap_writing import EXACT_TIME, exact_times
-from cdtool.formats.pieces import Piece, Pieces
-from cdtool.formats.source import Column, Source, with_topics
+from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times
+from cdtool.formats.pieces import Pieces
+from cdtool.formats.source import Source
+from cdtool.messages.batch import Batch
+from cdtool.messages.columns import Picked
+from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS
+from cdtool.messages.decoders import Decoders
+from cdtool.messages.fields import Field, FieldMissingError, missing, parse_field
+from cdtool.messages.gathering import in_order, tally
+from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 
 
 @dataclass
-class MappedLog:
+class MappedFields:
     """An MCAP file that is read piece by piece as often as is asked for; each field is a clock of its own.
 
     The times count from the `origin` [ns] that the pass before has found; `settled`: the last pass counted from it.

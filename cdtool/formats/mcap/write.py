@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError, nearest
-from cdtool.formats.mcap.schemas import DEFINITIONS, Definition
+from cdtool.messages.schemas import DEFINITIONS, Definition
 from cdtool.recording import FloatArray
 
 Encoding = Literal["cdr", "json"]

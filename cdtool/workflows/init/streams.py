@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.source import Source, split_unit
+from cdtool.formats.column_names import split_unit
+from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
 _NUMBER = re.compile(r"\d+")

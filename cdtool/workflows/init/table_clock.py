@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.clock.plausible_unit import contradicted_by_epoch
-from cdtool.formats.source import Column, Source
+from cdtool.columns import Column
+from cdtool.formats.source import Source
+from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.clock_guess import GuessedClock, guess_clock
 from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
 from cdtool.workflows.init.units_in_names import unit_in_name
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from cdtool.formats.source import split_unit
+from cdtool.formats.column_names import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words

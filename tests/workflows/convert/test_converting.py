@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.errors import OutputError, RecordingError, UsageError
 from cdtool.files import replaced
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.convert.converting import _WRITERS, convert
 from cdtool.workflows.runs import read_log

@@ -12,7 +12,7 @@ import pytest
 import cdtool
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.reading import read_recording, survey
+from cdtool.ingest.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.convert.converting import convert
 from tests.command import cdtool as command

@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.formats import time_order
 from cdtool.formats.csv import text
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 from cdtool.workflows.convert.converting import convert
 from tests.workflows.convert.test_converting import SEVERAL_CLOCKS, needs, table
 
@@ -18,7 +18,7 @@ def shuffled(path: Path) -> Path:
     """Two topics whose messages are up to 30 late, of which every tenth stands on the time of the one before it."""
     from mcap.writer import Writer
 
-    from cdtool.formats.mcap.schemas import DEFINITIONS
+    from cdtool.messages.schemas import DEFINITIONS
 
     random = np.random.default_rng(11)
     stamps = np.arange(1, 501) * 10**6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.formats.reading import survey
+from cdtool.ingest.reading import survey
 from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks

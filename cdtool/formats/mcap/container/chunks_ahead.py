@@ -28,7 +28,7 @@ from cdtool.formats.mcap.container.foretold import foretold_messages
 from cdtool.formats.mcap.container.records import ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.formats.mcap.taken import Taken, Taker
+from cdtool.messages.taken import Taken, Taker
 
 # Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
 # through the processor's cache, with less, what there is to do for each piece of memory counts.

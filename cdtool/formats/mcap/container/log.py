@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.formats.mcap.batch import NO_BATCH, Batch
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import Definitions, Stream
@@ -20,7 +19,8 @@ from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
-from cdtool.formats.mcap.taken import Part, Taker
+from cdtool.messages.batch import NO_BATCH, Batch
+from cdtool.messages.taken import Part, Taker
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container.walk_kernel import Bytes, sort_by_channel, walk
+from cdtool.messages.batch import Batch
 
 # Messages in one table, and definitions: what a walk is interrupted for.
 MOST_MESSAGES, MOST_DEFINITIONS = 1 << 17, 1 << 12

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.mcap.batch import Batch
 from cdtool.formats.mcap.container import walk_kernel as why
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.formats.mcap.taken import Taken
+from cdtool.messages.batch import Batch
+from cdtool.messages.taken import Taken
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,147 @@
+"""Which columns of a file the machine file names: by name, by name without its unit, or by number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.errors import RecordingError, nearest
+from cdtool.formats.source import Source
+from cdtool.recording import GROUND_TRUTH, Finding
+
+# What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
+OWN_CLOCK = "time"
+# How a note about ground truth begins that is mapped and not in a log.
+ABSENT = "is not in this log"
+# `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
+_BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """`torque [Nm]` -> ("torque", "Nm"); a name without a unit comes back whole, with None."""
+    match = _BRACKET.match(name)
+    if match is None:
+        return name, None
+    unit = (match["square"] if match["square"] is not None else match["round"]).strip()
+    if unit in ("", ":") or unit.isdigit():
+        return name, None
+    return match["name"], unit
+
+
+def column_key(column: str | int, names: Sequence[str]) -> str | None:
+    """The name of a column given by number (from 0), by name, or by its name without the unit if that is unique."""
+    if isinstance(column, int):
+        return names[column] if column < len(names) else None
+    if column in names:
+        return column
+    short = [name for name in names if split_unit(name)[0] == column]
+    return short[0] if len(short) == 1 else None
+
+
+def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[str]:
+    """The names of the columns that a channel map asks for, each once, in the file's order; raises RecordingError.
+
+    Ground truth may be absent: the load cell is fitted for impact tests only.
+    """
+    asked: list[tuple[str, str | int]] = []
+    if wanted.time.column is not None:
+        asked.append(("time", wanted.time.column))
+    asked += [
+        (source.channel, column)
+        for source in wanted.sources
+        for column in source.columns
+        if not (source.channel in GROUND_TRUTH and is_absent(column, names))
+    ]
+    keys = {find_key(path, channel, column, names) for channel, column in asked}
+    return [name for name in names if name in keys]
+
+
+def asked_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
+    """The columns that a map asks for (all without one); the container's own clock is none of them."""
+    if wanted is None:
+        return list(names)
+    if wanted.time.column == OWN_CLOCK and OWN_CLOCK not in names:
+        wanted = replace(wanted, time=TimeSource())
+    return wanted_keys(path, wanted, names)
+
+
+def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) -> str:
+    """The name of one column; raises RecordingError naming file, channel, column and the nearest known ones."""
+    key = column_key(column, names)
+    if key is not None:
+        return key
+    if isinstance(column, int):
+        raise RecordingError(
+            f"{path}: no column {column} (channel '{channel}')",
+            f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
+        )
+    same = _alike(column, names)
+    if len(same) > 1:
+        raise RecordingError(
+            f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
+            f"give its number instead: {' or '.join(same)}",
+        )
+    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names))
+
+
+def is_absent(column: str | int, names: Sequence[str]) -> bool:
+    """True where no column has that name or number; one that is there several times is not absent."""
+    return column_key(column, names) is None and (isinstance(column, int) or not _alike(column, names))
+
+
+def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> ChannelMap:
+    """The map without the ground truth that no message of a log holds; raises RecordingError for any other channel."""
+    held = tuple(item for item in wanted.sources if item.topic in known or item.channel not in GROUND_TRUTH)
+    for item in held:
+        if item.topic not in known:
+            raise RecordingError(
+                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
+            )
+    return replace(wanted, sources=held)
+
+
+def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return the map with the file's own names of its columns (`keys`), without the ground truth that it does not hold.
+
+    Absent ground truth is noted in the source. The clock that a container itself knows is no column. Raises
+    RecordingError where a column is missing, or is there several times.
+    """
+    names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
+    absent = [
+        item
+        for item in channels.sources
+        if item.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _asked(item, channels))
+    ]
+    time = channels.time
+    own = time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
+    if time.column is not None and not own:
+        time = replace(time, key=find_key(source.path, "time", time.column, names))
+    sources = tuple(
+        replace(item, keys=tuple(find_key(source.path, item.channel, key, names) for key in _asked(item, channels)))
+        for item in channels.sources
+        if item not in absent
+    )
+    what = "topic" if channels.topics else "column"
+    notes = [
+        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
+    ]
+    return replace(source, findings=(*source.findings, *notes)), replace(channels, time=time, sources=sources)
+
+
+def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
+    """What the machine file calls the columns of a channel."""
+    return (item.described,) if channels.topics else item.columns
+
+
+def _meant(item: ChannelSource, names: Sequence[str]) -> str:
+    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def _alike(column: str, names: Sequence[str]) -> list[str]:
+    """The numbers of the columns of one name, whatever their units."""
+    return [str(i) for i, name in enumerate(names) if column in (name.partition("#")[0], split_unit(name)[0])]

@@ -1,0 +1,163 @@
+"""Chunks in which every message is laid out as ones before it: columns without a look at single messages.
+
+What the decoders found in the first messages of each channel are its recipes. A chunk that fits them is taken by the
+thread that decompressed it, straight into the columns; any other one goes the ordinary way, after which the recipes may
+be others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.formats.mcap import uniform_kernel as kernel
+from cdtool.messages.columns.alike_kernel import WORD, words_of
+from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.taken import Alike, Bound, Destination, Knows, Part, Recipe, Taken, Words
+
+# Chunks that did not fit, beyond those that did, after which no more are tried.
+_MOST_IN_VAIN = 16
+_KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_INTEGER, "?": kernel.TRUTH}
+
+
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    """The recipes side by side, as the kernel takes them; `bound` keeps the columns that the addresses are of."""
+
+    bound: Mapping[int, Bound]
+    slots: IntArray
+    bounds: IntArray
+    compared: Words
+    mask: Words
+    pattern: Words
+    numbers: Words
+    stamps: Words
+
+
+class UniformTaker:
+    """A Taker (taken.py); `publish`: of a record's two times the publish time is wanted, not the log time."""
+
+    def __init__(self, publish: bool = False) -> None:
+        self._time = kernel.PUBLISH_TIME if publish else kernel.LOG_TIME
+        self._tables: _Tables | None = None
+        self._in_vain = 0
+
+    def learn(self, bound: Mapping[int, Bound]) -> None:
+        """From now on channels (by id) are taken so; one that is not in here is not taken."""
+        given_up = self._in_vain >= _MOST_IN_VAIN or not any(bound.values())
+        self._tables = None if given_up else _tables(bound)
+
+    @property
+    def ready(self) -> bool:
+        """There is something to go by."""
+        return self._tables is not None
+
+    def take(self, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:
+        """All messages of a chunk; None where one of them is not as expected, or a definition is not known."""
+        tables = self._tables
+        if tables is None:
+            return None
+        taken = self._take(tables, content, rows, knows)
+        self._in_vain = max(0, self._in_vain + (1 if taken is None else -1))
+        return taken
+
+    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:  # noqa: C901  one check for each reason to read the chunk otherwise
+        first, limits = np.zeros(len(tables.bound), np.uint64), np.zeros(len(tables.bound), np.uint64)
+        for slot, (channel, bound) in enumerate(tables.bound.items()):
+            if bound is not None and channel in rows:
+                free = bound[1].free
+                if rows[channel].start < free.start or rows[channel].stop > free.stop:
+                    return None
+                first[slot], limits[slot] = rows[channel].start, rows[channel].stop
+        reached, last = first.copy(), np.zeros(len(first), np.uint64)
+        times = np.array([kernel.NO_DATE, 0, 0], np.uint64)
+        at, why = 0, kernel.DEFINITION
+        while why == kernel.DEFINITION:
+            at, why = kernel.take_messages(
+                words_of(content),
+                np.ndarray((max(0, len(content) - 3),), np.float32, content, strides=(1,)),
+                at,
+                len(content),
+                tables.slots,
+                tables.bounds,
+                tables.compared,
+                tables.mask,
+                tables.pattern,
+                tables.numbers,
+                tables.stamps,
+                self._time,
+                limits,
+                reached,
+                last,
+                times,
+            )
+            if why == kernel.DEFINITION:
+                begin = at + kernel.PREFIX
+                opcode, end = int(content[at]), begin + int.from_bytes(content[at + 1 : begin].tobytes(), "little")
+                if not knows(opcode, content[begin:end].tobytes()):
+                    return None
+                at = end
+        earliest, latest, first_time = times.tolist()
+        if why != kernel.DONE or earliest > latest or latest >= kernel.NO_DATE:
+            return None
+        counts, parts = {}, {}
+        for (channel, bound), begin, end, limit, stamp in zip(
+            tables.bound.items(), first.tolist(), reached.tolist(), limits.tolist(), last.tolist(), strict=True
+        ):
+            if bound is not None and end < limit:
+                return None
+            if end > begin:
+                counts[channel] = end - begin
+                if bound is not None:
+                    parts[channel] = Part(bound[1], slice(begin, end), stamp < kernel.NO_DATE)
+        return Taken(counts, parts, (earliest, latest), first_time)
+
+
+def _tables(bound: Mapping[int, Bound]) -> _Tables:
+    slots = np.full(max(bound, default=-1) + 1, -1, np.int64)
+    bounds = np.zeros((len(bound), kernel.BOUNDS), np.int64)
+    stamps = np.zeros(len(bound), np.uint64)
+    alike: list[Alike] = []
+    numbers: list[Words] = []
+    compared = end = 0
+    for slot, (channel, each) in enumerate(bound.items()):
+        slots[channel] = slot
+        if each is None:
+            continue
+        recipe, destination = each
+        stamps[slot] = destination.stamps.ctypes.data
+        stamp = (-1, 0) if recipe.stamp is None else (recipe.stamp.at, recipe.stamp.signed)
+        numbers.append(_numbers(recipe, destination))
+        begin, others = end, end + int(np.count_nonzero(numbers[-1][:, kernel.KIND] == kernel.DOUBLE))
+        end += len(numbers[-1])
+        places = compared, compared + len(recipe.alike.compared), begin, others, end
+        bounds[slot] = recipe.alike.shortest, recipe.alike.longest, *places, *stamp
+        alike.append(recipe.alike)
+        compared = places[1]
+    return _Tables(
+        dict(bound),
+        slots,
+        bounds,
+        np.concatenate([each.compared for each in alike]),
+        np.concatenate([each.mask for each in alike]),
+        np.concatenate([each.pattern for each in alike]),
+        np.concatenate(numbers),
+        stamps,
+    )
+
+
+def _numbers(recipe: Recipe, destination: Destination) -> Words:
+    """(k, kernel.NUMBER): float64 first."""
+    rows = []
+    for numbers, table in zip(recipe.fields, destination.tables, strict=True):
+        size = np.dtype(numbers.dtype).itemsize
+        kind = kernel.DOUBLE if numbers.dtype == "f8" else _KINDS[numbers.dtype[0]]
+        for element, at in enumerate(numbers.at):
+            word = min(at, recipe.alike.shortest - WORD)  # the last words of a message are read whole, too
+            bits = 8 * (WORD - size)
+            address = table.ctypes.data + element * WORD
+            rows.append((address, table.strides[0], at, kind, word, bits - 8 * (at - word), bits))
+    rows.sort(key=lambda row: row[kernel.KIND] != kernel.DOUBLE)
+    return np.array(rows, np.uint64).reshape(-1, kernel.NUMBER)

@@ -1,0 +1,285 @@
+"""A file's columns -> channels in SI: the same for every format.
+
+Times are cleaned (clock.clean_time), values scaled; saturated and infinite ones and those that no sensor gives are
+masked; warnings are reported, all at once. Nothing is resampled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
+from cdtool.dynamics import Machine
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.formats.source import Source
+from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
+from cdtool.plain_text import counted
+from cdtool.plausible import IMPOSSIBLE
+from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
+
+Counts = npt.NDArray[np.int64]
+
+
+def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
+    """The channels in SI as the machine logs them, not yet referred to the load side; the map's columns are resolved.
+
+    The columns are taken out of the source one after another: none is longer in memory than it is needed.
+    """
+    work = _Assembly(source, channels)
+    series = {}
+    for number, item in enumerate(channels.sources):
+        series[item.channel] = work.series(item)
+        work.drop(item, channels.sources[number + 1 :])
+    work.columns.clear()
+    for item in channels.sources:
+        if item.duty is not None:
+            if "N m" not in machine.accepted_units("torque"):
+                raise ConfigurationError(
+                    f"{source.path}: torque of kind 'duty' is a motor's, the machine file says coordinates = 'load'",
+                    "describe the machine in motor coordinates",
+                )
+            series[item.channel] = _torque_from_duty(source.path, item, series, channels.speed_low_pass)
+    return Recording(
+        name=source.path.stem,
+        source=str(source.path),
+        joints=channels.joints,
+        channels=series,
+        origin=work.origin,
+        findings=(
+            *source.findings,
+            *work.findings,
+            *stuck_findings({name: _constant(series[name]) for name in MEASURED if name in series}, channels.joints),
+            *apart_findings({name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}),
+        ),
+        digest=file_digest(source.path),
+    )
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+class _Assembly:
+    """The series of one file, with the findings made on the way."""
+
+    def __init__(self, source: Source, channels: ChannelMap) -> None:
+        self.source = source
+        self.channels = channels
+        self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
+        self.origin = source.origin
+        self.findings: list[Finding] = []
+        self.gaps: set[str] = set()  # what was said of the table's clock is not repeated for each channel
+        self.table: CleanTime | None = None
+        if not channels.topics:
+            self.table = self._table_clock()
+            self.findings += unit_findings(source, channels)
+
+    def drop(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
+        """Forget the columns of a channel that no later one is made of."""
+        needed = {key for other in later for key in other.keys}
+        for key in item.keys:
+            if key not in needed:
+                self.columns.pop(key, None)
+
+    def series(self, item: ChannelSource) -> Series:
+        """One channel: its values in SI at its own times."""
+        if self.table is None:
+            column = self.columns[item.keys[0]]
+            stamps = column.time if column.time is not None else np.empty(0)
+            clock = self._clean(stamps, f"{item.channel} time", sampled=item.channel != "event")
+            values = column.values
+        else:
+            clock = self.table
+            parts = [self.columns[key].values for key in item.keys]
+            values = parts[0] if len(parts) == 1 else np.column_stack(parts)
+        if not len(clock.time):
+            raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
+        scaled, masked = in_si(item, self._kept(item, values, clock.keep))
+        self.findings += masked.findings(item, self.channels.joints)
+        series = Series(clock.time, scaled, item.unit)
+        odd = gap_findings(series, item.channel, masked.total)
+        self.findings += [found for found in odd if found.message not in self.gaps]
+        return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
+
+    def _table_clock(self) -> CleanTime:
+        time = self.channels.time
+        if time.column is None:
+            rows = {len(column.values) for column in self.columns.values()}
+            return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
+        column = self.columns[time.key]
+        self.findings += check_clock_unit(self.source.path, time, column, self.origin)
+        self.findings += time_unit_findings(time, column, self.origin)
+        start = epoch_start(column.values, time.factor)
+        if start:
+            self.origin += start * time.factor
+        clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
+        if not len(clock.time):
+            raise RecordingError(
+                f"{self.source.path}: column '{column.name}' holds no time stamp", "see [channels] time"
+            )
+        told_gaps = gap_findings(Series(clock.time, np.zeros(len(clock.time)), "s"), "time")
+        self.gaps = {found.message for found in told_gaps}
+        self.findings += told_gaps
+        return clock
+
+    def _clean(
+        self, stamps: FloatArray, clock: str, *, counted: FloatArray | None = None, sampled: bool = True
+    ) -> CleanTime:
+        """The times of a clock's stamps [s]; what is odd about them is told under its name."""
+        first = self.source.first_row
+        row_name = "line" if first else "sample"
+        try:
+            clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
+        except RecordingError as fault:
+            raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
+        self.findings += [replace(found, channel=clock) for found in clean.findings]
+        return clean
+
+    def _kept(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
+        table = values.reshape(len(values), -1)
+        if len(table) != len(keep):
+            raise RecordingError(
+                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
+                f"its clock {len(keep)}",
+                "columns of one recording are equally long",
+            )
+        check_width(self.source.path, item, table.shape[1])
+        return table if keep.all() else table[keep]
+
+
+def check_width(path: Path, item: ChannelSource, width: int) -> None:
+    """Raise RecordingError where a channel's samples have not one value a joint."""
+    if width != len(item.factor):
+        raise RecordingError(
+            f"{path}: channel '{item.channel}' ({item.described}) gives {width} values "
+            f"a sample for {len(item.factor)} joints",
+            "name one element a joint, in the order of machine.joints",
+        )
+
+
+@dataclass(frozen=True)
+class Masked:
+    """How many values of each joint are masked: infinite, at the sensor's limit, and none that a sensor gives."""
+
+    infinite: Counts
+    saturated: Counts
+    impossible: Counts
+
+    def __add__(self, other: Masked) -> Masked:
+        return Masked(
+            self.infinite + other.infinite, self.saturated + other.saturated, self.impossible + other.impossible
+        )
+
+    def findings(self, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+        """The findings about them, by joint."""
+        kinds: tuple[tuple[Counts, str, Literal["warning", "loss"]], ...] = (
+            (self.infinite, "infinite", "loss"),
+            (self.saturated, "at the sensor's limit", "warning"),
+            (self.impossible, "outside the possible range", "loss"),
+        )
+        return [
+            Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)
+            for counts, what, severity in kinds
+            for j, count in enumerate(counts.tolist())
+            if count
+        ]
+
+    @property
+    def total(self) -> int:
+        """How many values are masked in all."""
+        return int(sum(counts.sum() for counts in (self.infinite, self.saturated, self.impossible)))
+
+
+def _counted(count: int, of: str) -> str:
+    return (
+        counted(count, "value", "are") if not of else f"{counted(count, 'value')}{of} {'is' if count == 1 else 'are'}"
+    )
+
+
+def of_joint(joints: Sequence[str], joint: int, count: int) -> str:
+    """ " of joint elbow" where a channel has several joints, else nothing."""
+    return f" of joint {joints[joint]}" if count > 1 else ""
+
+
+def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Masked]:
+    """(n, J) values of a channel in its SI unit, NaN where they are masked, and how many these are."""
+    infinite = np.isinf(values)
+    saturated = np.zeros_like(infinite)
+    if item.valid_range is not None:
+        low, high = item.valid_range
+        saturated = ((values <= low) | (values >= high)) & ~infinite
+    with np.errstate(over="ignore"):
+        scaled: FloatArray = values * np.array(item.factor)
+    beyond = (values < item.least) | (values > item.most)
+    if item.channel not in UNITLESS:
+        beyond |= np.abs(scaled) >= IMPOSSIBLE
+    beyond &= ~(infinite | saturated)
+    scaled[infinite | saturated | beyond] = np.nan
+    infinite, saturated, beyond = (np.count_nonzero(item, axis=0) for item in (infinite, saturated, beyond))
+    return scaled, Masked(infinite, saturated, beyond)
+
+
+def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
+    """tau = k_t (u - k_e omega) / R (thesis 6.2.2), omega being the motor's speed at or before each sample."""
+    duty, logged = item.duty, series[item.channel]
+    assert duty is not None
+    if "speed" in series and series["speed"].unit == "rad/s":
+        speed = series["speed"]
+    elif "position" in series and series["position"].unit == "rad" and "speed" not in series:
+        speed = differentiate(series["position"], low_pass, "rad/s")
+    else:
+        raise ConfigurationError(
+            f"{path}: torque of kind 'duty' needs the motor's speed [rad/s] or angle [rad]",
+            "map speed or position of the motor in [channels]",
+        )
+    voltage = logged.values * (duty.supply_voltage if logged.unit == "1" else 1.0)
+    omega = previous_value(speed, logged.time)
+    torque = duty.torque_constant * (voltage - duty.back_emf_constant * omega) / duty.resistance
+    return Series(logged.time, torque, "N m")
+
+
+def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]) -> list[Finding]:
+    """A measured channel that never changes while its joint moves; `constant`: joint by joint, a channel does not."""
+    found = []
+    for name in (item for item in MEASURED if item in constant):
+        others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
+        for joint, stands in enumerate(constant[name]):
+            if stands and not all(other[joint] for other in others):
+                which = of_joint(joints, joint, len(constant[name]))
+                found.append(Finding(f"the value{which} never changes while the machine moves: stuck?", name))
+    return found
+
+
+def apart_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Finding]:
+    """Channels on clocks of their own that have no time [s] in common: between them nothing can be compared.
+
+    What is logged at events only may lie beside the rest, by no more than the log is long.
+    """
+    spans = sorted((first, last, name) for name, (first, last) in first_and_last.items())
+    longest = max((end - start for start, end, _ in spans), default=0.0)
+    found = []
+    latest, before = (spans[0][1], spans[0][2]) if spans else (0.0, "")
+    for start, end, name in spans[1:]:
+        distance = start - latest
+        if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
+            text = f"begins {distance:.6g} s after {before} ends: their clocks have no time in common"
+            found.append(Finding(f"{text}; choose another clock in the machine file, or a time_offset", name))
+        if end > latest:
+            latest, before = end, name
+    return found
+
+
+def _constant(series: Series) -> list[bool]:
+    """Joint by joint: does it never change?"""
+    finite = (column[np.isfinite(column)] for column in series.values.T)
+    return [len(known) > 1 and bool(np.all(known == known[0])) for known in finite]

@@ -1,0 +1,197 @@
+"""Reading a recording: which format, which section of the machine file, one file or the parts of one log."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cdtool.channels import ChannelMap
+from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.file_kinds import kind_of
+from cdtool.formats import FORMATS
+from cdtool.formats.column_names import resolve_columns
+from cdtool.formats.csv.text import read_sample
+from cdtool.formats.source import Format, Source
+from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.own_clocks import with_own_clocks
+from cdtool.ingest.parts import joined_recordings, joined_sources, lost_parts
+from cdtool.logged_recording import LoggedRecording
+from cdtool.machine_file import MachineFile
+from cdtool.plausible import PlausibleRanges
+from cdtool.recording import Recording
+
+_KNOWN_CONTENTS = {
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8\xff": "a JPEG image",
+    b"GIF8": "a GIF image",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "a ZIP archive or an Excel workbook",
+    b"\x1f\x8b": "gzip-compressed",
+    b"(\xb5/\xfd": "zstd-compressed",
+    b"\x89HDF": "an HDF5 file",
+    b"SQLite format 3": "an SQLite database, but no ROS 2 bag",
+    b"<": "HTML or XML",
+    b"{": "JSON",
+    b"[": "JSON",
+}
+_NEXT_STEPS = {
+    "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
+    "gzip-compressed": "unpack it first, e.g. with gunzip",
+    "zstd-compressed": "unpack it first, e.g. with unzstd",
+}
+# UTF-32 first: its mark begins with that of UTF-16.
+_WIDE = {
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+
+
+def choose_format(path: Path) -> Format:
+    """The format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
+    head = _head(path)
+    suffix = path.suffix.lower()
+    for name in FORMATS.names():  # one by one: mostly the first fits, and the others need not be loaded
+        likely: Format = FORMATS.load(name)()
+        if suffix in likely.suffixes and likely.sniff(path):
+            return likely
+    formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+    by_suffix = [item for item in formats if suffix in item.suffixes]
+    # Almost any text can pass for a table: one that claims to be of another format must hold numbers.
+    claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
+    for item in [*by_suffix, *formats]:
+        if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+            return item
+    wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
+    start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+    seen = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+    seen = kind_of(head) or seen if seen == "JSON" else seen
+    if wide and not seen and _is_damaged_text(path, wide):
+        raise RecordingError(
+            f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it again from where it was made"
+        )
+    expected = f", nor a whole {by_suffix[0].name.upper()} file" if by_suffix and not seen else ""
+    raise RecordingError(
+        f"{path}: is not a recording{f': it is {seen}' if seen else expected}",
+        _NEXT_STEPS.get(seen, f"cdtool reads {', '.join(item.name for item in formats)}"),
+    )
+
+
+def survey(path: Path) -> Source:
+    """All numeric columns of a file, or of the folder that rosbag2 made, and its warnings; raises RecordingError."""
+    if path.is_dir():
+        return joined_sources(path, [choose_format(part).columns(part) for part in log_parts(path)])
+    return choose_format(path).columns(path)
+
+
+def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
+    """One log as a recording on the load side; raises RecordingError or ConfigurationError.
+
+    A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts. Values outside of `ranges` are masked.
+    """
+    return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
+
+
+def read_as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
+    """One log, or a folder of its parts, as it is logged; raises RecordingError or ConfigurationError."""
+    if not path.is_dir():
+        return read_parts([path], machine_file, path.stem)
+    parts = log_parts(path)
+    logged = read_parts(parts, machine_file, path.name)
+    findings = (*lost_parts(path, parts), *logged.recording.findings)
+    return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
+
+
+def log_parts(path: Path) -> list[Path]:
+    """The files of a log: itself, or those in the folder that rosbag2 made; raises RecordingError."""
+    for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
+        if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
+            return parts
+    if path.is_dir() and (lost := lost_parts(path, [])):
+        raise RecordingError(f"{path}: {lost[0]}", "copy the whole folder that rosbag2 made")
+    _head(path)
+    return [path]
+
+
+def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
+    """One file's columns that the machine file maps, and the map that fits them; raises RecordingError.
+
+    A load cell or label that is mapped and not in the file is left out of the map, with a note.
+    """
+    found = choose_format(path)
+    channels = _map(found, machine_file, path)
+    source, resolved = resolve_columns(found.columns(path, channels), channels)
+    return with_own_clocks(source, resolved)
+
+
+def has_topics(found: Format) -> bool:
+    """True where a format holds messages of topics, so that [channels.mcap] maps it; a plug-in need not tell."""
+    return bool(getattr(found, "topics", False))
+
+
+def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
+    """Return files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
+    parts: list[Recording] = []
+    low_pass, factors = 0.0, dict[str, tuple[float, ...]]()
+    for path in paths:
+        source, channels = mapped_source(path, machine_file)
+        low_pass = channels.speed_low_pass
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
+        parts.append(as_logged(source, channels, machine_file.machine))
+    joined = parts[0] if len(parts) == 1 and parts[0].name == name else joined_recordings(parts, name)
+    return LoggedRecording(joined, factors, low_pass)
+
+
+def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
+    topics = has_topics(found)
+    channels = machine_file.topics if topics else machine_file.columns
+    if not channels.sources:
+        section = "[channels.mcap]" if topics else "[channels]"
+        what = "topic and field" if topics else "column and unit"
+        raise ConfigurationError(
+            f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
+        )
+    return channels
+
+
+def _sniffs_any_text(found: Format) -> bool:
+    return bool(getattr(found, "sniffs_any_text", False))
+
+
+def _is_table(found: Format, path: Path) -> bool:
+    try:
+        return bool(found.columns(path).columns)
+    except RecordingError:
+        return False
+
+
+def _suffixes() -> set[str]:
+    return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
+
+
+def _is_damaged_text(path: Path, encoding: str) -> bool:
+    try:
+        codecs.getincrementaldecoder(encoding)().decode(read_sample(path))
+    except UnicodeError:
+        return True
+    return False
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
+        if not path.exists():
+            raise RecordingError(f"{path}: no such file", "check the path")
+        if not path.is_file():
+            raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
+        with path.open("rb") as file:
+            head = file.read(512)
+    except OSError as fault:
+        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
+    if not head:
+        raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
+    return head

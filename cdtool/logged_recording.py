@@ -1,0 +1,27 @@
+"""A log's channels before they are referred to the load side: what plausible ranges are learned from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cdtool.dynamics import Machine
+from cdtool.plausible import PlausibleRanges
+from cdtool.recording import Recording
+
+
+@dataclass(frozen=True)
+class LoggedRecording:
+    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers."""
+
+    recording: Recording
+    factors: Mapping[str, tuple[float, ...]]
+    speed_low_pass: float
+
+    def on_load_side(
+        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
+    ) -> Recording:
+        """The recording on the load side, made without the values that are outside of the plausible ranges."""
+        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
+        recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
+        return recording

@@ -1,0 +1,178 @@
+"""Reading JSON messages of a known shape: the text between the values is the same in all, the values are decoded.
+
+The shape is a row of tokens, each a text that must stand there and what follows it: a number (or true, false, null), a
+text without escapes, or the end. What fits is JSON with the same members (RFC 8259); what does not fit is left to
+others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.decimal_kernel import UNDECIDED, float_bits
+from cdtool.kernels import kernel
+from cdtool.messages.columns.gathered import ByteArray, IntArray
+
+VALUE, TEXT, END = 0, 1, 2
+OTHER, FITS, UNCLEAR = 0, 1, 2  # what becomes of a message; UNCLEAR: it fits, but Python must convert a number
+
+# Unsigned constants: a signed one beside an unsigned number would make a float of both.
+_0, _1, _4, _5, _7, _8, _9, _10, _16, _32, _48, _56, _63, _64 = map(
+    np.uint64, (0, 1, 4, 5, 7, 8, 9, 10, 16, 32, 48, 56, 63, 64)
+)
+_ZEROS, _SIXES, _HIGH = np.uint64(0x3030303030303030), np.uint64(0x4646464646464646), np.uint64(0x8080808080808080)
+_QUOTES, _SLASHES = np.uint64(0x2222222222222222), np.uint64(0x5C5C5C5C5C5C5C5C)
+_ONES, _SPACES = np.uint64(0x0101010101010101), np.uint64(0x2020202020202020)
+_PAIRS, _UPPER, _LOWER = np.uint64(0x000000FF000000FF), np.uint64(0x000F424000000064), np.uint64(0x0000271000000001)
+_NULL, _TRUE, _FALSE = (np.uint64(int.from_bytes(word)) for word in (b"null", b"true", b"false"))
+_NAN, _ONE = np.uint64(0x7FF8000000000000), np.uint64(0x3FF0000000000000)  # as float64
+_TENS = np.array([10**n for n in range(9)], dtype=np.uint64)
+_LARGEST = np.array([(2**64 - 10**n) // 10**n for n in range(9)], dtype=np.uint64)  # n digits more fit 64 bits
+_MOST_DIGITS = np.uint64(4000)  # Python bounds those of an int
+
+
+@kernel("uint64(uint64)")
+def _first(found: np.uint64) -> np.uint64:
+    """Which byte of a word is the first whose highest bit is set, the others being 0; 8 where none is."""
+    first: np.uint64 = ((((found & (~found + _1)) >> _7) - _1) & _ONES) * _ONES >> _56
+    return first
+
+
+@kernel(
+    "void(Array(uint8, 1, 'C', readonly=True), Array(uint64, 1, 'A', readonly=True, aligned=False), "
+    "Array(int64, 1, 'A', readonly=True), Array(int64, 1, 'A', readonly=True), uint8[::1], int64[:,::1], "
+    "Array(uint64, 2, 'C', readonly=True), uint64[:,::1], uint8[::1])"
+)
+def read_alike(
+    data: ByteArray,
+    words: npt.NDArray[np.uint64],
+    start: IntArray,
+    length: IntArray,
+    literals: ByteArray,
+    tokens: IntArray,
+    powers: npt.NDArray[np.uint64],
+    bits: npt.NDArray[np.uint64],
+    fits: ByteArray,
+) -> None:
+    """Fill `fits` (n,) and, where a message does, `bits` (n, columns) with the float64 of its wanted values.
+
+    `tokens` (m, 4): first byte and size of the literal before it, kind, column of a wanted value (-1: not wanted).
+    `words[p]` are the 8 bytes of `data` from p on. Eight digits at a time: Lemire 2021 (decimal_kernel.py).
+    """
+    for i in range(start.size):
+        p = np.uint64(start[i])
+        end = p + np.uint64(length[i])
+        fits[i] = OTHER
+        unclear = False
+        for t in range(tokens.shape[0]):
+            literal, size, kind, column = np.uint64(tokens[t, 0]), np.uint64(tokens[t, 1]), tokens[t, 2], tokens[t, 3]
+            if p + size > end:
+                break
+            differing = np.uint8(0)
+            for k in range(size):
+                differing = np.uint8(differing | np.uint8(data[p + k] ^ literals[literal + k]))
+            if differing:
+                break
+            p += size
+            if kind == END:
+                if p == end:
+                    fits[i] = UNCLEAR if unclear else FITS
+                break
+            if p >= end:
+                break
+            byte = data[p]
+            if kind == TEXT:
+                while p + _8 <= end:
+                    word = words[p]
+                    quote, slash = word ^ _QUOTES, word ^ _SLASHES
+                    found = ((quote - _ONES) & ~quote) | ((slash - _ONES) & ~slash) | ((word - _SPACES) & ~word)
+                    count = _first((found | word) & _HIGH)
+                    p += count
+                    if count != _8:
+                        break
+                while p < end:
+                    byte = data[p]
+                    if byte < 0x20 or byte >= 0x80 or byte == 0x22 or byte == 0x5C:
+                        break
+                    p += _1
+                continue  # the next literal begins with the closing quote
+            if byte >= 0x61:  # null, true, false
+                size = _5 if byte == 0x66 else _4
+                if p + size > end:
+                    break
+                word = _0
+                for k in range(size):
+                    word = word << _8 | data[p + k]
+                if word != _NULL and word != _TRUE and word != _FALSE:
+                    break
+                p += size
+                if column >= 0:
+                    bits[i, column] = _NAN if word == _NULL else _ONE if word == _TRUE else _0
+                continue
+            # -? (0 | [1-9][0-9]*) (. [0-9]+)? ([eE] [+-]? [0-9]+)?
+            negative = np.uint64(byte == 0x2D)
+            p += negative
+            w = _0
+            overflow = False
+            begin = p
+            whole = True
+            sound = False
+            after = p  # the point
+            while True:
+                # Of a fraction 8 digits at a time, and those that are left at once.
+                while not whole and p + _8 <= end:
+                    word = words[p]
+                    low = word - _ZEROS
+                    count = _first(((word + _SIXES) | low) & _HIGH)
+                    if count == _0:
+                        break
+                    low <<= _64 - _8 * count
+                    overflow = overflow or w > _LARGEST[count]
+                    low = low * _10 + (low >> _8)
+                    upper = (low & _PAIRS) * _UPPER
+                    lower = ((low >> _16) & _PAIRS) * _LOWER
+                    w = w * _TENS[count] + ((upper + lower) >> _32)
+                    p += count
+                    if count != _8:
+                        break
+                while p < end:
+                    digit = np.uint64(data[p]) - _48
+                    if digit > _9:
+                        break
+                    overflow = overflow or w > _LARGEST[1]
+                    w = w * _10 + digit
+                    p += _1
+                if not whole:
+                    break
+                sound = p > begin and (data[begin] != 0x30 or p == begin + _1)  # type: ignore[assignment]
+                if not sound or p >= end or data[p] != 0x2E:
+                    break
+                whole = False
+                p += _1
+                after = p
+            if not sound or (p - begin > _MOST_DIGITS if whole else p == after):
+                break
+            q = np.int64(0) if whole else np.int64(after) - np.int64(p)
+            if p < end and data[p] | 0x20 == 0x65:
+                whole = False
+                p += _1
+                down = p < end and data[p] == 0x2D
+                if down or (p < end and data[p] == 0x2B):
+                    p += _1
+                after = p
+                power = 0
+                while p < end:
+                    digit = np.uint64(data[p]) - _48
+                    if digit > _9:
+                        break
+                    power = min(power * 10 + np.int64(digit), 100000)  # type: ignore[assignment]
+                    p += _1
+                if p == after:
+                    break
+                q += -power if down else power
+            if column >= 0:
+                value = UNDECIDED if overflow else float_bits(w, q, powers)
+                unclear = unclear or value == UNDECIDED
+                # An int has no negative zero.
+                bits[i, column] = value if whole and w == _0 else value | negative << _63

@@ -1,0 +1,196 @@
+"""Messages with a schema: fields resolved against it once, then found and picked batch by batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.messages.batch import Batch
+from cdtool.messages.columns.by_name import NamedPlan, gather_by_name
+from cdtool.messages.columns.gathered import ByteArray, Gathered, IntArray
+from cdtool.messages.columns.pattern import Pattern
+from cdtool.messages.columns.picking import Plan, nowhere, pick
+from cdtool.messages.columns.recipes import recipe_of
+from cdtool.messages.columns.resolution import names_place, resolve
+from cdtool.messages.columns.slots import Found, Place
+from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError
+from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema
+from cdtool.messages.taken import Recipe
+
+_MOST_FIELDS = 4096
+_LATEST = 9_223_372_035  # s: an int64 of ns holds no more
+
+
+class Finder(Protocol):
+    """One encoding: where the places of a batch's messages are."""
+
+    def find(self, batch: Batch, places: tuple[Place, ...]) -> Found:
+        """The places, each asked for once."""
+        ...
+
+    def pattern(self, places: tuple[Place, ...]) -> Pattern | None:
+        """What the last messages had in common; None where they had nothing."""
+        ...
+
+
+@dataclass
+class TypedDecoder:
+    """A Decoder (gathered.py) for messages whose schema tells every field."""
+
+    schema: Schema
+    finder: Finder
+    _plans: dict[Field, Plan | NamedPlan | FieldMissingError] = field(default_factory=dict)
+
+    def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema tells them, whatever the messages are)
+        """Every numeric field but the header's stamp, in the order of the schema; of arrays those that may be short."""
+        found = []
+        for name in _numeric_names(self.schema, self.schema.root, "", ()):
+            found.append(name)
+            if len(found) >= _MOST_FIELDS:
+                break
+        return found
+
+    def gather(
+        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+    ) -> Gathered:
+        """The wanted fields of all messages; one that the schema does not have is absent in all, with its fault."""
+        plans = [self.plan(each) for each in wanted]
+        stamp = self.stamp_places() if stamps else ()
+        found = self.finder.find(batch, _places(plans, stamp))
+        parts = [self._gathered(plan, found, batch, joints) for plan in plans]
+        picked = tuple(part.picked[0] for part in parts)
+        status, reason = _damaged(found, parts)
+        if not stamps:
+            return Gathered(picked, status, reason)
+        times, there = stamp_times(found, stamp)
+        return Gathered(picked, status, reason, times, there)
+
+    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> Recipe | None:
+        """How more messages like the last ones become the same fields; None where they do not at once."""
+        plans = [plan for plan in (self.plan(each) for each in wanted) if isinstance(plan, Plan)]
+        stamp = self.stamp_places() if stamps else ()
+        if len(plans) < len(wanted) or (stamps and not stamp):
+            return None
+        pattern = self.finder.pattern(_places(plans, stamp))
+        return None if pattern is None else recipe_of(pattern, plans, joints, stamp)
+
+    def _gathered(
+        self, plan: Plan | NamedPlan | FieldMissingError, found: Found, batch: Batch, joints: Sequence[str]
+    ) -> Gathered:
+        """One field of all messages, and those that are damaged where only this field shows it."""
+        if isinstance(plan, FieldMissingError):
+            return Gathered((nowhere(len(batch), plan),), found.status, found.reason)
+        if isinstance(plan, Plan):
+            return Gathered((pick(plan, found, joints),), found.status, found.reason)
+
+        def gather(rows: IntArray, field: Field) -> Gathered:
+            return self.gather(_some(batch, rows), [field], joints)
+
+        return gather_by_name(plan, found, gather)
+
+    def names(self, batch: Batch, field: Field) -> list[str]:
+        """What the first ten messages call the elements of the field's array, sorted."""
+        plan = self.plan(field)
+        place = None if isinstance(plan, FieldMissingError) else plan.names
+        if place is None:
+            return []
+        found = self.finder.find(batch, (place,))
+        return sorted({name for row in np.flatnonzero(found.status == 0)[:10] for name in found.names[place].of(row)})
+
+    def element_names(self, batch: Batch) -> tuple[str, ...]:
+        """The array of texts `name` of the first message, in its order; empty where there is none."""
+        place = names_place(self.schema.root, ())
+        if place is None:
+            return ()
+        found = self.finder.find(batch.first(1), (place,))
+        return found.names[place].of(0) if len(found.rows) else ()
+
+    def plan(self, field: Field) -> Plan | NamedPlan | FieldMissingError:
+        """The field's place, or why the schema has none."""
+        if field not in self._plans:
+            try:
+                self._plans[field] = resolve(field, self.schema)
+            except FieldMissingError as fault:
+                self._plans[field] = fault
+        return self._plans[field]
+
+    def stamp_places(self) -> tuple[Place, ...]:
+        """Seconds and nanoseconds of the header's stamp; empty where the schema has none."""
+        header = self.schema.root.member("header")
+        stamp = self._inner(header, "stamp")
+        for names in STAMPS:
+            parts = [self._inner(stamp, name) for name in names]
+            if all(part is not None and isinstance(part.kind, Number) and part.array is None for part in parts):
+                return tuple(("header", "stamp", name) for name in names)
+        return ()
+
+    def _inner(self, member: Member | None, name: str) -> Member | None:
+        if member is None or member.array is not None or not isinstance(member.kind, Message):
+            return None
+        return self.schema.nested(member.kind).member(name)
+
+
+def _places(plans: Sequence[Plan | NamedPlan | FieldMissingError], stamp: tuple[Place, ...]) -> tuple[Place, ...]:
+    """All that plans and stamp need, each once."""
+    needed = (place for plan in plans if not isinstance(plan, FieldMissingError) for place in plan.places)
+    return tuple(dict.fromkeys((*needed, *stamp)))
+
+
+def _some(batch: Batch, rows: IntArray) -> Batch:
+    """The messages `rows` of a batch."""
+    if len(rows) == len(batch):
+        return batch
+    return Batch(batch.data, batch.start[rows], batch.length[rows], batch.log_time[rows])
+
+
+def _damaged(found: Found, parts: Sequence[Gathered]) -> tuple[ByteArray, str]:
+    """Which messages are damaged, also where only one field shows it, and why the first of them is."""
+    status, reason = found.status, found.reason
+    for part in parts:
+        more = (part.status != 0) & (status == 0)
+        if more.any():
+            first = not status.any() or np.argmax(more) < np.argmax(status != 0)
+            status, reason = np.maximum(status, part.status), part.reason if first else reason
+    return status, reason
+
+
+def _numeric_names(schema: Schema, layout: Layout, prefix: str, above: tuple[str, ...]) -> Iterator[str]:
+    if layout.name in above:  # protobuf's messages may hold themselves
+        return
+    for member in layout.members:
+        full = f"{prefix}{member.name}"
+        if full == "header.stamp":
+            continue
+        if isinstance(member.kind, Number):
+            if member.array is None:
+                yield full
+            elif (member.array.length or 0) <= LONGEST_ARRAY:
+                yield f"{full}[:]"
+        elif isinstance(member.kind, Message) and member.array is None:
+            yield from _numeric_names(schema, schema.nested(member.kind), f"{full}.", (*above, layout.name))
+
+
+def stamp_times(found: Found, places: tuple[Place, ...]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
+    """(n,) ns of seconds and nanoseconds at `places`, and where both are there; exact, as seconds below 2^53 are."""
+    n = len(found.status)
+    times = np.zeros(n, dtype=np.int64)
+    if not places:
+        return times, np.zeros(n, dtype=np.bool_)
+    seconds, nanoseconds = (found.slots[place] for place in places)
+    if found.whole and seconds.uniform == nanoseconds.uniform == 1:
+        rows = None
+    else:
+        rows = np.flatnonzero((found.status == 0) & (seconds.count == 1) & (nanoseconds.count == 1))
+    whole, rest = (slot.numbers(rows, 0, 1)[:, 0] for slot in (seconds, nanoseconds))
+    usable = (np.abs(whole) <= _LATEST) & (np.abs(rest) <= 2**53)
+    if rows is None and usable.all():
+        return whole.astype(np.int64) * 10**9 + rest.astype(np.int64), usable
+    rows = (np.arange(n) if rows is None else rows)[usable]
+    there = np.zeros(n, dtype=np.bool_)
+    there[rows] = True
+    times[rows] = whole[usable].astype(np.int64) * 10**9 + rest[usable].astype(np.int64)
+    return times, there

@@ -1,0 +1,145 @@
+"""Every numeric field of a topic, as `info` shows them, batch by batch."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.columns import Column, Piece
+from cdtool.distribution import Distribution
+from cdtool.errors import RecordingError
+from cdtool.large_integers import rounded_integers, rounding_finding
+from cdtool.messages.batch import Batch
+from cdtool.messages.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
+from cdtool.messages.decoders import Decoders
+from cdtool.messages.fields import Field, parse_field
+from cdtool.messages.gathering import in_order, tally
+from cdtool.messages.stamp_order import StampOrders
+from cdtool.messages.stream import Stream
+from cdtool.recording import Finding, FloatArray
+
+_LONGEST_ARRAY = 16
+# Messages times bytes of the longest: an image, too, is an array of numbers until its length is known, and each
+# number takes 8 bytes.
+_LONGEST_BATCH = 1 << 23
+
+
+class TopicSurvey:
+    """All fields of a topic's messages by log time, and how late they were logged."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.decoders = Decoders()
+        self._fields: dict[str, Field] = {}
+        self._widths: dict[str, Counter[int]] = {}
+        self._shapes: dict[str, tuple[int, ...]] = {}  # of a field's row, once a message holds it
+        self._late = Distribution()
+        self._orders = StampOrders(topic)
+        self._rounded: Counter[str] = Counter()
+        self._is_late = self._stamped = False
+
+    def pieces(self, stream: Stream, batch: Batch, origin: int) -> Iterator[Piece]:
+        """The messages of a batch with times after `origin` [ns], as far as they can be decoded."""
+        longest = int(batch.length.max()) if len(batch) else 1
+        some = max(1, _LONGEST_BATCH // max(1, longest))
+        for start in range(0, len(batch), some):
+            rows = slice(start, start + some)
+            part = Batch(batch.data, batch.start[rows], batch.length[rows], batch.log_time[rows])
+            if (piece := self._piece(stream, part, origin)) is not None:
+                yield piece
+
+    def _piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
+        decoder = self.decoders.of(stream, batch)
+        if decoder is None:
+            return None
+        fields = dict(self._fields)
+        for name in decoder.fields(batch):
+            if name not in fields and (parsed := _parsed(name)) is not None:
+                fields[name] = parsed
+        try:
+            gathered = decoder.gather(batch, list(fields.values()), stamps=True)
+        except UndecodableError as fault:
+            self.decoders.give_up(stream, batch, fault)
+            return None
+        self._widths |= {name: Counter() for name in fields.keys() - self._fields.keys()}
+        self._fields = fields
+        whole = self.decoders.keep(gathered)
+        self._add_stamps(batch, gathered, whole)
+        stamps = batch.log_time if whole.all() else batch.log_time[whole]
+        self._orders.add(stream.channel.id, stamps)
+        time, order = in_order(stamps, origin)
+        values: dict[str, FloatArray] = {}
+        for name, picked in zip(self._fields, gathered.picked, strict=True):
+            column = self._column(name, picked, whole)
+            if column is not None:
+                values[f"{self.topic} {name}"] = column if order is None else column[order]
+        return Piece(self.topic, time, values, len(time), origin / 1e9)
+
+    def _add_stamps(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> None:
+        if gathered.stamps is None or gathered.has_stamp is None:
+            return
+        stamped = whole & gathered.has_stamp
+        stamps = gathered.stamps[stamped]
+        late = (batch.log_time[stamped] - stamps.astype(np.uint64)).view(np.int64)
+        self._stamped = self._stamped or bool(stamps.any())
+        self._is_late = self._is_late or bool(late.any())
+        self._late.add(late / 1e6)
+
+    def _column(self, name: str, picked: Picked, whole: npt.NDArray[np.bool_]) -> FloatArray | None:
+        """The field's values, NaN where a message has none; None where no message so far has any."""
+        values, count, there = picked.values, picked.count, picked.state != ABSENT
+        if not whole.all():
+            values, there, count = values[whole], there[whole], None if count is None else count[whole]
+        widths = self._widths[name]
+        if count is not None:
+            there &= (count >= 0) & (count <= _LONGEST_ARRAY)
+            held = tally(count[there & (count > 0)])
+            if held:
+                self._shapes.setdefault(name, (next(iter(held)),))
+            widths.update(held)
+        elif there.any():
+            self._shapes.setdefault(name, ())
+            widths[1] += 1
+        if name not in self._shapes:
+            return None
+        if values.shape[1:] != self._shapes[name]:
+            return np.full((len(values), *self._shapes[name]), np.nan)
+        self._rounded[name] += rounded_integers(values)
+        if not there.all():
+            values = np.where(there.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
+        return values
+
+    def found(self) -> Iterator[Column | Finding]:
+        """Columns without rows, arrays whose length varies, messages that cannot be decoded."""
+        yield from self.decoders.failure(self.topic)
+        yield from self._orders.findings()
+        for name in self._fields:
+            widths, full = self._widths[name], f"{self.topic} {name}"
+            if len(widths) > 1:
+                text = f"arrays of {' and '.join(map(str, sorted(widths)))} elements: left out"
+                yield Finding(text, full, "note")
+            elif widths:
+                yield from rounding_finding(full, self._rounded[name], "note")
+                yield Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
+        yield from self._header()
+
+    def _header(self) -> Iterator[Finding]:
+        if not self._is_late:
+            return
+        if not self._stamped:
+            yield Finding("the header's stamps are never set: use the log clock", self.topic, "note")
+            return
+        low, median, high = (self._late.percentile(percent) for percent in (5, 50, 95))
+        text = f"logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
+        yield Finding(text, self.topic, "note")
+
+
+def _parsed(name: str) -> Field | None:
+    """A field by its name; None where the name itself holds what the field language is made of."""
+    try:
+        return parse_field(name, "")
+    except RecordingError:
+        return None

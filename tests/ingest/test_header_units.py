@@ -1,0 +1,161 @@
+"""A header's unit that contradicts the machine file, in kind or by a factor, is told; one that fits is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.channels import ChannelSource
+from cdtool.columns import Column
+from cdtool.ingest.header_units import channel_unit_findings
+from cdtool.ingest.reading import read_recording
+
+LOAD = """
+[machine]
+type = "{kind}"
+coordinates = "load"
+{inertia}
+"""
+LINEAR = LOAD.format(kind="linear_axis", inertia="load_mass = 50.0")
+ROTARY = LOAD.format(kind="rotary_axis", inertia="load_inertia = 1.0")
+
+
+def told(recording, channel):
+    return [item for item in recording.findings if item.channel == channel and "the header says" in item.message]
+
+
+def found(log, machine, machine_table, channel, header, stated):
+    """The findings on a channel whose column `x` has this header, where the machine file states `stated`."""
+    unit = "m/s" if "linear" in machine_table else "rad/s"
+    time = np.arange(30) * 0.01
+    rows = "".join(f"{t:.2f};{0.1 + t:.3f};{t:.3f}\n" for t in time)
+    speed = "" if channel == "speed" else f'speed = {{ column = "v", unit = "{unit}" }}\n'
+    text = f'[channels]\ntime = {{ column = "t", unit = "s" }}\n{speed}{channel} = {{ column = "x", {stated} }}\n'
+    path = log(f"t [s];x{f' [{header}]' if header else ''};v [{unit}]\n{rows}")
+    recording = read_recording(path, machine(text, machine_table))
+    assert channel == "speed" or told(recording, "speed") == []
+    return told(recording, channel)
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "header", "stated", "words"),
+    [
+        (LINEAR, "position", "mm", 'unit = "m"', 'the machine file m (a factor of 1000): write unit = "mm"'),
+        (LINEAR, "speed", "mm/s", 'unit = "m/s"', "a factor of 1000"),
+        (LINEAR, "force", "kN", 'unit = "N"', "'x [kN]', the machine file N (a factor of 1000)"),
+        (LINEAR, "force", "N", 'unit = "kN"', "a factor of 1000"),
+        (LINEAR, "acceleration", "g", 'unit = "m/s2", scale = -1', "a factor of 9.807"),
+        (ROTARY, "speed", "rpm", 'unit = "rad/s"', 'a factor of 9.549): write unit = "rpm"'),
+        (ROTARY, "speed", "1/min", 'unit = "rad/s"', 'write unit = "1/min"'),
+        (ROTARY, "position", "deg", 'unit = "rad"', "a factor of 57.3"),
+        (ROTARY, "torque", "mNm", 'unit = "N m"', "a factor of 1000"),
+        (ROTARY, "torque", "kNm", 'unit = "N m"', "a factor of 1000"),
+        (ROTARY, "torque", "mA", 'unit = "A", scale = 0.5', 'the machine file A (a factor of 1000): write unit = "mA"'),
+        (ROTARY, "torque", "A", 'unit = "N m"', 'the machine file N m: write unit = "A" with a scale in N m per A'),
+        (ROTARY, "torque", "Nm", 'unit = "A", scale = 0.5', 'write unit = "Nm" without that scale if the header'),
+        (ROTARY, "torque", "V", 'unit = "A", scale = 0.5', 'write unit = "V" with a scale in N m per V'),
+        (ROTARY, "torque", "%", 'unit = "1", scale = 20', "a factor of 100"),
+        (ROTARY, "position", "count", 'unit = "rad"', 'write unit = "count" with a scale in rad per count'),
+        (ROTARY, "torque", "mNm", 'unit = "N m", scale = 50', "a factor of 1000"),
+        (ROTARY, "speed", "Nm", 'unit = "rad/s"', "'x [Nm]', the machine file rad/s: is it another column?"),
+    ],
+    ids=lambda value: value if isinstance(value, str) and "[machine]" not in value and "factor" not in value else "",
+)
+def test_a_header_that_contradicts_the_machine_file_is_a_warning(log, machine, kind, channel, header, stated, words):
+    (finding,) = found(log, machine, kind, channel, header, stated)
+    assert words in finding.message
+    assert finding.severity == "warning"
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "header", "stated"),
+    [
+        (LINEAR, "position", "mm", 'unit = "mm"'),
+        (LINEAR, "position", "mm", 'unit = "m", scale = 0.001'),
+        (LINEAR, "position", "mm", 'unit = "m", scale = -0.001'),
+        (LINEAR, "acceleration", "m/s^2", 'unit = "m/s2", scale = -1'),
+        (LINEAR, "force", "kgf", 'unit = "N", scale = 9.81'),
+        (ROTARY, "speed", "1/min", 'unit = "rpm", scale = -1'),
+        (ROTARY, "speed", "rpm", 'unit = "rad/s", scale = 0.1047'),
+        (ROTARY, "torque", "Nm", 'unit = "N m", scale = 50'),
+        (ROTARY, "torque", "mA", 'unit = "mA", scale = 0.5'),
+        (ROTARY, "torque", "Nm", 'unit = "1", scale = 1'),
+        (ROTARY, "torque", "counts", 'unit = "1", scale = 0.1'),
+        (ROTARY, "torque", "bananas", 'unit = "N m"'),
+        (ROTARY, "torque", "", 'unit = "N m"'),
+        (ROTARY, "label", "V", "scale = 1"),
+        (ROTARY, "trigger", "mV", "scale = 0.2"),
+    ],
+    ids=lambda value: value if isinstance(value, str) and "[machine]" not in value else "",
+)
+def test_a_header_that_fits_or_says_nothing_is_not_told(log, machine, kind, channel, header, stated):
+    assert found(log, machine, kind, channel, header, stated) == []
+
+
+def test_a_unit_of_1_is_none_unless_the_machine_file_takes_the_value_for_a_share():
+    plain = Column("x", np.empty(0), unit="1")
+    torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
+    assert channel_unit_findings(torque, [plain]) == []
+    duty = ChannelSource("torque", ("x",), factor=(0.01,), unit="1", stated="%")
+    assert "a factor of 100" in channel_unit_findings(duty, [plain])[0].message
+
+
+def test_a_channel_of_joints_of_both_kinds_is_in_the_si_unit_of_each():
+    both = ChannelSource("position", ("a", "b"), factor=(1.0, 1.0), unit="SI", stated="SI")
+    columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]
+    assert channel_unit_findings(both, columns) == []
+    columns[0] = Column("a", np.empty(0), unit="deg")
+    assert "the header says 'a [deg]', the machine file SI" in channel_unit_findings(both, columns)[0].message
+
+
+def test_a_row_of_units_is_held_against_the_machine_file_too(log, machine):
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "pos", unit = "m" }\n'
+    rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
+    recording = read_recording(log(f"t;pos\ns;mm\n{rows}"), machine(channels, LINEAR))
+    assert "the header says 'pos [mm]', the machine file m" in told(recording, "position")[0].message
+
+
+def test_joints_that_are_wrong_alike_are_one_warning_and_others_are_none(log, machine):
+    channels = """
+[channels]
+time = { column = "t", unit = "s" }
+position = { columns = ["a", "b"], unit = "rad" }
+speed = { columns = ["c", "d"], unit = "rad/s" }
+"""
+    rows = "".join(f"{0.01 * k:.2f};{k};{2 * k};{3 * k};{4 * k}\n" for k in range(30))
+    recording = read_recording(
+        log(f"t [s];a [deg];b [deg];c [rad/s];d [rpm]\n{rows}"), machine(channels, ROTARY + 'joints = ["a", "b"]\n')
+    )
+    assert ["'a [deg]' and 1 more so" in item.message for item in told(recording, "position")] == [True]
+    assert ["'d [rpm]'" in item.message for item in told(recording, "speed")] == [True]
+
+
+@pytest.mark.parametrize(
+    ("header", "time", "words"),
+    [
+        ("ms", 'unit = "s"', 'the machine file s (a factor of 1000): write unit = "ms"'),
+        ("mm", 'unit = "s"', "'t [mm]', the machine file s: is it another column?"),
+        ("ms", "rate_hz = 100", "the machine file counts samples at 100 Hz (a factor of 10)"),
+        ("ms", "rate_hz = 1000", ""),
+        ("count", "rate_hz = 100", ""),
+        ("s", 'unit = "s"', ""),
+    ],
+)
+def test_the_clocks_unit_is_held_against_the_machine_file(log, machine, header, time, words):
+    channels = f'[channels]\ntime = {{ column = "t", {time} }}\nposition = {{ column = "x", unit = "m" }}\n'
+    rows = "".join(f"{k};{k}\n" for k in range(30))
+    findings = told(read_recording(log(f"t [{header}];x [m]\n{rows}"), machine(channels, LINEAR)), "time")
+    assert len(findings) == bool(words)
+    assert all(words in item.message for item in findings)
+
+
+def test_each_column_on_a_clock_of_its_own_has_its_unit_compared(tmp_path, machine):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        for name, unit, values in (("time", "s", 0.01 * np.arange(30)), ("pos", "mm", np.arange(30.0))):
+            file[f"drive/{name}"] = values
+            file[f"drive/{name}"].attrs["unit"] = unit
+    channels = '[channels]\ntime = { column = "time", unit = "s" }\nposition = { column = "drive/pos", unit = "m" }\n'
+    recording = read_recording(path, machine(channels, LINEAR))
+    assert "the header says 'drive/pos [mm]', the machine file m" in told(recording, "position")[0].message

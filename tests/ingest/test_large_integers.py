@@ -1,0 +1,120 @@
+"""Numbers of more digits than float64: a clock is exact to the nanosecond, anything else is counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdtool.formats.csv import Csv
+from cdtool.formats.pieces import joined
+from cdtool.ingest.reading import read_recording
+from cdtool.large_integers import rounded_integers
+from tests.formats.conftest import COLUMNS
+
+EPOCH = 1_700_000_000_123_456_789
+
+
+def said(source) -> list[str]:
+    return [str(finding) for finding in source.findings if "2^53" in finding.message]
+
+
+def written(ns: int, unit: str, mark: str = ".") -> str:
+    """The stamp in that unit with all its digits."""
+    decimals = {"s": 9, "ms": 6, "us": 3, "ns": 0}[unit]
+    return str(ns) if not decimals else f"{ns // 10**decimals}{mark}{ns % 10**decimals:0{decimals}d}"
+
+
+def same(time: np.ndarray, nanoseconds) -> bool:
+    """Seconds as they are, but for the last bit of the factor that leads there."""
+    return len(time) == len(nanoseconds) and np.allclose(time, np.array(nanoseconds) / 1e9, rtol=4e-16, atol=0.0)
+
+
+def clock_in(unit: str) -> str:
+    return COLUMNS.replace('"ms"', f'"{unit}"')
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "], ids=["comma", "semicolon", "tab", "blank"])
+@pytest.mark.parametrize("at", [0, 2], ids=["first", "last"])
+def test_stamps_since_1970_keep_every_nanosecond(log, machine, unit, separator, at):
+    stamps = EPOCH + np.cumsum(np.random.default_rng(3).integers(900_001, 1_100_003, 500))
+    names, rows = ["i_motor", "n_motor"], []
+    names.insert(at, "t")
+    for i, stamp in enumerate(stamps.tolist()):
+        row = ["1.5", f"{i}.25"]
+        row.insert(at, written(stamp, unit, "," if separator == ";" else "."))
+        rows.append([cell.replace(".", ",") if separator == ";" else cell for cell in row])
+    text = "\n".join(separator.join(row) for row in [names, *rows]) + "\n"
+    recording = read_recording(log(text), machine(clock_in(unit)))
+    assert same(recording["speed"].time, stamps - stamps[0])
+    assert recording.origin == stamps[0] / 1e9
+    assert not said(recording)
+
+
+def test_rows_that_are_none_shift_no_stamp(log, machine, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 256)
+    stamps = [EPOCH + 1_000_001 * i for i in range(200)]
+    lines = [f"{stamp},1,{i}" for i, stamp in enumerate(stamps)]
+    lines[150:150] = ["# a comment", "", "t,i_motor,n_motor"]
+    lines[60:60] = ["", "", "# another one"]
+    lines[20] = '"' + lines[20].replace(",", '","') + '"'
+    text = "t,i_motor,n_motor\n# units unknown\n" + "\n".join(lines) + "\n"
+    time = read_recording(log(text), machine(clock_in("ns")))["speed"].time
+    differences = np.array(stamps) - EPOCH
+    assert time[20] == pytest.approx(differences[20] / 1e9, abs=2e-7)  # in quotes: as float64 has it
+    assert same(np.delete(time, 20), np.delete(differences, 20))
+
+
+def test_a_missing_stamp_and_one_with_an_exponent_lose_nothing_of_the_others(log, machine):
+    stamps = [str(EPOCH + 1_000_001 * i) for i in range(20)]
+    stamps[4], stamps[9] = "", "1.700000000132456e18"
+    text = "t,i_motor,n_motor\n" + "".join(f"{stamp},1,{i}\n" for i, stamp in enumerate(stamps))
+    recording = read_recording(log(text), machine(clock_in("ns")))
+    assert same(np.delete(recording["speed"].time, 8), [1_000_001 * i for i in range(20) if i not in (4, 9)])
+    assert recording["speed"].time[8] == pytest.approx(0.009000, abs=1e-6)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    first=st.integers(10**17, 9 * 10**18),
+    steps=st.lists(st.integers(1, 10**10), min_size=4, max_size=40),
+    unit=st.sampled_from(["s", "ms", "us", "ns"]),
+    last=st.booleans(),
+)
+def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit, last):
+    stamps = [first + sum(steps[:i]) for i in range(len(steps) + 1)]
+    rows = "".join(f"{i}.5,{written(x, unit)},1\n" for i, x in enumerate(stamps))
+    path = log("n_motor,t,i_motor\n" + (rows if last else rows[:-1]))
+    time = read_recording(path, machine(clock_in(unit)))["speed"].time
+    assert same(time, [stamp - first for stamp in stamps[: len(time)]])
+    assert len(time) >= len(stamps) - (not last)
+
+
+def test_without_a_machine_file_rounded_stamps_are_counted(log):
+    text = "stamp,x\n" + "".join(f"{EPOCH + i},{i}\n" for i in range(30))
+    for source in (Csv().columns(log(text)), joined(Csv().pieces(log(text)), sort=False)):
+        assert said(source) == [
+            "stamp: 30 values beyond 2^53: of integers that large the last digits are rounded to float64"
+        ]
+
+
+def test_a_column_that_is_no_clock_is_counted_with_a_machine_file_too(log, machine):
+    rows = "".join(f"{i},1,{2**53 + 2 * i - 4}\n" for i in range(8))
+    recording = read_recording(log("t,i_motor,n_motor\n" + rows), machine())
+    assert said(recording)[0].startswith("n_motor: 5 values beyond 2^53")
+
+
+@pytest.mark.parametrize(
+    ("values", "count"),
+    [
+        ([0.0, 2.0**53, -(2.0**53)], 0),
+        ([2.0**53 + 2, -(2.0**53) - 2, 2.0**64], 3),
+        ([1e20, -1e300, np.inf, np.nan], 0),
+        ([], 0),
+    ],
+    ids=["exact", "rounded", "no 64 bits", "none"],
+)
+def test_what_64_bits_hold_and_float64_does_not_is_counted(values, count):
+    assert rounded_integers(np.array(values)) == count

@@ -1,0 +1,230 @@
+"""A log in parts, as rosbag2 splits one: surveyed as one, and what its metadata.yaml names in vain."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.errors import RecordingError
+from cdtool.formats.mcap.write import Stream, write_mcap
+from cdtool.ingest.parts import lost_parts
+from cdtool.ingest.reading import log_parts, read_recording, survey
+from cdtool.machine_file import read_machine_file
+
+START = 1_700_000_000
+MACHINE = """[machine]
+type = "linear_axis"
+coordinates = "load"
+
+[channels.mcap]
+speed = { topic = "/speed", field = "data" }
+"""
+
+
+def write_part(path: Path, time: np.ndarray, values: np.ndarray, topics: tuple[str, ...] = ("/speed",)) -> Path:
+    streams = [Stream(topic, "std_msgs/msg/Float64", time, {"data": values}) for topic in topics]
+    write_mcap(path, streams, start_ns=START * 10**9)
+    return path
+
+
+def bag(folder: Path, count: int = 3, rows: int = 100) -> Path:
+    """`count` parts of a second each, numbered as rosbag2 does: the tenth sorts before the second."""
+    folder.mkdir(exist_ok=True)
+    for number in range(count):
+        time = number + np.arange(rows) / rows
+        write_part(folder / f"bag_{number}.mcap", time, time)
+    return folder
+
+
+def metadata(folder: Path, text: str) -> None:
+    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  version: 5\n{text}  message_count: 3\n")
+
+
+def machine(folder: Path):
+    (folder / "machine.toml").write_text(MACHINE)
+    return read_machine_file(folder / "machine.toml")
+
+
+def losses(findings) -> list[str]:
+    return [str(finding) for finding in findings if finding.severity == "loss"]
+
+
+@settings(max_examples=15, deadline=None)
+@given(cuts=st.lists(st.integers(0, 200), max_size=4), order=st.permutations(range(5)), seed=st.integers(0, 2**32 - 1))
+def test_a_log_cut_anywhere_is_surveyed_as_the_whole_one(tmp_path_factory, cuts, order, seed):
+    folder = tmp_path_factory.mktemp("cut")
+    values = np.random.default_rng(seed).normal(size=200)
+    time = np.arange(200) / 128.0
+    edges = [0, *sorted(cuts), 200]
+    (folder / "bag").mkdir()
+    for i, (first, last) in enumerate(pairwise(edges)):
+        write_part(folder / "bag" / f"{order[i]}.mcap", time[first:last], values[first:last])
+    whole = survey(write_part(folder / "whole.mcap", time, values))
+    parts = survey(folder / "bag")
+    assert parts.path == folder / "bag" and parts.format == "mcap" and parts.names == whole.names
+    assert parts.origin == whole.origin == START
+    column, expected = parts.columns["/speed data"], whole.columns["/speed data"]
+    np.testing.assert_array_equal(column.values, expected.values)
+    # A part's origin is an epoch in float64, of which the last digit is 0.24 us.
+    np.testing.assert_allclose(column.time, expected.time, rtol=0.0, atol=5e-7)
+    assert parts.details["/speed"] == whole.details["/speed"]
+    assert {item.message.partition(": ")[2] for item in parts.findings} <= {"holds no message"}
+
+
+def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
+    source = survey(bag(tmp_path / "bag", count=11))
+    time = source.columns["/speed data"].time
+    assert np.all(np.diff(time) > 0.0) and len(time) == 1100
+    assert source.details["parts"] == "11, bag_0.mcap to bag_10.mcap"
+    assert source.details["/speed"].endswith(", 1100 messages")
+
+
+def test_a_topic_that_only_some_parts_hold_is_surveyed_from_these(tmp_path):
+    folder = bag(tmp_path / "bag", count=2)
+    time = 2.0 + np.arange(50) / 50
+    write_part(folder / "bag_2.mcap", time, time, ("/speed", "/event"))
+    source = survey(folder)
+    assert len(source.columns["/speed data"].values) == 250
+    np.testing.assert_allclose(source.columns["/event data"].time, time, rtol=0.0, atol=5e-7)
+
+
+def test_a_part_that_begins_before_the_last_one_ends_is_put_in_order_and_told(tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for number in (0, 1):
+        time = 0.5 * number + np.arange(100) / 100 + 0.001 * number
+        write_part(folder / f"bag_{number}.mcap", time, time)
+    source = survey(folder)
+    column = source.columns["/speed data"]
+    assert np.all(np.diff(column.time) > 0.0)
+    np.testing.assert_allclose(column.values, column.time, rtol=0.0, atol=5e-7)
+    assert [str(item) for item in source.findings] == [
+        "bag_1.mcap begins before the part before it ends (/speed data): put in the order of the times"
+    ]
+
+
+def test_an_array_whose_length_changes_from_part_to_part_is_left_out_and_told(tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for number in (0, 1):
+        time = number + np.arange(10) / 10
+        fields = {"position": np.ones((10, 2 + number))}
+        stream = Stream("/joints", "sensor_msgs/msg/JointState", time, fields)
+        write_mcap(folder / f"bag_{number}.mcap", [stream], start_ns=START * 10**9)
+    source = survey(folder)
+    assert "/joints position[:]" not in source.columns
+    assert "/joints position[:]: arrays of 2 and 3 elements: left out" in map(str, source.findings)
+
+
+def test_what_is_odd_about_a_part_is_told_with_its_name(tmp_path):
+    folder = bag(tmp_path / "bag")
+    whole = (folder / "bag_2.mcap").read_bytes()
+    (folder / "bag_2.mcap").write_bytes(whole[:-40])
+    told = losses(survey(folder).findings)
+    assert told and all("bag_2.mcap: " in text for text in told)
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [
+        "  relative_file_paths:\n    - bag_0.mcap\n    - bag_1.mcap\n    - bag_2.mcap\n    - bag_3.mcap\n",
+        "  relative_file_paths:\n  - bag_0.mcap\n\n  # one more\n  - bag_1.mcap\n  - bag_2.mcap # it\n  - bag_3.mcap\n",
+        "  relative_file_paths: [bag_0.mcap, bag_1.mcap,\n    'bag_2.mcap', \"bag_3.mcap\"]\n",
+        "  relative_file_paths:\n  - 'b/bag_0.mcap'\n  - \"b/bag_1.mcap\"\n  - b/bag_2.mcap\n  - b/bag_3.mcap\n",
+    ],
+    ids=["block", "block with comments", "flow", "with the folder, as the first versions"],
+)
+def test_a_part_that_metadata_names_and_that_is_not_there_is_a_loss(tmp_path, listed):
+    folder = bag(tmp_path / "bag")
+    metadata(folder, listed)
+    lost = ["part bag_3.mcap of metadata.yaml is not in the folder"]
+    assert losses(survey(folder).findings) == lost
+    assert losses(read_recording(folder, machine(tmp_path)).findings) == lost
+
+
+def test_the_last_of_two_parts_that_is_gone_is_a_loss_too(tmp_path):
+    folder = bag(tmp_path / "bag", count=1)
+    metadata(folder, "  relative_file_paths:\n    - bag_0.mcap\n    - bag_1.mcap\n")
+    assert losses(survey(folder).findings) == ["part bag_1.mcap of metadata.yaml is not in the folder"]
+
+
+def test_a_part_that_is_compressed_as_a_file_is_told_unless_it_is_there_decompressed_too(tmp_path):
+    folder = bag(tmp_path / "bag")
+    metadata(folder, "".join(["  relative_file_paths:\n", *(f"  - bag_{i}.mcap.zstd\n" for i in range(3))]))
+    assert losses(survey(folder).findings) == []
+    (folder / "bag_1.mcap").rename(folder / "bag_1.mcap.zstd")
+    assert losses(survey(folder).findings) == [
+        "part bag_1.mcap.zstd of metadata.yaml is compressed as a whole: decompress it, e.g. with zstd -d"
+    ]
+
+
+def test_a_part_of_another_kind_than_those_that_are_read_is_a_loss(tmp_path):
+    folder = bag(tmp_path / "bag", count=1)
+    (folder / "bag_1.db3").write_bytes(b"SQLite format 3\0")
+    metadata(folder, "  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.db3\n")
+    assert losses(survey(folder).findings) == [
+        "part bag_1.db3 of metadata.yaml is left out: the folder holds parts of another kind too"
+    ]
+
+
+def test_a_folder_none_of_whose_parts_is_there_is_refused_with_the_first_of_them(tmp_path):
+    metadata(tmp_path, "  relative_file_paths:\n  - bag_0.db3\n")
+    for read in (survey, log_parts):
+        with pytest.raises(RecordingError, match=r"part bag_0\.db3 of metadata\.yaml is not in the folder") as fault:
+            read(tmp_path)
+        assert "\n" not in str(fault.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "relative_file_paths:", "relative_file_paths: [", "relative_file_paths: none", "\0\xff" * 50, "- a\n- b\n"],
+    ids=["empty", "no item", "an open list", "a word", "bytes", "another list"],
+)
+def test_metadata_that_cannot_be_understood_says_nothing(tmp_path, text):
+    folder = bag(tmp_path / "bag", count=1)
+    (folder / "metadata.yaml").write_bytes(text.encode("latin-1"))
+    assert lost_parts(folder, log_parts(folder)) == []
+
+
+def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    number = store.types["std_msgs/msg/Float64"]
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for part in (0, 1):
+        with Writer(tmp_path / f"bag_{part}", version=8) as writer:
+            connection = writer.add_connection("/speed", number.__msgtype__, typestore=store)
+            for k in range(50):
+                stamp = START * 10**9 + (50 * part + k) * 10**7
+                writer.write(connection, stamp, store.serialize_cdr(number(50.0 * part + k), number.__msgtype__))
+        (tmp_path / f"bag_{part}" / f"bag_{part}.db3").rename(folder / f"bag_{part}.db3")
+    metadata(folder, "  relative_file_paths:\n  - bag_0.db3\n  - bag_1.db3\n  - bag_2.db3\n")
+    source = survey(folder)
+    assert source.details["/speed"] == "std_msgs/msg/Float64, 100 messages"
+    np.testing.assert_array_equal(source.columns["/speed data"].values, np.arange(100.0))
+    assert losses(source.findings) == ["part bag_2.db3 of metadata.yaml is not in the folder"]
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.01, 5.0])
+def test_a_pause_between_two_parts_is_told(tmp_path, pause):
+    folder = tmp_path / "log"
+    folder.mkdir()
+    for number in range(3):
+        time = number + np.arange(100) / 100 + pause * (number == 2)
+        write_part(folder / f"bag_{number}.mcap", time, time)
+    findings = read_recording(folder, machine(tmp_path)).findings
+    told = [str(finding) for finding in findings if "nothing is logged between" in str(finding)]
+    if pause < 5.0:
+        assert not told
+    else:
+        (only,) = told
+        assert "bag_2.mcap: begins 5.01 s after the part before it ends: nothing" in only

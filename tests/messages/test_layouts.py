@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import pytest
+
+from cdtool.messages.columns import UndecodableError, decoder_for
+from cdtool.messages.layouts.layout import Array, Message, Number, SchemaError, Text
+from cdtool.messages.layouts.ros2msg import parse_ros2msg
+from cdtool.messages.schemas import DEFINITIONS
+from tests.messages.batches import batch_of, fields_of
+
+RULE = "=" * 80
+
+
+def members(text):
+    return parse_ros2msg("test_msgs/msg/Thing", text.encode()).root.members
+
+
+def test_types_arrays_defaults_constants_and_comments_are_told_apart():
+    found = members(
+        "# Thing\nint32 FIVE=5\nstring TEXT='a # b'\nfloat64 a 1.5\nstring<=10 b \"x = y\"\nint8[3] c [1, 2, 3]\n"
+        "float32[<=4] d\nstring<=3[<=2] e\nbyte f  # comment\nchar g\nwstring h\n\tbool[] i"
+    )
+    assert [(member.name, member.kind, member.array) for member in found] == [
+        ("a", Number("float64"), None),
+        ("b", Text(), None),
+        ("c", Number("int8"), Array(3)),
+        ("d", Number("float32"), Array()),
+        ("e", Text(), Array()),
+        ("f", Number("uint8"), None),
+        ("g", Number("uint8"), None),
+        ("h", Text(wide=True), None),
+        ("i", Number("bool"), Array()),
+    ]
+
+
+def test_nested_types_are_found_by_their_full_and_their_short_name():
+    text = f"Inner a\ntest_msgs/Inner b\ntest_msgs/msg/Inner[] c\n{RULE}\nMSG: test_msgs/msg/Inner\nint8 x"
+    assert [member.kind for member in members(text)] == [Message("test_msgs/Inner")] * 3
+    assert members("builtin_interfaces/Time stamp")[0].kind == Message("builtin_interfaces/Time")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("not ? a definition", "is not a field"),
+        ("float64", "is not a field"),
+        ("float64 a,b", "is not a field"),
+        ("float65 a", "type 'float65' of test_msgs/Thing.a is not defined"),
+        ("float64[0] a", "is not understood"),
+        ("float64[<=] a", "is not understood"),
+        ("float64<=3 a", "only strings have a bound"),
+        ("int8 a\nint8 a", "two fields 'a'"),
+        ("Thing a", "holds itself"),
+        (f"A a\n{RULE}\nMSG: test_msgs/A\nB b\n{RULE}\nMSG: test_msgs/B\nA a", "holds itself"),
+        (f"A a\n{RULE}\nint8 x", "instead of MSG:"),
+        (f"A a\n{RULE}\nMSG: test_msgs/A\nint8 x\n{RULE}\nMSG: test_msgs/A\nint16 x", "defined twice, differently"),
+        ("int64 a\n---\nint64 sum", "of a service or action"),
+        ("\udcff", "not UTF-8"),
+    ],
+)
+def test_a_text_that_is_no_message_definition_is_refused_with_what_is_wrong_in_it(text, problem):
+    with pytest.raises(SchemaError, match=problem.replace("?", r"\?")):
+        parse_ros2msg("test_msgs/msg/Thing", text.encode(errors="surrogateescape"))
+
+
+@pytest.mark.parametrize(
+    ("message", "schema", "text"),
+    [
+        ("cdr", "ros2idl", "schema encoding 'ros2idl' is not read"),
+        ("protobuf", "", "no schema is not read"),
+        ("flatbuffer", "flatbuffer", "message encoding 'flatbuffer'"),
+        ("cdr", "ros1msg", "message encoding 'cdr' with schema encoding 'ros1msg'"),
+    ],
+)
+def test_other_encodings_are_refused_by_name(message, schema, text):
+    with pytest.raises(UndecodableError, match=text):
+        decoder_for(message, schema, "a/b", b"")
+
+
+def test_a_survey_names_every_number_but_the_headers_stamp():
+    def fields(name):
+        return decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode()).fields(batch_of([]))
+
+    assert fields("geometry_msgs/msg/WrenchStamped") == [f"wrench.{a}.{b}" for a in ("force", "torque") for b in "xyz"]
+    assert fields("sensor_msgs/msg/JointState") == ["position[:]", "velocity[:]", "effort[:]"]
+    assert fields("std_msgs/msg/Float64MultiArray") == ["layout.data_offset", "data[:]"]
+    assert "orientation_covariance[:]" in fields("sensor_msgs/msg/Imu")
+    assert decoder_for("cdr", "ros2msg", "a/b", b"float64[17] a\nfloat64[16] b").fields(batch_of([])) == ["b[:]"]
+
+
+@pytest.mark.parametrize(
+    ("field", "problem", "known"),
+    [
+        ("wrench.forces.z", "there is no 'forces'", ("force", "torque")),
+        ("wrench.force", "'wrench.force' holds a geometry_msgs/Vector3, not a number", ()),
+        ("header.frame_id", "'header.frame_id' holds a text, not a number", ()),
+        ("wrench.force.z[0]", "'z' is not an array", ("z",)),
+        ("wrench.force.z.x", "there is no 'x'", ()),
+    ],
+)
+def test_a_field_that_the_schema_does_not_have_is_told_with_those_that_it_has(field, problem, known):
+    name = "geometry_msgs/msg/WrenchStamped"
+    found = decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode())
+    (picked,) = found.gather(batch_of([b"\0\1\0\0" + bytes(64)]), fields_of(field)).picked
+    assert (picked.fault.problem, picked.fault.known) == (problem, known)
+    assert picked.state.tolist() == [2]
