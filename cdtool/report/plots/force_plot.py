@@ -37,6 +37,11 @@ _WHOLE = 0.99
 _PIXELS = 700
 _UNSEEN = HATCHES[Status.GAP]
 _ORDER = ("fail", "not_assessable", "pass")
+# The first part of the time axis [s] is the shortest of these that shows what happens; what follows is compressed.
+_VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
+_VIEW_SHARE = 0.72
+_TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+_MOST_TICKS = 8.01
 
 
 @dataclass(frozen=True)
@@ -234,13 +239,6 @@ def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]
         text = f"alarm {label(name, 24)}"
         handles.append(Line2D([], [], color=look.colour, marker=look.marker, linestyle="none", label=text))
     return handles
-
-
-# The first part of the time axis [s] is the shortest of these that shows what happens; what follows is compressed.
-_VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
-_VIEW_SHARE = 0.72
-_TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-_MOST_TICKS = 8.01
 
 
 def _time_nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -> list[float]:
