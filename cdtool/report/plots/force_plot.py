@@ -19,14 +19,13 @@ from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save
-from cdtool.report.plots.limit_labels import LineLabel, place_labels
+from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _WORST = "#A3123F"
 _EMPHASISED = 6
