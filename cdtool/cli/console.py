@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import Detected
     from cdtool.workflows.runs import Progress
 
-
 _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140
 _NARROWEST, _WIDEST = 60, 100
