@@ -26,7 +26,8 @@ from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
 from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.detection_options import DetectionOptions, by_keywords
+from cdtool.workflows.detection_options import DetectionOptions
+from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
 from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
