@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
@@ -28,6 +27,7 @@ from cdtool.report.markdown.figures import (
 )
 from cdtool.report.markdown.text import Section, Table, escape, fitted
 from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, verdict_words
+from cdtool.report.writers.base import Image
 
 # Room for the verdict and how to read the figures, whatever names there are.
 _LEAST = 4_000
@@ -65,15 +65,6 @@ _BUDGET = ("detector", "allowed", "safety factor set", "alarms with it", "operat
 _GAINS = ("detector", "gains", "SHA-256 of its threshold")
 _RECORDING = ("recording", "group", "contacts", "operations", "length [s]", "campaign", "test point", "SHA-256")
 _Rows = Sequence[Sequence[object]]
-
-
-@dataclass(frozen=True)
-class Image:
-    """A figure beside the report: its file name, caption, and group (None: of all groups)."""
-
-    name: str
-    caption: str
-    group: str | None = None
 
 
 def to_markdown(evaluated: Evaluated, images: Sequence[Image] = (), most: int = 60_000) -> str:

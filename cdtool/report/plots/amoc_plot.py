@@ -23,6 +23,7 @@ from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
 from cdtool.report.plots.side_table import Column, SideTable, key_height
 from cdtool.report.plots.style import BAND, look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -297,3 +298,12 @@ def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:
     if floored and any(point.median < FLOOR_MS for point in points):
         words.append(f"medians below {FLOOR_MS:.0f} ms are drawn there")
     return "; ".join(words)
+
+
+def write_amoc(report: Report, folder: Path) -> list[Image]:
+    """Draw amoc.png for a report folder, where limits were moved; raises CdtoolError (see `save`)."""
+    if not report.evaluated.results.sweep:
+        return []
+    image = Image("amoc.png", "median latency against false alarms, with the limits of each detector moved")
+    plot_amoc(report.evaluated, folder / image.name)
+    return [image]

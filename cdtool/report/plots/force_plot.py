@@ -14,13 +14,16 @@ import numpy as np
 
 from cdtool.detection import Status
 from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.traced import TracedForce, force_profiles, traced_forces
 from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
+from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
-from cdtool.report.plots.figures import drawing, label, new_figure, save
+from cdtool.report.plots.figures import drawing, label, new_figure, save, slug
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -276,3 +279,38 @@ def _rounded_up(time: float) -> float:
     """To two digits, for the axis's last label."""
     digit = 10.0 ** (math.floor(math.log10(time)) - 1)
     return round(math.ceil(time / digit - 1e-9) * digit, 9)
+
+
+def write_forces(report: Report, folder: Path) -> list[Image]:
+    """Draw forces.png for a report folder, forces_<profile>.png with several profiles; raises CdtoolError (see `save`).
+
+    Only where there are force limits and curves.
+    """
+    results = report.evaluated.results
+    curves = traced_forces(results, report.traces)
+    used = {name: [item for item in curves if item.verdict.profile == name] for name in force_profiles(results)}
+    shown = {name: items for name, items in used.items() if items}
+    images, taken = [], set[str]()
+    for name, items in shown.items():
+        file = "forces.png" if len(shown) == 1 else f"forces_{slug(name, taken)}.png"
+        judged = sum(row.profile == name for row in results.forces)
+        images.append(Image(file, _force_caption(results, name, len(items), judged)))
+        plot_forces(_panels(items), force_profiles(results)[name], folder / file)
+    return images
+
+
+def _force_caption(results: Results, profile: str, drawn: int, judged: int) -> str:
+    caption = f"contact force over time against {profile}"
+    if drawn < judged:
+        caption += f": the {drawn} of {judged} contacts whose curves were kept"
+    if results.provenance.get("mass_before_cell_kg"):
+        caption += "; curves as the load cell saw them, verdicts corrected for the mass before it"
+    return caption
+
+
+def _panels(items: Sequence[TracedForce]) -> list[ForcePanel]:
+    groups: dict[str, list[ForceCurve]] = {}
+    for item in items:
+        name = item.recording if item.contact == 1 else f"{item.recording}, contact {item.contact}"
+        groups.setdefault(item.group, []).append(ForceCurve(name, item.time, item.force, item.verdict, item.alarms))
+    return [ForcePanel(group, tuple(curves)) for group, curves in groups.items()]
