@@ -89,7 +89,7 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
 
     `may_replace(folder)` says whether everything in an existing folder may go; it raises where nothing may be written
     there. Where not everything may go, and where a folder cannot be exchanged (a mount point, the current folder, a
-    file system without _exchange), each file takes the place of its namesake and the others stay. Raises as `replaced`.
+    file system without exchange), each file takes the place of its namesake and the others stay. Raises as `replaced`.
     """
     target = resolved(path)
     if target.exists() and not target.is_dir():
@@ -221,7 +221,7 @@ def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
 
 
 def _put_whole(part: Path, target: Path) -> bool:
-    """Let a folder take its place; False where the file system cannot _exchange it for the one that is there."""
+    """Let a folder take its place; False where the file system cannot exchange it for the one that is there."""
     if not target.exists():
         part.rename(target)
         return True
