@@ -178,7 +178,7 @@ def _unpacked(content: bytes) -> Iterator[bytes]:
         raise ContentError(f"{len(stream.unused_data)} bytes after its end")
 
 
-def _check_toml(text: str) -> None:  # noqa: C901  one count for each bound, in one pass over the tokens
+def _check_toml(text: str) -> None:
     """Raise ContentError for what tomllib would need far more memory, time or stack for than a person's file."""
     depth = dots = entries = escapes = 0
     for number, token in enumerate(_TOML_TOKEN.finditer(text)):
@@ -189,11 +189,9 @@ def _check_toml(text: str) -> None:  # noqa: C901  one count for each bound, in 
             raise ContentError(f"more than {_MOST_TOML_ENTRIES} keys or {_MOST_TOML_WORDS} words")
         if kind == "unclosed":
             raise ContentError(f"a text begins {_line(text, token)} and does not end")
-        if kind in (None, "text", "lines"):
-            continue
-        if kind == "word":
-            if len(found) > _MOST_WORD:
-                raise ContentError(f"a number or key of {len(found)} characters {_line(text, token)}")
+        if kind == "word" and len(found) > _MOST_WORD:
+            raise ContentError(f"a number or key of {len(found)} characters {_line(text, token)}")
+        if kind in (None, "text", "lines", "word"):
             continue
         if found == ".":
             dots += 1

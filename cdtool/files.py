@@ -20,11 +20,13 @@ from pathlib import Path
 
 from cdtool.errors import CdtoolError, OutputError, UsageError
 from cdtool.file_locks import holding, release_all, temporary_name
-from cdtool.folder_swap import exchange, has_to_stay
 from cdtool.plain_text import plain
 
 _BINARY = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 _temporaries: set[Path] = set()
+_HERE = -100  # AT_FDCWD
+_EXCHANGE = 2  # RENAME_EXCHANGE
+_UNABLE = (errno.ENOSYS, errno.EINVAL, errno.EXDEV, errno.EBUSY, errno.EOPNOTSUPP, errno.EPERM)
 
 
 @contextmanager
@@ -94,7 +96,7 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
         raise UsageError(f"{plain(path)}: exists and is not a folder", "choose another name")
     if target.exists() and not os.access(target, os.W_OK | os.X_OK):
         raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
-    whole = not has_to_stay(target) and (may_replace is None or not target.exists() or may_replace(target))
+    whole = not _has_to_stay(target) and (may_replace is None or not target.exists() or may_replace(target))
     place = target.parent if whole else target
     part = temporary_name(target, place)
     with made_folder(target.parent), _explained(path, [(part, path)]), holding(target, place, path):
@@ -224,7 +226,7 @@ def _put_whole(part: Path, target: Path) -> bool:
         part.rename(target)
         return True
     part.chmod(stat.S_IMODE(target.stat().st_mode))
-    return exchange(part, target)
+    return _exchange(part, target)
 
 
 def _flush(path: Path) -> None:
@@ -261,3 +263,30 @@ def _remove(path: Path) -> None:
 atexit.register(clean_up)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_temporaries.clear)  # they are the parent's
+
+
+def _exchange(first: Path, second: Path) -> bool:
+    """Exchange two folders by one call (Linux: renameat2); False where system or file system cannot; raises OSError."""
+    import ctypes
+
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    if call(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0:
+        return True
+    fault = ctypes.get_errno()
+    if fault in _UNABLE:
+        return False
+    raise OSError(fault, os.strerror(fault), str(second))
+
+
+def _has_to_stay(folder: Path) -> bool:
+    """An existing folder that must not be renamed: a mount point, the current folder, or one in a read-only folder."""
+    if not folder.is_dir():
+        return False
+    try:
+        inside = Path(os.path.realpath(Path.cwd())).is_relative_to(folder)
+    except FileNotFoundError:  # the current folder is gone
+        inside = False
+    return inside or folder.is_mount() or not os.access(folder.parent, os.W_OK | os.X_OK)

@@ -7,13 +7,14 @@ channels as they are logged, in SI, before anything is derived from them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
 
-from cdtool.leaps import Leap, behind_leaps
 from cdtool.plain_text import counted
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
 
@@ -38,6 +39,11 @@ _SPIKE, _SPIKE_SAMPLES = {"acceleration": 20.0}, 3
 _SPIKE_ELSE = 5.0
 # The share of samples and of runs that may be broken without moving a range.
 _SHARE, _RUNS = 0.99, 0.8
+# Within so many samples from its begin a log may begin with what is wrong.
+_EDGE = 3
+# From a new zero a position moves on once it has kept within so many reaches of the usual ones for so long [s], and has
+# moved by this share of the reach.
+_AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
 
 
 @dataclass(frozen=True)
@@ -212,11 +218,11 @@ def _leapt(
     step = np.abs(np.diff(values[index]))
     if known.rate > 0.0:
         is_leap = step > np.maximum(known.reach, _FASTER * known.rate * np.diff(time[index]))
-        found, leaps = behind_leaps(time[index], values[index], is_leap, known.reach, (centre, known.reach))
+        found, leaps = _behind_leaps(time[index], values[index], is_leap, known.reach, (centre, known.reach))
     else:
         near = 0.5 * _WRAP * abs(factor)
         is_leap = (step >= 2.0 * near) & (near > _FAR_ENDS * known.reach)
-        found, leaps = behind_leaps(time[index], values[index], is_leap, near, None)
+        found, leaps = _behind_leaps(time[index], values[index], is_leap, near, None)
     wrong = np.zeros(len(values), dtype=bool)
     wrong[index[found]] = True
     return wrong, leaps
@@ -243,3 +249,64 @@ def _leap_words(leaps: Sequence[Leap], masked: int, unit: str, joint: str) -> st
         text += f"; read from a new zero from {zeros[0]:.3f} s on"
         text += f", and at {counted(len(zeros) - 1, 'more time')}" if len(zeros) > 1 else ""
     return text
+
+
+@dataclass(frozen=True)
+class Leap:
+    """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values count as they are, NaN if never."""
+
+    time: float
+    before: float
+    after: float
+    new_zero: float = math.nan
+
+
+def _behind_leaps(
+    time: FloatArray, values: FloatArray, is_leap: BoolArray, near: float, usual: tuple[float, float] | None
+) -> tuple[BoolArray, list[Leap]]:
+    """Return True (n,) for the values behind a leap, and the leaps; `is_leap` (n - 1,): the steps that are one.
+
+    A value is back where it is within `near` of the one before the leap. With `usual` (centre and reach) a position may
+    have been set to a new zero too: one that is reset stands among the usual positions and moves on there,
+    which one that reads nothing does not. Causal, but for a log that begins with what is wrong.
+    """
+    wrong = np.zeros(len(values), dtype=bool)
+    leaps = []
+    end, places = 0, np.flatnonzero(is_leap).tolist()
+    for number, at in enumerate(places):
+        if at < end:
+            continue
+        leap = Leap(float(time[at + 1]), float(values[at]), float(values[at + 1]))
+        if at < _EDGE and end == 0 and len(values) > 2 * _EDGE:
+            wrong[: at + 1] = True
+            leaps.append(leap)
+            end = at + 2
+            continue
+        end, moves_on = _end(time, values, [*places[number:], len(values) - 1], near, usual)
+        wrong[at + 1 : end] = True
+        new_zero = float(time[end]) if moves_on else math.nan
+        leaps.append(Leap(leap.time, leap.before, leap.after, new_zero))
+    return wrong, leaps
+
+
+def _end(
+    time: FloatArray, values: FloatArray, leaps: Sequence[int], near: float, usual: tuple[float, float] | None
+) -> tuple[int, bool]:
+    """The first value behind `leaps[0]` that counts again, and whether from a new zero; the last row ends `leaps`."""
+    before = values[leaps[0]]
+    for first, last in pairwise(leaps):
+        part = slice(first + 1, last + 1)
+        back = np.abs(values[part] - before) <= near
+        on = _moves_on(time[part], values[part], *usual) if usual else np.zeros_like(back)
+        if (back | on).any():
+            found = int(np.argmax(back | on))
+            return first + 1 + found, not back[found]
+    return len(values), False
+
+
+def _moves_on(time: FloatArray, values: FloatArray, centre: float, reach: float) -> BoolArray:
+    """True (n,) where the values behind a leap have kept among the usual ones so far, and have moved."""
+    among = np.logical_and.accumulate(np.abs(values - centre) <= _AMONG * reach)
+    moved = np.abs(values - values[0]) >= _MOVED * reach
+    on: BoolArray = among & moved & (time - time[0] >= _SETTLED)
+    return on

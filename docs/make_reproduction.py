@@ -22,8 +22,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
 from cdtool.report.plots.detection_plot import plot_detected
 from cdtool.report.plots.figures import drawing, new_figure, save
-from cdtool.report.plots.folder_figures import most_telling
-from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.plots.trigger_plot import most_telling, plot_triggers
 from cdtool.signature_store import write_signature
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings

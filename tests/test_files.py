@@ -229,7 +229,7 @@ def test_where_a_folder_cannot_go_as_a_whole_its_files_are_replaced_and_the_othe
     (target / "a.md").write_text("old")
     (target / "other").write_text("mine")
     if why == "no exchange":
-        monkeypatch.setattr(files, "exchange", lambda *_: False)
+        monkeypatch.setattr(files, "_exchange", lambda *_: False)
     if why == "current folder":
         monkeypatch.chdir(target)
     with replaced_folder(target, lambda _: why != "not everything may go") as part:

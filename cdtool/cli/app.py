@@ -1,4 +1,4 @@
-"""The app: one command a file, and the one place where a known error becomes one line and an exit status."""
+"""The app: the table of commands, and the one place where a known error becomes one line and an exit status."""
 
 from __future__ import annotations
 
@@ -9,60 +9,78 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections import UserDict
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from cdtool.cli.benchmark import benchmark
-from cdtool.cli.compare import compare
-from cdtool.cli.convert import convert
-from cdtool.cli.detect import detect
-from cdtool.cli.explain import explain
-from cdtool.cli.info import info
-from cdtool.cli.init import init
-from cdtool.cli.learn_signature import learn_signature
-from cdtool.cli.list_known import list_known
-from cdtool.cli.plan import plan
-from cdtool.cli.recover import recover
-from cdtool.cli.report import report
-from cdtool.cli.score import score
-from cdtool.cli.signature import signature
-from cdtool.cli.simulate import simulate
 from cdtool.cli.streams import lost_output, open_standard_streams
-from cdtool.cli.study import study
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
 from cdtool.plain_text import one_line
 
+COMMANDS: Mapping[str, str] = {
+    "info": "cdtool.cli.info:info",
+    "init": "cdtool.cli.init:init",
+    "learn-signature": "cdtool.cli.learn_signature:learn_signature",
+    "detect": "cdtool.cli.detect:detect",
+    "explain": "cdtool.cli.explain:explain",
+    "benchmark": "cdtool.cli.benchmark:benchmark",
+    "report": "cdtool.cli.report:report",
+    "score": "cdtool.cli.score:score",
+    "compare": "cdtool.cli.compare:compare",
+    "plan": "cdtool.cli.plan:plan",
+    "convert": "cdtool.cli.convert:convert",
+    "recover": "cdtool.cli.recover:recover",
+    "list": "cdtool.cli.list_known:list_known",
+    "signature": "cdtool.cli.signature:signature",
+    "simulate": "cdtool.cli.simulate:simulate",
+    "study": "cdtool.cli.study:study",
+}
+"""Every command, in the order of the help: the function with its options, or the app with its subcommands."""
+
+# In typer's default mode the help loses what stands in brackets, such as units.
+_LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
+
+
+class _Commands(UserDict[str, Any]):
+    """The commands by name. Each is imported when it is asked for: running one reads the options of no other."""
+
+    def __getitem__(self, name: str) -> Any:
+        if isinstance(self.data[name], str):
+            self.data[name] = _load_command(name, self.data[name])
+        return self.data[name]
+
+
+def _load_command(name: str, place: str) -> Any:
+    module, _, attribute = place.partition(":")
+    command = getattr(import_module(module), attribute)
+    group = typer.Typer(add_completion=False, **_LOOK)
+    group.callback()(lambda: None)  # without a callback typer makes no group of a single command
+    if isinstance(command, typer.Typer):
+        group.add_typer(command, name=name)
+    else:
+        group.command(name, epilog=statuses_words(name))(command)
+    return typer.main.get_group(group).commands[name]
+
+
+class _CommandGroup(TyperGroup):
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = _Commands(COMMANDS)
+
+
 app = typer.Typer(
     name="cdtool",
+    cls=_CommandGroup,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",  # in its default the help loses what stands in brackets, such as units
+    **_LOOK,
 )
-for command in (
-    info,
-    init,
-    learn_signature,
-    detect,
-    explain,
-    benchmark,
-    report,
-    score,
-    compare,
-    plan,
-    convert,
-    recover,
-    list_known,
-):
-    name = "list" if command is list_known else command.__name__.replace("_", "-")
-    app.command(name, epilog=statuses_words(name))(command)
-app.add_typer(signature, name="signature")
-app.add_typer(simulate, name="simulate")
-app.add_typer(study, name="study")
 
 _WHAT_FOR = "How fast, how surely and at which force does a machine notice that it has hit something?"
 # What a service manager or a pipeline sends to end a command, and a terminal that is closed.
@@ -159,7 +177,7 @@ def _run_app(came: list[int]) -> Any:
         raise
 
 
-def _main(came: list[int]) -> None:  # noqa: C901  one branch for each way to end
+def _main(came: list[int]) -> None:
     open_standard_streams()
     # What imports make stays: searching it for garbage is a tenth of a short command.
     gc.set_threshold(50_000, 10, 10)
@@ -171,35 +189,45 @@ def _main(came: list[int]) -> None:  # noqa: C901  one branch for each way to en
             raise CdtoolError(f"standard output: {fault.strerror}", "what was printed is incomplete: check the space")
         status = status if isinstance(status, int) else status_of([])
         sys.exit(status)
-    except CdtoolError as fault:
-        from cdtool.cli.console import print_error
-
-        print_error(fault)
-        sys.exit(status_of([Fact.WRONG_USAGE]))
     except SystemExit as end:
         if end.code == ExitStatus.INTERRUPTED:
             typer.echo("interrupted", err=True)
         elif end.code in {128 + number for number in _ENDING}:
             typer.echo("terminated", err=True)
         raise
-    except OSError as fault:
-        from cdtool.cli.console import print_error
-
-        where = f"{fault.filename}: " if fault.filename else ""
-        print_error(CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space"))
-        sys.exit(status_of([Fact.NOTHING_USABLE]))
-    except MemoryError:
-        from cdtool.cli.console import print_error
-
-        print_error(CdtoolError("not enough memory", "fewer or shorter logs, a smaller --jobs, or more memory"))
-        sys.exit(status_of([Fact.NOTHING_USABLE]))
     except (KeyboardInterrupt, typer.Abort):
         typer.echo("interrupted", err=True)
         sys.exit(status_of([Fact.INTERRUPTED]))
     except Exception as fault:
-        if isinstance(fault, _CLICK_ERROR):
-            _print_usage_error(fault)
-            sys.exit(status_of([Fact.WRONG_USAGE]))
+        sys.exit(status_of([_show_fault(fault)]))
+
+
+def _show_fault(fault: Exception) -> Fact:
+    """Print why a command has failed, in one line where the reason is known; returns what its exit status is by."""
+    if isinstance(fault, _CLICK_ERROR):
+        _print_usage_error(fault)
+        return Fact.WRONG_USAGE
+    known = _known_fault(fault)
+    if known is None:
         # Python would end with 1, which means a violated limit to a pipeline.
-        traceback.print_exc()
-        sys.exit(status_of([Fact.INTERNAL_ERROR]))
+        traceback.print_exception(fault)
+        return Fact.INTERNAL_ERROR
+    from cdtool.cli.console import print_error
+
+    error, fact = known
+    print_error(error)
+    return fact
+
+
+def _known_fault(fault: Exception) -> tuple[CdtoolError, Fact] | None:
+    if isinstance(fault, CdtoolError):
+        return fault, Fact.WRONG_USAGE
+    if isinstance(fault, OSError):
+        where = f"{fault.filename}: " if fault.filename else ""
+        error = CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space")
+        return error, Fact.NOTHING_USABLE
+    if isinstance(fault, MemoryError):
+        return CdtoolError(
+            "not enough memory", "fewer or shorter logs, a smaller --jobs, or more memory"
+        ), Fact.NOTHING_USABLE
+    return None

@@ -8,12 +8,12 @@ import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.cli.column_blocks import GAP, ColumnWidth, blocks, column_width
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
 from cdtool.evaluation.results import Skipped
@@ -33,6 +33,10 @@ _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140
 _NARROWEST, _WIDEST = 60, 100
 _PIPE = 160
+# Between two columns [characters].
+_GAP = 2
+# Sentences are wrapped at words, but to no less than this where they are longer [characters].
+_LEAST_SENTENCE = 30
 
 
 def print_error(fault: CdtoolError) -> None:
@@ -148,13 +152,13 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
     width = (
         max(shutil.get_terminal_size().columns, _NARROWEST)
         if is_terminal
-        else max(_PIPE, sum(item.needed + GAP for item in widths))
+        else max(_PIPE, sum(item.needed + _GAP for item in widths))
     )
-    for number, block in enumerate(blocks(widths, width)):
+    for number, block in enumerate(column_blocks(widths, width)):
         made: Table = RichTable(
-            box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, GAP, 0, 0)
+            box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, _GAP, 0, 0)
         )
-        fits = sum(widths[i].needed + GAP for i in block) <= width
+        fits = sum(widths[i].needed + _GAP for i in block) <= width
         for i in block:
             heading, side = shown[i]
             is_right = side == "right"
@@ -210,3 +214,39 @@ def _bare(item: Skipped) -> str:
     from cdtool.workflows.runs import DAMAGED
 
     return item.reason.removeprefix(DAMAGED).removeprefix(f"{item.recording}: ")
+
+
+@dataclass(frozen=True)
+class ColumnWidth:
+    """One column: `needed` characters, which words alone keep of a sentence, `natural` ones of its longest cell."""
+
+    is_name: bool
+    needed: int
+    natural: int
+
+
+def column_width(heading: str, side: str, cells: Sequence[str], leading: bool) -> ColumnWidth:
+    """Return the width of a column; a left one that is not `leading` holds sentences."""
+    lines = [*heading.split("\n"), *cells]
+    natural = max(map(len, lines), default=0)
+    if side == "right" or leading:
+        return ColumnWidth(leading, natural, natural)
+    words = max((len(word) for line in lines for word in line.split()), default=0)
+    return ColumnWidth(False, max(words, min(natural, _LEAST_SENTENCE)), natural)
+
+
+def column_blocks(columns: Sequence[ColumnWidth], width: int) -> list[list[int]]:
+    """Return the columns of each table to print below another: the names first in each, then as many as fit."""
+    names = [i for i, column in enumerate(columns) if column.is_name]
+    base = sum(columns[i].needed + _GAP for i in names)
+    made: list[list[int]] = []
+    room = 0
+    for i, column in enumerate(columns):
+        if i in names:
+            continue
+        if not made or column.needed + _GAP > room:
+            made.append(list(names))
+            room = width - base
+        made[-1].append(i)
+        room -= column.needed + _GAP
+    return made or [list(names)]

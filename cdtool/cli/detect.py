@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,12 +21,14 @@ from cdtool.evaluation.results import Skipped
 from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
+    from cdtool.pipeline import Detection
     from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
+    from cdtool.workflows.detection_options import DetectionOptions
 
 
 @with_options
-def detect(  # noqa: C901  the whole command, from its options to its exit status
+def detect(
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     options: LogOptions,
     contact_at: Annotated[
@@ -44,54 +49,79 @@ def detect(  # noqa: C901  the whole command, from its options to its exit statu
     """
     from cdtool.files import made_folder
     from cdtool.workflows.contact_force import ContactPoint, summarise_force
-    from cdtool.workflows.detection import detect_log
-    from cdtool.workflows.runs import absent_truth, lost
 
     settings = options.settings()
     prepared, machine_file = settings.prepared(), settings.machine_file()
     contact = ContactPoint.parse(contact_at) if contact_at else None
-    plot_names = _plot_names(plot, logs, force=force)
-    done: list[tuple[Path, Detected]] = []
-    forces: dict[str, ForceSummary] = {}
-    skipped: list[Skipped] = [*prepared.skipped] if prepared else []
+    run = _Run(
+        settings,
+        _plot_names(plot, logs, force=force),
+        partial(summarise_force, machine=machine_file.machine, contact=contact) if contact else None,
+        skipped=[*prepared.skipped] if prepared else [],
+    )
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
     with folder, progress("detecting") as advance:
         for i, log in enumerate(logs, 1):
             try:
-                found = detect_log(log, settings)
-                if contact:
-                    made = [summarise_force(item, machine_file.machine, contact) for item in found.detections]
-                    forces |= {item.operation: item for item in made}
-                done.append((log, found))
-                skipped += [*lost(found.recording), *found.not_scored]
-                if plot_names:
-                    from cdtool.report.plots.detection_plot import plot_detected
-
-                    plot_detected(found, plot_names[log])
+                run.add(log)
             except CdtoolError as fault:
                 # What is wrong with the call, the signature or the disk is wrong for every log.
                 if len(logs) == 1 or isinstance(fault, UsageError | SignatureError | OutputError):
                     raise
-                skipped.append(Skipped(str(log), str(fault)))
+                run.skipped.append(Skipped(str(log), str(fault)))
             if advance:
                 advance(i, len(logs))
-    if not done:
-        for item in skipped:
+    if not run.done:
+        for item in run.skipped:
             print_error(CdtoolError(item.reason))
         leave(facts=[Fact.NOTHING_USABLE])
-    taught = "the signature was learned from it: no alarm here shows nothing"
-    learned = [Skipped(str(log), taught) for log, found in done if found.learned]
-    absent = [Skipped(str(log), str(item)) for log, found in done for item in absent_truth(found.recording)]
-    warnings = [item for _, found in done for item in found.warnings]
-    print_skipped(skipped, [*learned, *warnings], [*(note for _, found in done for note in found.notes), *absent])
-    if as_json:
-        print_json(as_rows(done, forces))
-    else:
-        show_detected([found for _, found in done], forces)
-        for log, _ in done:
-            if log in plot_names:
-                typer.echo(f"plot written to {plain(plot_names[log])}")
-    leave(skipped, print_not_assessable((str(log), found) for log, found in done))
+    run.show(as_json=as_json)
+
+
+@dataclass
+class _Run:
+    """Detection in several logs: what is done for each, and what came of those so far."""
+
+    settings: DetectionOptions
+    plot_names: Mapping[Path, Path]
+    estimate_force: Callable[[Detection], ForceSummary] | None
+    skipped: list[Skipped]
+    done: list[tuple[Path, Detected]] = field(default_factory=list)
+    forces: dict[str, ForceSummary] = field(default_factory=dict)
+
+    def add(self, log: Path) -> None:
+        """Detect in one log, and draw its plot; raises CdtoolError."""
+        from cdtool.workflows.detection import detect_log
+        from cdtool.workflows.runs import lost
+
+        found = detect_log(log, self.settings)
+        if self.estimate_force:
+            self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
+        self.done.append((log, found))
+        self.skipped += [*lost(found.recording), *found.not_scored]
+        if self.plot_names:
+            from cdtool.report.plots.detection_plot import plot_detected
+
+            plot_detected(found, self.plot_names[log])
+
+    def show(self, *, as_json: bool) -> None:
+        """Print what was found, and end with its exit status."""
+        from cdtool.workflows.runs import absent_truth
+
+        taught = "the signature was learned from it: no alarm here shows nothing"
+        learned = [Skipped(str(log), taught) for log, found in self.done if found.learned]
+        absent = [Skipped(str(log), str(item)) for log, found in self.done for item in absent_truth(found.recording)]
+        warnings = [item for _, found in self.done for item in found.warnings]
+        notes = [note for _, found in self.done for note in found.notes]
+        print_skipped(self.skipped, [*learned, *warnings], [*notes, *absent])
+        if as_json:
+            print_json(as_rows(self.done, self.forces))
+        else:
+            show_detected([found for _, found in self.done], self.forces)
+            for log, _ in self.done:
+                if log in self.plot_names:
+                    typer.echo(f"plot written to {plain(self.plot_names[log])}")
+        leave(self.skipped, print_not_assessable((str(log), found) for log, found in self.done))
 
 
 def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:

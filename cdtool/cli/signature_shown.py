@@ -129,9 +129,11 @@ def _show_coverage(found: Coverage) -> None:
 
 
 def _show_drift(found: DriftAudit) -> None:
+    from cdtool.evaluation.upkeep.words import verdicts
+
     for joint in found.joints:
         typer.echo(f"season of {counted(len(joint.runs), 'run')}, {plain(joint.joint)}:")
-        for verdict in joint.verdicts:
+        for verdict in verdicts(joint):
             say(verdict, indent="  ")
         step = max(1, math.ceil(len(joint.runs) / _SHOWN))
         rows = [
@@ -182,12 +184,14 @@ def _coverage_as_json(found: Coverage) -> dict[str, Any]:
 
 
 def _drift_as_json(found: DriftAudit) -> dict[str, Any]:
+    from cdtool.evaluation.upkeep.words import verdicts
+
     return {
         "axis": found.axis,
         "joints": [
             {
                 "joint": joint.joint,
-                "verdicts": list(joint.verdicts),
+                "verdicts": list(verdicts(joint)),
                 "runs_left": joint.runs_left,
                 "runs": [asdict(run) for run in joint.runs],
             }

@@ -88,7 +88,7 @@ def figures(
 
     Example: cdtool study figures -o figures
     """
-    from cdtool.report.plots.impact_figures import draw_impact_figures
+    from cdtool.report.plots.impact_plots import draw_impact_figures
 
     written = draw_impact_figures(output, force=force)
     if as_json:

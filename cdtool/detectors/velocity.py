@@ -61,9 +61,7 @@ class Velocity:
             ready = np.full(momentum.shape[1], -np.inf)
             residual, status = observe_momentum(drive, balance, momentum, self.bandwidth, ready)
             return Signal(drive.time, residual, status, self.unit(machine), self.signed)
-        residual = np.empty(balance.shape)
-        status = np.empty(balance.shape, dtype=np.uint8)
-        observe_velocity(
+        residual, status = observe_velocity(
             drive.time,
             np.ascontiguousarray(balance),
             np.ascontiguousarray(drive.speed),
@@ -71,7 +69,5 @@ class Velocity:
             np.ascontiguousarray(for_every_joint(drive.missing)[:, 0]),
             np.ascontiguousarray(for_every_joint(drive.interrupted)[:, 0]),
             per_joint(self.bandwidth, len(machine.joints)) * machine.nominal_inertia,
-            residual,
-            status,
         )
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)

@@ -28,15 +28,16 @@ def observe_velocity(
     missing: BoolArray,
     motion_missing: BoolArray,
     gains: FloatArray,
-    residual: FloatArray,
-    status: StatusArray,
-) -> None:
-    """res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
+) -> tuple[FloatArray, StatusArray]:
+    """Return the residual res (n, J) and its status:
+
+    res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
 
     K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
     A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
-    of the slowest mode and 0.15 s without a sample it restarts. Fills `residual` and `status` (n, J).
+    of the slowest mode and 0.15 s without a sample it restarts.
     """
+    residual, status = np.empty(balance.shape), np.empty(balance.shape, dtype=np.uint8)
     root = np.sqrt(gains)
     known = np.flatnonzero(~motion_missing)
     periods, vectors = np.empty(balance.shape), np.empty(inertia.shape)
@@ -46,6 +47,7 @@ def observe_velocity(
         periods[ends], vectors[ends] = np.linalg.eigh(mean / (root[:, np.newaxis] * root))
     work = np.zeros((_WORK, len(root)))
     _observe(time, balance, speed, inertia, periods, vectors, missing, motion_missing, root, work, residual, status)
+    return residual, status
 
 
 @kernel(

@@ -1,7 +1,12 @@
-"""results.json: strict JSON, checked against the layout of `Results` when it is read."""
+"""results.json: strict JSON, checked against the layout of `Results` when it is read; and that layout as a JSON Schema.
+
+Conventions: every field is always written, null where there is no value; a field that is not in the schema is not in
+the file.
+"""
 
 from __future__ import annotations
 
+import inspect
 import json
 import types
 from collections.abc import Mapping
@@ -12,8 +17,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError
-from cdtool.evaluation.results import SCHEMA_VERSION, Results
-from cdtool.evaluation.results_schema import WORDS
+from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
 from cdtool.file_kinds import kind_of
 from cdtool.strict_json import strict_json
 from cdtool.value_words import value_in_words
@@ -26,6 +30,15 @@ _SPACED_WORDS = 2
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 _PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+_SCHEMA_TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
+# What text may be, where it is one of a few words: for one class, or for every one that has the field.
+WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
+    (ContactResult, "outcome"): ("detected", "missed", "not_assessable", "in_progress"),
+    (LimitResult, "outcome"): ("met", "violated", "not_assessable"),
+    (ConclusionResult, "outcome"): ("violated", "not_assessable", "met", "not_asked"),
+    "verdict": ("pass", "fail", "not_assessable"),
+    "side": ("above", "below"),
+}
 
 
 def to_json(results: Results) -> str:
@@ -156,3 +169,53 @@ def _other_kind(path: Path, content: bytes) -> RecordingError | None:
 
 def _no_results(path: Path, why: str) -> RecordingError:
     return RecordingError(f"{path}: not a results file: {why}", _NEXT_STEP)
+
+
+def results_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of results.json."""
+    parts: dict[str, Any] = {}
+    whole = _object(Results, parts)
+    whole["properties"]["schema_version"] |= {"const": SCHEMA_VERSION}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"cdtool results.json, schema_version {SCHEMA_VERSION}",
+        **whole,
+        "$defs": dict(sorted(parts.items())),
+    }
+
+
+def _object(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    properties = {}
+    for item in fields(kind):
+        made = _schema(hints[item.name], parts)
+        words = WORDS.get((kind, item.name)) or WORDS.get(item.name)
+        if words:
+            made["enum"] = [*words, None] if "null" in made["type"] else list(words)
+        properties[item.name] = {"description": item.metadata["meaning"], **made}
+    return {
+        "description": inspect.getdoc(kind),
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def _schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    origin, inner = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return {}
+    if origin in (Union, types.UnionType):
+        (known,) = (item for item in inner if item is not type(None))
+        return {"type": [_SCHEMA_TYPES[known], "null"]}
+    if origin is tuple:
+        return {"type": "array", "items": _schema(inner[0], parts)}
+    if origin is Mapping:
+        return {"type": "object", "additionalProperties": _schema(inner[1], parts)}
+    if is_dataclass(kind):
+        name = kind.__name__  # type: ignore[union-attr]
+        if name not in parts:
+            parts[name] = _object(kind, parts)
+        return {"$ref": f"#/$defs/{name}"}
+    return {"type": _SCHEMA_TYPES[kind]}

@@ -84,9 +84,9 @@ class KinematicTree:
         formed: one sweep out, one back. Raises UsageError where shapes do not fit.
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
-        momentum, force, gravity = (np.empty_like(position) for _ in range(3))
-        sweep_momentum(self._bodies, self._route, self._gravity, position, speed, momentum, force, gravity)
-        return momentum, force, gravity
+        terms = np.empty_like(position), np.empty_like(position), np.empty_like(position)
+        sweep_momentum(self._bodies, self._route, self._gravity, position, speed, terms)
+        return terms
 
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Kinetic energy T = qd^T M qd / 2, drives included, and potential energy U, (n,) each [J].

@@ -109,13 +109,11 @@ def sweep_momentum(
     gravity_vector: FloatArray,
     position: FloatArray,
     speed: FloatArray,
-    momentum: FloatArray,
-    velocity_force: FloatArray,
-    gravity: FloatArray,
+    terms: tuple[FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """p = M qd, C^T qd and g, (n, J) each, of every sample."""
+    """Fill `terms` with p = M qd, C^T qd and g, (n, J) each, of every sample."""
     none, (slots, fault) = np.empty(0), work_space(route, GRAVITY, gravity_vector)
-    _sweep(bodies, route, position, speed, slots, fault, momentum, velocity_force, gravity, gravity_vector, none, none)
+    _sweep(bodies, route, position, speed, slots, fault, *terms, gravity_vector, none, none)
 
 
 def sweep_energies(

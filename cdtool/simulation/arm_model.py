@@ -80,38 +80,44 @@ def simulate_arm_run(
     reference = parameters.reference(trial, time)
     obstacle = parameters.obstacle(trial, angle)
     start = parameters.equilibrium(trial)
-    truth, first_contact = integrate_arm(
-        parameters, start, reference, disturbance, friction, obstacle, trial, impact, substeps
-    )
+    stroke = ArmStroke(reference, disturbance, friction, obstacle, trial, impact)
+    truth, first_contact = integrate_arm(parameters, start, stroke, substeps)
     return _measure(parameters, time, reference, truth, noise, first_contact)
 
 
-def integrate_arm(  # noqa: PLR0913  every part of the simulated arm
-    parameters: ArmParameters,
-    initial_state: Array,
-    reference: tuple[Array, Array],
-    disturbance: Array,
-    friction: Array,
-    obstacle: float,
-    trial: Trial,
-    impact: Impact,
-    substeps: int,
-) -> tuple[dict[str, Array], float]:
-    """The true motion by name (`arm_kernel.ROWS`, each (2, n), and contact_force (n,)), and the first contact [s].
+@dataclass(frozen=True)
+class ArmStroke:
+    """What an arm is to do, and what acts on it.
 
-    `initial_state` (6, 2) is in the order of `ROWS`; `reference` position [rad] and speed [rad/s] and `disturbance`
-    [N m] (2, n) hold a value a sample; `friction` (2,) is each joint's factor on its Coulomb and static friction [-];
-    `obstacle` is that of `ArmParameters.obstacle`. The first contact is NaN without one.
+    `reference` position [rad] and speed [rad/s] and `disturbance` [N m] (2, n) hold a value per sample; `friction` (2,)
+    is each joint's factor on its Coulomb and static friction [-]; `obstacle` is that of `ArmParameters.obstacle`.
     """
-    log = np.zeros((len(arm_kernel.ROWS), *disturbance.shape))
-    contact_force = np.zeros(disturbance.shape[1])
+
+    reference: tuple[Array, Array]
+    disturbance: Array
+    friction: Array
+    obstacle: float
+    trial: Trial
+    impact: Impact
+
+
+def integrate_arm(
+    parameters: ArmParameters, initial_state: Array, stroke: ArmStroke, substeps: int
+) -> tuple[dict[str, Array], float]:
+    """Return the true motion and the time of the first contact [s], NaN without one.
+
+    The motion by name: `arm_kernel.ROWS`, each (2, n), and contact_force (n,). `initial_state` (6, 2) is in the order
+    of `ROWS`.
+    """
+    log = np.zeros((len(arm_kernel.ROWS), *stroke.disturbance.shape))
+    contact_force = np.zeros(stroke.disturbance.shape[1])
     numbers = tuple(float(getattr(parameters, name)) for name in arm_kernel.PARAMETER_ORDER)
     pairs = tuple(tuple(map(float, getattr(parameters, name))) for name in arm_kernel.JOINT_PARAMETER_ORDER)
-    kind = arm_kernel.CONTACT_KINDS[impact]
+    kind = arm_kernel.CONTACT_KINDS[stroke.impact]
     scratch = (*np.zeros((3, 6, 2)), np.zeros((arm_kernel.HELD, 2)))
     first_contact = arm_kernel.integrate_arm(
-        *(numbers, pairs, initial_state.copy(), *scratch, *reference, disturbance, friction),
-        *(obstacle, trial, kind, substeps, log, contact_force),
+        *(numbers, pairs, initial_state.copy(), *scratch, *stroke.reference),
+        *(stroke.disturbance, stroke.friction, stroke.obstacle, stroke.trial, kind, substeps, log, contact_force),
     )
     return {**dict(zip(arm_kernel.ROWS, log, strict=True)), "contact_force": contact_force}, first_contact
 
@@ -142,6 +148,14 @@ def _measure(
     felt = specific_force(parameters, truth["link_position"], truth["link_speed"], truth["link_acceleration"])
     moving = np.minimum(np.abs(truth["link_speed"][0]) / parameters.nominal_speed, 1.0)
     imu, torque = np.empty((time.size, 2)), np.empty((time.size, 2))
+    sensor = sensors.Accelerometer(
+        noise=parameters.imu_noise,
+        bias=parameters.imu_bias,
+        frequency=parameters.imu_frequency,
+        damping=parameters.imu_damping,
+        resolution=parameters.imu_resolution,
+        period=period,
+    )
     for joint in (0, 1):
         torque[:, joint] = sensors.measured_torque(
             truth["motor_torque"][joint],
@@ -157,17 +171,8 @@ def _measure(
             parameters.vibration_damping,
             period,
         )
-        imu[:, joint] = sensors.accelerometer(
-            felt[joint],
-            vibration * moving,
-            noise[:, 6 + joint],
-            noise=parameters.imu_noise,
-            bias=parameters.imu_bias,
-            frequency=parameters.imu_frequency,
-            damping=parameters.imu_damping,
-            resolution=parameters.imu_resolution,
-            period=period,
-            settled=float(felt[joint, 0]),
+        imu[:, joint] = sensor.reading(
+            felt[joint], vibration * moving, noise[:, 6 + joint], settled=float(felt[joint, 0])
         )
     return ArmRun(
         time=time,

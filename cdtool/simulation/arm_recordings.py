@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from cdtool.simulation.arm_model import ArmRun, Array, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial, require_trial
 from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, without_references, write_folder
 from cdtool.units import UNITS
+from cdtool.workflows.keyword_options import by_keywords
 
 _JOINTS = ("arm", "forearm")
 # CSV: torque, speed, acceleration and force to steps far below their noise; encoders in whole counts.
@@ -75,25 +77,33 @@ def as_recording(run: ArmRun, name: str) -> Recording:
     return Recording(name, name, _JOINTS, channels)
 
 
-def write_arm_recordings(  # noqa: PLR0913  keyword options of the Python API
-    folder: Path,
-    counts: Mapping[str, int],
-    seed: int,
-    trial: Trial = 1,
-    file_format: str = "csv",
-    progress: Callable[[int, int], None] | None = None,
-    parameters: ArmParameters | None = None,
-    references: bool = True,
-) -> int:
-    """Write `counts` recordings of each group below `folder`; returns how many. Same seed, same bytes.
+@dataclass(frozen=True)
+class ArmRecordings:
+    """The recordings to write: `counts` of each group (free, holdout, stiff, soft), simulated from `seed`.
 
-    Groups: free, holdout, stiff, soft. A run depends on seed, trial, group and number alone, not on how many are
-    written. `file_format` "mixed": the first two of each group as MCAP, the others as CSV. Raises UsageError where
-    nothing is to be written, the folder is not empty, the trial is unknown, or the encoders are ideal.
-    Without `references` neither logs nor machine file have a reference channel.
+    `file_format` "mixed": the first two of each group as MCAP, the others as CSV. Without `references` neither logs nor
+    machine file have a reference channel.
     """
+
+    counts: Mapping[str, int]
+    seed: int
+    trial: Trial = 1
+    file_format: str = "csv"
+    progress: Callable[[int, int], None] | None = None
+    parameters: ArmParameters | None = None
+    references: bool = True
+
+
+def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
+    """Write recordings of an arm below `folder`; returns how many. Same seed, same bytes.
+
+    The options are those of `ArmRecordings`. A run depends on seed, trial, group and number alone, not on how many are
+    written. Raises UsageError where nothing is to be written, the folder is not empty, the trial is unknown, or the
+    encoders are ideal.
+    """
+    seed, trial, references = wanted.seed, wanted.trial, wanted.references
     require_trial(trial)
-    arm = parameters or ArmParameters()
+    arm = wanted.parameters or ArmParameters()
     if arm.encoder_counts < 1:
         raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more a revolution.")
 
@@ -112,7 +122,10 @@ def write_arm_recordings(  # noqa: PLR0913  keyword options of the Python API
     log_mcap = partial(_write_mcap, references=references)
     text = _machine_toml(arm, count) if references else without_references(_machine_toml(arm, count))
     bench = Bench(simulate, log_csv, log_mcap, text, settings, _BENCHMARK_RULES)
-    return write_folder(folder, counts, file_format, bench, progress)
+    return write_folder(folder, wanted.counts, wanted.file_format, bench, wanted.progress)
+
+
+write_arm_recordings = by_keywords(ArmRecordings, write_recordings_of)
 
 
 def _write_csv(path: Path, run: ArmRun, count: float, references: bool) -> None:

@@ -229,10 +229,7 @@ def _measure(
     force = sensors.measured_torque(
         truth["motor_force"], noise[:, 1], parameters.torque_noise, parameters.torque_filter_time, period
     )
-    acceleration = sensors.accelerometer(
-        truth["leaf_acceleration"],
-        panel * np.abs(truth["leaf_speed"]) / parameters.nominal_speed,
-        noise[:, 3],
+    sensor = sensors.Accelerometer(
         noise=parameters.accelerometer_noise,
         bias=parameters.accelerometer_bias,
         frequency=parameters.accelerometer_frequency,
@@ -240,6 +237,8 @@ def _measure(
         resolution=parameters.accelerometer_resolution,
         period=period,
     )
+    vibration = panel * np.abs(truth["leaf_speed"]) / parameters.nominal_speed
+    acceleration = sensor.reading(truth["leaf_acceleration"], vibration, noise[:, 3])
     return GateRun(
         time=time,
         motor_torque=force * ratio,

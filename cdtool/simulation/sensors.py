@@ -7,6 +7,7 @@ standard normal samples: the caller owns the random generator.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -76,24 +77,27 @@ def measured_torque(torque: Array, white: Array, noise: float, time_constant: fl
     return low_pass(torque + noise * white, time_constant, period)
 
 
-def accelerometer(  # noqa: PLR0913  every property of the sensor
-    acceleration: Array,
-    vibration: Array,
-    white: Array,
-    *,
-    noise: float,
-    bias: float,
-    frequency: float,
-    damping: float,
-    resolution: float,
-    period: float,
-    settled: float = 0.0,
-) -> Array:
-    """A MEMS reading: LP2(acceleration + vibration + noise white + bias), rounded to `resolution` [m/s2].
+@dataclass(frozen=True, kw_only=True)
+class Accelerometer:
+    """A MEMS sensor: its white `noise` [m/s2 rms] and `bias` [m/s2], and the `resolution` [m/s2] of what it logs.
 
-    `frequency` [Hz] and `damping` belong to the sensor's low-pass, which starts at rest on the value `settled` [m/s2]
-    (gravity's share, on a sensor that has been on for long); `resolution` = 0 is unquantised.
+    `frequency` [Hz] and `damping` are its low-pass's; `resolution` 0 is unquantised. It is read every `period` [s].
     """
-    sensed = acceleration + vibration + noise * white + bias
-    reading = settled + second_order_low_pass(sensed - settled, frequency, damping, period)
-    return np.asarray(np.rint(reading / resolution) * resolution if resolution > 0.0 else reading, dtype=np.float64)
+
+    noise: float
+    bias: float
+    frequency: float
+    damping: float
+    resolution: float
+    period: float
+
+    def reading(self, acceleration: Array, vibration: Array, white: Array, settled: float = 0.0) -> Array:
+        """Return LP2(acceleration + vibration + noise white + bias), rounded to the resolution [m/s2].
+
+        The low-pass starts at rest on the value `settled` [m/s2] (gravity's share, on a sensor that has been on for
+        long).
+        """
+        sensed = acceleration + vibration + self.noise * white + self.bias
+        reading = settled + second_order_low_pass(sensed - settled, self.frequency, self.damping, self.period)
+        rounded = np.rint(reading / self.resolution) * self.resolution if self.resolution > 0.0 else reading
+        return np.asarray(rounded, dtype=np.float64)

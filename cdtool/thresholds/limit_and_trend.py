@@ -2,19 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
-from cdtool.detection import Signal
-from cdtool.recording import Recording
+import numpy as np
+
+from cdtool.detection import Band, Signal
+from cdtool.errors import UsageError
+from cdtool.motion import MotionClass
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.base import with_limits
+from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import known
-from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.limit import FittedLimit, Limit
+from cdtool.thresholds.settings import check_above, check_sides, on_side, watched_side
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
 from cdtool.thresholds.trend import trend_of
-from cdtool.thresholds.trend_table import FittedTrendTable, fit_trend_table
 
 SHAPES = ("line", "table")
+# A level of the trend has a limit of its own once this share of the runs has reached it.
+_COVERAGE = 0.8
+
+
+@dataclass(frozen=True)
+class FittedTrendTable:
+    """Limits on i at each level of its trend: `levels` (s, J) per s as shares of the runs' extremes, `limits` s times.
+
+    Level 0 is any trend; at level m the upper limit holds for trends of at least `rising[m]`, the lower one for those
+    of at most `falling[m]`. A trend above the highest level that most runs reach takes that level's limit.
+    """
+
+    rising: FloatArray
+    falling: FloatArray
+    limits: tuple[FittedLimit, ...]
+    time_constant: float
+    motion: MotionClass | None
+
+    @property
+    def safety_factor(self) -> float:
+        """Standard deviations from the runs' mean extreme to the limit."""
+        return self.limits[0].safety_factor
+
+    def with_safety_factor(self, factor: float) -> FittedTrendTable:
+        """The same with its limits at `factor` standard deviations."""
+        return replace(self, limits=tuple(item.with_safety_factor(factor) for item in self.limits))
+
+    def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+        """The signal and the band of its trend; raises UsageError where the number of joints differs."""
+        joints = signal.values.shape[1]
+        if self.rising.shape[1] != joints:
+            raise UsageError(
+                f"{recording.name}: learned for {self.rising.shape[1]} joints, not for {joints}", "learn for these"
+            )
+        trend = trend_of(signal, self.time_constant)
+        lower, upper = np.empty(signal.values.shape), np.empty(signal.values.shape)
+        for level, limit in enumerate(self.limits):
+            upper[:] = np.where(trend.values >= self.rising[level], limit.upper, upper) if level else limit.upper
+            lower[:] = np.where(trend.values <= self.falling[level], limit.lower, lower) if level else limit.lower
+        return with_limits(replace(signal, status=trend.status), lower, upper)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "rising": self.rising.tolist(),
+            "falling": self.falling.tolist(),
+            "limits": [item.to_dict() for item in self.limits],
+            "time_constant": self.time_constant,
+            "motion": self.motion.to_dict() if self.motion else None,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The inverse of `to_dict`."""
+        return cls(
+            rising=np.array(values["rising"], dtype=np.float64),
+            falling=np.array(values["falling"], dtype=np.float64),
+            limits=tuple(FittedLimit.from_dict(item) for item in values["limits"]),
+            time_constant=float(values["time_constant"]),
+            motion=MotionClass.from_dict(values["motion"]) if values["motion"] else None,
+        )
 
 
 @dataclass(frozen=True)
@@ -55,9 +122,52 @@ class LimitAndTrend:
         """Limits of the line or the table; raises SignatureError with fewer than two runs or without valid samples."""
         if self.shape == "line":
             return fit_statistic_limit(self, pairs)
-        return fit_trend_table(pairs, self.safety_factor, self.sides, self.time_constant, self.steps)
+        return _fit_trend_table(pairs, self.safety_factor, self.sides, self.time_constant, self.steps)
 
     def statistic(self, signal: Signal, period: float) -> Signal:  # noqa: ARG002 - steps are measured
         """i + lead di/dt, in the signal's unit."""
         trend = trend_of(signal, self.time_constant)
         return replace(trend, values=signal.values + self.lead * trend.values, unit=signal.unit)
+
+
+def _fit_trend_table(
+    pairs: Sequence[tuple[Recording, Signal]],
+    safety_factor: float,
+    sides: str | None,
+    time_constant: float,
+    steps: int,
+) -> FittedTrendTable:
+    """Levels at equal shares of the runs' mean extreme trend, and limits of i at each; raises SignatureError."""
+    trends = [trend_of(signal, time_constant) for _, signal in pairs]
+    tops = Limit().fit([(recording, trend) for (recording, _), trend in zip(pairs, trends, strict=True)])
+    shares = (np.arange(steps) / steps)[:, np.newaxis]
+    rising = shares * np.maximum(tops.greatest, 0.0)
+    falling = shares * np.minimum(tops.least, 0.0)
+    signals = [replace(signal, status=trend.status) for (_, signal), trend in zip(pairs, trends, strict=True)]
+    limits = [Limit(safety_factor).fit([(pair[0], signal) for pair, signal in zip(pairs, signals, strict=True)])]
+    for level in range(1, steps):
+        highest = [_highest(s, s.values, t.values >= rising[level]) for s, t in zip(signals, trends, strict=True)]
+        lowest = [_highest(s, -s.values, t.values <= falling[level]) for s, t in zip(signals, trends, strict=True)]
+        greatest, spread_above = _level(highest, limits[-1].greatest, limits[-1].spread_above)
+        least, spread_below = _level(lowest, tuple(-x for x in limits[-1].least), limits[-1].spread_below)
+        limits.append(FittedLimit(tuple(-x for x in least), greatest, spread_below, spread_above, safety_factor))
+    motion = common_class([recording for recording, _ in pairs]) if sides == "one" else None
+    side = watched_side(sides, motion, pairs[0][1].signed)
+    return FittedTrendTable(rising, falling, tuple(on_side(item, side) for item in limits), time_constant, motion)
+
+
+def _highest(signal: Signal, values: FloatArray, there: BoolArray) -> FloatArray:
+    """The largest value (J,) of a run among valid samples `there`; -inf without one."""
+    highest: FloatArray = np.max(np.where(signal.valid & there, values, -np.inf), axis=0)
+    return highest
+
+
+def _level(runs: Sequence[FloatArray], before: Sequence[float], spread_before: Sequence[float]) -> tuple[Any, Any]:
+    """Mean and standard deviation of the runs' extremes, one a joint; those of the level before where few reach it."""
+    extremes = np.array(runs)
+    mean, spread = list(before), list(spread_before)
+    for j in range(extremes.shape[1]):
+        reached = extremes[np.isfinite(extremes[:, j]), j]
+        if len(reached) >= max(2.0, _COVERAGE * len(extremes)):
+            mean[j], spread[j] = float(np.mean(reached)), float(np.std(reached, ddof=1))
+    return tuple(mean), tuple(spread)

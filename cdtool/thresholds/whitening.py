@@ -1,4 +1,7 @@
-"""The signal's deviation from its signature, whitened: what the samples before do not foretell."""
+"""The signal's deviation from its signature, whitened: what the samples before do not foretell.
+
+Its autoregressive model is fitted by Burg's recursion over several sections of the runs.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,7 @@ from cdtool.detection import Signal, Status
 from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.autoregression import burg, stationary_covariance
 from cdtool.thresholds.fitted_signature import FittedSignature
-from cdtool.thresholds.sample_rate import at_learned_rate
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
 from cdtool.thresholds.stretches import filtered, stretch_bounds, stretches
@@ -25,6 +26,12 @@ from cdtool.thresholds.stretches import filtered, stretch_bounds, stretches
 # What a statistic has gathered holds over so many missing samples, or so long [s]: a contact that has been building up
 # goes on behind a gap, and does not begin again.
 _HELD_SAMPLES, _HELD_SECONDS = 20, 0.15
+# The sum of so many powers of 2 of terms stands for the infinite one.
+_DOUBLINGS = 24
+# Sample periods differ from the learned one by at most this share: a model counts in samples.
+PERIOD_TOLERANCE = 0.2
+# The median of this many steps decides; while there are fewer than the second number, the rate is taken to be right.
+_STEPS, _ENOUGH = 101, 20
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,7 @@ class Whitening:
         with what is known by then, all VALID. At a start the order's number of samples is START_UP. OTHER_RATE where
         the log is sampled at another rate than the runs so far: learn from runs of the same rate.
         """
-        at_rate = at_learned_rate(signal.time, self.period)
+        at_rate = _at_learned_rate(signal.time, self.period)
         deviation = _deviation(self.signature, recording, signal)
         off = deviation.valid & ~at_rate[:, np.newaxis]
         deviation = replace(deviation, status=np.where(off, Status.OTHER_RATE, deviation.status).astype(np.uint8))
@@ -82,7 +89,7 @@ class Whitening:
     def _column(self, deviation: Signal, j: int, order: int) -> Signal:
         coefficients = np.ascontiguousarray(self.coefficients[:, j])
         # Where nothing is known, e varies as the signature says: at least by 1.
-        stationary = stationary_covariance(coefficients, least=1.0 / self.spread[j] ** 2)
+        stationary = _stationary_covariance(coefficients, least=1.0 / self.spread[j] ** 2)
         work = np.empty((2 * order, order))
 
         def whiten(values: FloatArray, step: FloatArray) -> FloatArray:
@@ -223,3 +230,59 @@ def _whiten(  # noqa: C901  a kernel is one loop
                     covariance[i, j] -= gain * covariance[0, j]
             observed += 1
         past[0] = values[k]
+
+
+def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
+    """Coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k, and the standard deviation of nu, from stretches of e.
+
+    Burg's recursion with forward and backward errors summed over all stretches; those of at most `order` samples are
+    left out. The model is stable by construction. Standard deviation NaN where no stretch is long enough.
+    """
+    forward = [part for part in parts if len(part) > order]
+    backward = forward
+    polynomial = np.ones(1)
+    for _ in range(order):
+        ahead, behind = [part[1:] for part in forward], [part[:-1] for part in backward]
+        crossed = sum(float(f @ b) for f, b in zip(ahead, behind, strict=True))
+        energy = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        reflection = -2.0 * crossed / energy if energy > 0.0 else 0.0
+        forward = [f + reflection * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b + reflection * f for f, b in zip(ahead, behind, strict=True)]
+        longer = np.append(polynomial, 0.0)
+        polynomial = longer + reflection * longer[::-1]
+    number = sum(len(part) for part in forward)
+    power = sum(float(part @ part) for part in forward)
+    return -polynomial[1:], float(np.sqrt(power / number)) if number else float("nan")
+
+
+def _stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray:
+    """Covariance (p, p) of the last p values of e, that of nu being 1: P = F P F' + Q, solved by doubling.
+
+    It is scaled up where the variance of e would be below `least`. The model is stable (see `burg`).
+    """
+    order = len(coefficients)
+    transition = np.eye(order, k=-1)
+    transition[0] = coefficients
+    covariance = np.zeros((order, order))
+    covariance[0, 0] = 1.0
+    for _ in range(_DOUBLINGS):
+        covariance = covariance + transition @ covariance @ transition.T
+        transition = transition @ transition
+    scaled: FloatArray = covariance * max(1.0, least / float(covariance[0, 0]))
+    return scaled
+
+
+def _at_learned_rate(time: FloatArray, period: float) -> BoolArray:
+    """Return (n,) where the median of the steps so far, the last 101, lies within 20 % of `period` [s]. Causal.
+
+    A median: lost samples and jitter do not move it.
+    """
+    steps = np.diff(time)
+    long, short = steps > (1.0 + PERIOD_TOLERANCE) * period, steps < (1.0 - PERIOD_TOLERANCE) * period
+    count = np.arange(1, len(steps) + 1)
+    recent = np.minimum(count, _STEPS)
+    right = np.ones(len(time), dtype=bool)
+    for odd in (long, short):
+        total = np.concatenate(([0], np.cumsum(odd)))
+        right[1:] &= total[1:] - total[count - recent] <= 0.5 * np.maximum(recent, _ENOUGH)
+    return right

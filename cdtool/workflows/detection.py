@@ -23,10 +23,11 @@ from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
-from cdtool.workflows.contacts.matched_log import match_log
+from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.detection_options import DetectionOptions, by_keywords
+from cdtool.workflows.detection_options import DetectionOptions
+from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
 from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
@@ -109,9 +110,8 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
     contacts = any_contacts(recording, rules)
-    matched = match_log(
-        recording, parts, contacts, [[item] for item in detections], "", rules, raised_by.wait, options.operations
-    )
+    detected = DetectedLog(recording, parts, options.operations, contacts, [[item] for item in detections])
+    matched = match_log(detected, "", rules, raised_by.wait)
     return Detected(
         recording,
         detections,

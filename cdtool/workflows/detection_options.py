@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from functools import wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar, cast
 
 from cdtool.activation import ActivationSettings
 from cdtool.errors import UsageError
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-
-_Given = ParamSpec("_Given")
-_Options = TypeVar("_Options")
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -62,17 +55,3 @@ class DetectionOptions:
         if self.machine is None:
             raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
         return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
-
-
-def by_keywords(
-    options: Callable[_Given, _Options], run: Callable[[str | Path, _Options], _Result]
-) -> Callable[Concatenate[str | Path, _Given], _Result]:
-    """Return `run` for those who call it with the fields of its options: `detect(log, machine, detector="gm")`."""
-
-    @wraps(run)
-    def call(log: str | Path, *fields: _Given.args, **more: _Given.kwargs) -> _Result:
-        return run(log, options(*fields, **more))
-
-    log, *_ = inspect.signature(run).parameters.values()
-    vars(call)["__signature__"] = inspect.Signature([log, *inspect.signature(options).parameters.values()])
-    return cast("Callable[Concatenate[str | Path, _Given], _Result]", call)

@@ -8,8 +8,9 @@ from pathlib import Path
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
 from cdtool.pipeline import Detection
 from cdtool.workflows.detection import Detected, detect_log
-from cdtool.workflows.detection_options import DetectionOptions, by_keywords
+from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.detector_inputs import inputs_of
+from cdtool.workflows.keyword_options import by_keywords
 
 
 @dataclass(frozen=True)

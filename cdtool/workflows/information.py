@@ -1,9 +1,9 @@
-"""What is in a log: channels, units, rates, gaps and all findings at once."""
+"""What is in a log: channels, units, rates, gaps and all findings; and why a clock is missing or doubtful."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.clock.stamps import missing_findings
+from cdtool.clock.stamps import COARSE_SHARE, missing_findings
+from cdtool.columns import Column
+from cdtool.distribution import Distribution
+from cdtool.formats.source import Source
+from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
+from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Finding, Recording, Series, worst_first
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -20,8 +25,7 @@ from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
-    from cdtool.columns import Column
-    from cdtool.ingest.log_figures import ClockFigures, LogFigures
+    from cdtool.ingest.log_figures import LogFigures
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,6 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
 def _survey(log: Path) -> Info:
     from cdtool.formats.csv import TableSource
-    from cdtool.ingest.clock_doubts import clock_doubts
     from cdtool.ingest.clock_guess import find_clock
     from cdtool.ingest.log_figures import LogFigures
     from cdtool.ingest.part_pieces import in_time_order, log_pieces
@@ -76,7 +79,7 @@ def _survey(log: Path) -> Info:
     clock = find_clock(source, figures.columns, figures.values_of)
     channels = [_described(column, figures, clock.figures if clock else None) for column in source.columns.values()]
     findings = [*source.findings, *(clock.findings if clock else ())]
-    findings += clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
+    findings += _clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
     for channel in channels:
         findings += missing_findings(channel.missing, channel.samples, channel.name)
     dialect = source.dialect if isinstance(source, TableSource) else ""
@@ -143,3 +146,57 @@ def _channel(name: str, series: Series, joint: int) -> ChannelInfo:
         minimum=float(present.min()) if len(present) else None,
         maximum=float(present.max()) if len(present) else None,
     )
+
+
+def _clock_doubts(
+    source: Source,
+    figures: Mapping[str, ColumnFigures],
+    clocks: Mapping[str, ClockFigures],
+    reread: Reread,
+    clock: TableClock | None,
+) -> list[Finding]:
+    """Of a table the columns that are named as clocks and are none, and that there is no clock; of topics coarse ones.
+
+    `figures` are those of the columns, `clocks` those of the topics' own clocks.
+    """
+    tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
+    found = list(_named_ones(tables, figures, reread, clock))
+    if tables and clock is None:
+        text = "no column looks like a clock: rates, gaps and times are unknown"
+        found.append(Finding(f"{text}; name it, or the sample rate, in [channels] time of a machine file"))
+    for name, known in clocks.items():
+        doubt = _doubt(known.steps) if name and known.rows > 2 else ""
+        if doubt:
+            found.append(Finding(f"{doubt}", f"{name} time"))
+    return found
+
+
+def _named_ones(
+    tables: list[Column], figures: Mapping[str, ColumnFigures], reread: Reread, clock: TableClock | None
+) -> Iterator[Finding]:
+    for column in tables:
+        if not is_clock_name(column.name) or (clock is not None and column.name == clock.column):
+            continue
+        steps, last = Distribution(), np.empty(0)
+        for piece in reread(column.name):
+            known = np.concatenate((last, piece[np.isfinite(piece)]))
+            steps.add(np.diff(known))
+            last = known[-1:]
+        forward = figures[column.name]
+        if doubt := _doubt(steps):
+            yield Finding(f"named as a clock, but {doubt}", column.name)
+        elif forward.present == 0:
+            yield Finding("named as a clock, but it holds no stamp", column.name)
+        elif clock is None and forward.forward < forward.steps:
+            text = f"named as a clock, but it runs backward at {forward.steps - forward.forward} of its steps"
+            yield Finding(text, column.name)
+
+
+def _doubt(steps: Distribution) -> str:
+    """What is odd about steps between stamps, empty where nothing is."""
+    repeated = steps.share(0.0, 0.0) if steps.count else 0.0
+    if repeated >= 1.0:
+        return f"all of its {steps.count + 1} stamps are the same: the clock stands still"
+    if repeated > COARSE_SHARE:
+        return f"{100.0 * repeated:.3g} % of its stamps repeat: a coarse clock"
+    return ""

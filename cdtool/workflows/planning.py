@@ -22,6 +22,7 @@ from cdtool.evaluation.statistics.sample_size import (
 from cdtool.evaluation.statistics.spread import Spread, spread_of
 from cdtool.evaluation.summary import campaigns
 from cdtool.plain_text import counted, digits
+from cdtool.workflows.keyword_options import by_keywords
 
 
 @dataclass(frozen=True)
@@ -60,25 +61,33 @@ class Plan:
     measured: Measured | None = None
 
 
-def plan(  # noqa: PLR0913  keyword options of the Python API
-    *,
-    difference_ms: float | None = None,
-    std_ms: float | Measured | None = None,
-    unpaired: bool = False,
-    power: float = 0.8,
-    missed_at_most: str = "",
-    false_alarms_at_most: str = "",
-    allowed: int | None = None,
-    significance: float = SIGNIFICANT,
-) -> Plan:
-    """Answer what is asked: the impacts for a difference or a missed share, the exposure for a false-alarm rate.
+@dataclass(frozen=True, kw_only=True)
+class Questions:
+    """What a test is planned for; at least one of `difference_ms`, `missed_at_most`, `false_alarms_at_most` is asked.
 
     `std_ms`: of the differences within pairs, or within a group where `unpaired`; given, or from `measured_std`.
     `missed_at_most` as 5% or 0.05; `false_alarms_at_most` as 1/1000op or 0.1/h. `allowed` misses or false alarms are
-    answered besides none; None: one. Raises UsageError where nothing is asked, or a question lacks a part.
+    answered besides none; None: one.
     """
-    check_significance(significance)
-    level = 1.0 - significance
+
+    difference_ms: float | None = None
+    std_ms: float | Measured | None = None
+    unpaired: bool = False
+    power: float = 0.8
+    missed_at_most: str = ""
+    false_alarms_at_most: str = ""
+    allowed: int | None = None
+    significance: float = SIGNIFICANT
+
+
+def answer(questions: Questions) -> Plan:
+    """Answer what is asked: the impacts for a difference or a missed share, the exposure for a false-alarm rate.
+
+    The fields are those of `Questions`. Raises UsageError where nothing is asked, or a question lacks a part.
+    """
+    difference_ms, std_ms, allowed = questions.difference_ms, questions.std_ms, questions.allowed
+    check_significance(questions.significance)
+    level = 1.0 - questions.significance
     counts = (0, 1) if allowed is None else tuple(dict.fromkeys((0, allowed)))
     answers: list[Answer] = []
     measured = std_ms if isinstance(std_ms, Measured) or std_ms is None else Measured(std_ms)
@@ -88,17 +97,20 @@ def plan(  # noqa: PLR0913  keyword options of the Python API
                 f"a difference of {difference_ms:g} ms without a standard deviation",
                 "give --std-ms 8, or --from results.json of an earlier test",
             )
-        answers.append(_difference(difference_ms, measured, unpaired, power, level))
-    if missed_at_most:
-        answers.append(_missed(_share(missed_at_most), counts, level))
-    if false_alarms_at_most:
-        answers.append(_false_alarms(Budget.parse(false_alarms_at_most), counts, level))
+        answers.append(_difference(difference_ms, measured, questions.unpaired, questions.power, level))
+    if questions.missed_at_most:
+        answers.append(_missed(_share(questions.missed_at_most), counts, level))
+    if questions.false_alarms_at_most:
+        answers.append(_false_alarms(Budget.parse(questions.false_alarms_at_most), counts, level))
     if not answers:
         raise UsageError(
             "nothing is asked",
             "ask with --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most 1/1000op (or 0.1/h)",
         )
     return Plan(tuple(answers), measured if difference_ms is not None else None)
+
+
+plan = by_keywords(Questions, answer)
 
 
 def measured_std(

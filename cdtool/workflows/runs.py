@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -118,24 +118,31 @@ def _with_channels(path: Path, recording: Recording) -> Recording:
     return recording
 
 
-def load_runs(  # noqa: PLR0913  keyword options on how to read, cut and report
-    paths: Sequence[Path],
-    machine_file: MachineFile,
-    how: str,
-    *,
-    onset: OnsetRule | None = None,
-    ranges: PlausibleRanges | None = None,
-    jobs: int = 1,
-    base: Path | None = None,
-    progress: Progress | None = None,
+@dataclass(frozen=True)
+class RunReading:
+    """How impact-free logs are read: cut by `operations`, without contacts by the `onset` rule, named below `base`.
+
+    `jobs` logs are read at once; `progress` is called after each.
+    """
+
+    operations: str
+    _: KW_ONLY
+    onset: OnsetRule | None = None
+    base: Path | None = None
+    jobs: int = 1
+    progress: Progress | None = None
+
+
+def load_runs(
+    paths: Sequence[Path], machine_file: MachineFile, reading: RunReading, ranges: PlausibleRanges | None = None
 ) -> Runs:
-    """The operations of many impact-free logs; a log that cannot be read is left out and named, the others go on.
+    """Return the operations of many impact-free logs; one that cannot be read is left out and named, the others go on.
 
     So is a log that is given twice or holds the bytes of another one, and an operation in which the load cell shows
-    a contact by the `onset` rule. Values that no sensor gives are masked: those outside of the plausible `ranges`,
+    a contact. Values that no sensor gives are masked: those outside of the plausible `ranges`,
     which are learned from all these logs where none are given.
     """
-    rule = onset or OnsetRule()
+    rule, base, jobs = reading.onset or OnsetRule(), reading.base, reading.jobs
     paths, repeated = _each_once(paths)
     operations: list[Operation] = []
     skipped = [Skipped(shown_path(path, base), "given more than once: counts once") for path in repeated]
@@ -156,11 +163,11 @@ def load_runs(  # noqa: PLR0913  keyword options on how to read, cut and report
         try:
             recording = logged.on_load_side(machine_file.machine, known, to_learn=True)
             recording = replace(recording, name=shown_path(path, base))
-            return recording, operations_of(recording, how)
+            return recording, operations_of(recording, reading.operations)
         except CdtoolError as fault:
             return fault
 
-    logged = list(zip(paths, in_order(read, paths, jobs, progress), strict=True))
+    logged = list(zip(paths, in_order(read, paths, jobs, reading.progress), strict=True))
     known = ranges or PlausibleRanges.learned([it.recording for _, it in logged if isinstance(it, LoggedRecording)])
     for path, loaded in zip(paths, in_order(cut, logged, jobs, None), strict=True):
         if isinstance(loaded, CdtoolError):

@@ -7,13 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.cli.app import app
 from tests.command import cdtool
 
 LOGS = Path(__file__).parents[2] / "sample_logs"
-pytestmark = pytest.mark.skipif(
-    not any(item.name == "convert" for item in app.registered_commands), reason="cdtool convert is not registered"
-)
 
 
 def test_a_converted_log_is_read_with_the_machine_file_beside_it(tmp_path):

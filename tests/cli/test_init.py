@@ -181,13 +181,6 @@ def test_the_next_command_can_be_pasted_into_a_shell(tmp_path):
     assert shlex.split(line) == ["cdtool", "info", str(log), "--machine", str(path)]
 
 
-def registered(name: str) -> bool:
-    from cdtool.cli.app import app
-
-    return any(item.name == name for item in app.registered_commands)
-
-
-@pytest.mark.skipif(not registered("init"), reason="cdtool init is not registered")
 def test_the_command_prints_the_draft_and_the_next_step(tmp_path):
     done = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml")
     assert done.status == 0 and "guessed" in done.out and "cdtool info" in done.out

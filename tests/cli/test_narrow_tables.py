@@ -7,8 +7,7 @@ import sys
 
 import pytest
 
-from cdtool.cli.column_blocks import blocks, column_width
-from cdtool.cli.console import table
+from cdtool.cli.console import column_blocks, column_width, table
 
 HEADINGS = [("group", "left"), ("detector", "left"), ("latency\nms", "right"), ("range\nms", "right"), ("why", "left")]
 ROWS = [
@@ -50,6 +49,6 @@ def test_blocks_repeat_the_names_and_keep_the_order():
     widths = [
         column_width(heading, side, [row[i] for row in ROWS], i < 2) for i, (heading, side) in enumerate(HEADINGS)
     ]
-    assert blocks(widths, 200) == [[0, 1, 2, 3, 4]]
-    assert blocks(widths, 62) == [[0, 1, 2], [0, 1, 3], [0, 1, 4]]
-    assert [i for block in blocks(widths, 62) for i in block if i > 1] == [2, 3, 4]
+    assert column_blocks(widths, 200) == [[0, 1, 2, 3, 4]]
+    assert column_blocks(widths, 62) == [[0, 1, 2], [0, 1, 3], [0, 1, 4]]
+    assert [i for block in column_blocks(widths, 62) for i in block if i > 1] == [2, 3, 4]

@@ -14,8 +14,7 @@ import jsonschema
 import pytest
 
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
-from cdtool.evaluation.results_file import to_json
-from cdtool.evaluation.results_schema import results_schema
+from cdtool.evaluation.results_file import results_schema, to_json
 from cdtool.workflows.benchmark.benchmark import benchmark
 from tests.evaluation.test_results import FULL
 

@@ -8,7 +8,7 @@ import pytest
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.dialect import find_dialect
+from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import Run
 

@@ -16,7 +16,7 @@ from cdtool.report.contacts_csv import contacts_csv
 from cdtool.report.junit import to_junit
 from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
-from cdtool.report.plots.folder_figures import slug
+from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
 from tests.report.conftest import Bench
 from tests.report.hostile import HOSTILE

@@ -12,7 +12,15 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.simulation import arm_kernel, sensors
-from cdtool.simulation.arm_model import ArmRun, Array, Impact, integrate_arm, simulate_arm_run, specific_force
+from cdtool.simulation.arm_model import (
+    ArmRun,
+    ArmStroke,
+    Array,
+    Impact,
+    integrate_arm,
+    simulate_arm_run,
+    specific_force,
+)
 from cdtool.simulation.arm_parameters import ArmParameters, Trial
 from tests.simulation.resolver import resolver_speed
 
@@ -51,7 +59,8 @@ def run_of(trial: Trial, impact: Impact, seed: int = 1) -> ArmRun:
 def hold(parameters: ArmParameters, start: Array, samples: int) -> dict[str, Array]:
     """The controllers asked to stay where trial 1 starts, nothing to hit."""
     reference = np.repeat(ARM.equilibrium(1)[0][:, np.newaxis], samples, axis=1), np.zeros((2, samples))
-    truth, _ = integrate_arm(parameters, start, reference, np.zeros((2, samples)), np.ones(2), 9.0, 1, "none", 5)
+    stroke = ArmStroke(reference, np.zeros((2, samples)), np.ones(2), 9.0, 1, "none")
+    truth, _ = integrate_arm(parameters, start, stroke, 5)
     return truth
 
 
@@ -66,7 +75,8 @@ def coast(
     start[0] = start[2] = angle - np.radians(ahead), ARM.forearm_angle[trial - 1]
     start[1] = start[3] = speed, 0.4 * speed
     still = np.zeros((2, samples))
-    truth, touch = integrate_arm(parameters, start, (still, still), still, np.ones(2), obstacle, trial, impact, 20)
+    stroke = ArmStroke((still, still), still, np.ones(2), obstacle, trial, impact)
+    truth, touch = integrate_arm(parameters, start, stroke, 20)
     assert touch < 0.01
     return truth, obstacle
 
@@ -182,7 +192,7 @@ def test_the_integration_is_of_fourth_order_where_the_laws_are_smooth() -> None:
     ends = []
     for substeps in (2, 4, 8):
         still = np.zeros((2, samples))
-        truth, _ = integrate_arm(smooth, start, reference, still, np.ones(2), 9.0, 1, "none", substeps)
+        truth, _ = integrate_arm(smooth, start, ArmStroke(reference, still, np.ones(2), 9.0, 1, "none"), substeps)
         ends.append(truth["link_position"])
     order = np.log2(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max())
     assert order == pytest.approx(4.0, abs=0.3)

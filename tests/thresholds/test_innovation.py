@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from cdtool.detection import Status
 from cdtool.errors import NothingValidError, UsageError
-from cdtool.thresholds.autoregression import burg
 from cdtool.thresholds.innovation import Innovation
+from cdtool.thresholds.whitening import burg
 from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke
 
 # Behind the ramp, before the end of the travel that enough runs have reached.

@@ -10,7 +10,7 @@ import pytest
 
 import cdtool
 from cdtool.recording import Recording, Series
-from cdtool.workflows.log_checks.accelerometer_check import accelerometer_findings
+from cdtool.workflows.log_checks.log_findings import accelerometer_findings
 from tests.data_folder import data, needs_data
 
 

@@ -1,7 +1,8 @@
 """What is asked of one detector in one group of two builds: latency, force, misses, not assessable, false alarms.
 
 Conventions: a change is new less old, and more is worse in every figure. A question that no outcome could have decided,
-such as misses where nothing was missed, has no p (NaN) and does not count as asked. All p are two-sided.
+such as misses where nothing was missed, has no p (NaN) and does not count as asked. All p are two-sided. A
+detectable change is infinite where no change could have been shown.
 
 What a question leaves open is the largest change for the worse that the recordings do not rule out, as a share: of the
 old mean; of the contacts; or false alarms per operation.
@@ -16,8 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.evaluation.builds.detectable import least_count, paired_detectable, unpaired_detectable
 from cdtool.evaluation.results import ContactResult
+from cdtool.evaluation.statistics.bootstrap import RESAMPLES
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p, paired_difference, unpaired_difference
 from cdtool.evaluation.statistics.rates import (
@@ -26,8 +27,9 @@ from cdtool.evaluation.statistics.rates import (
     poisson_difference_p,
     poisson_increase_at_most,
 )
+from cdtool.evaluation.statistics.sample_size import detectable_difference
 from cdtool.evaluation.statistics.small_sample import FEWEST
-from cdtool.evaluation.statistics.spread import spread_of
+from cdtool.evaluation.statistics.spread import Spread, spread_of
 
 Figure = Literal["latency_ms", "force_at_alarm_n", "missed", "not_assessable", "false_alarms"]
 Pairs = Sequence[tuple[ContactResult, ContactResult]]
@@ -38,6 +40,7 @@ Labels = Mapping[str, str]
 # Counts looked at for the least one that a test would show.
 _MOST = 10_000
 _COMPLETE_UNPAIRED = 0.05
+POWER = 0.8
 
 
 @dataclass(frozen=True)
@@ -101,10 +104,10 @@ def ask_mean(
         # Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change.
         differences = [round(b - a, 3) for a, b in zip(before[0], after[0], strict=True)]
         found = paired_difference(differences, before[1], level)
-        detectable = paired_detectable(spread_of(differences, before[1]))
+        detectable = _paired_detectable(spread_of(differences, before[1]))
     else:
         found = unpaired_difference(after[0], before[0], after[1], before[1], level)
-        detectable = unpaired_detectable(*means)
+        detectable = _unpaired_detectable(*means)
     reason = "" if not math.isnan(found.p) else "fewer than two recordings or campaigns"
 
     def left_open(alpha: float) -> float:
@@ -177,7 +180,7 @@ def ask_false_alarms(old: Watched, new: Watched, paired: bool) -> Asked:
 
     p = p_of(count_new) if count + count_new else math.nan
     change = Interval(count_new / hours_new - count / hours, math.nan, math.nan)
-    least = least_count(p_of, math.floor(count * hours_new / hours), _MOST)
+    least = _least_count(p_of, math.floor(count * hours_new / hours), _MOST)
     same = paired and (count, hours) == (count_new, hours_new)
     open_rate = poisson_increase_at_most(count_new, new.operations, count, old.operations)
     return Asked(
@@ -201,7 +204,7 @@ def _ask_flags(
 
     p = mcnemar_p(only_old, only_new) if only_old + only_new else math.nan
     change = Interval((after - before) / len(old), math.nan, math.nan)
-    least = least_count(p_of, before, len(old) - only_old)
+    least = _least_count(p_of, before, len(old) - only_old)
     n = len(old)
     worse, better = after == n and 2 * only_new >= n, before == n and after == 0
     # If either build could as well have missed each of them, all on one side: 1/2 for each.
@@ -242,7 +245,7 @@ def _ask_counts(figure: Literal["missed", "not_assessable"], old: tuple[int, int
         of_new,
         change,
         p,
-        least_count(p_of, before * of_new // of, of_new),
+        _least_count(p_of, before * of_new // of, of_new),
         left_open=lambda _: open_share,
         complete_p=_complete_by_counts(before, of, after, of_new),
     )
@@ -278,3 +281,54 @@ def _assessable(contact: ContactResult) -> bool:
 def _valued(figure: str, contacts: Sequence[ContactResult], labels: Labels) -> tuple[list[float], list[str]]:
     known = [item for item in contacts if getattr(item, figure) is not None]
     return [getattr(item, figure) for item in known], [labels.get(item.recording, item.recording) for item in known]
+
+
+def _paired_detectable(spread: Spread) -> Callable[[float], float]:
+    """Return the least mean difference of pairs with this spread that the sign-flip test shows at a given p."""
+    k = spread.clusters
+    patterns = 2**k if k <= 13 else math.inf
+
+    def least(alpha: float) -> float:
+        return _detectable(k, spread.std, alpha, patterns)
+
+    return least
+
+
+def _unpaired_detectable(old: Spread, new: Spread) -> Callable[[float], float]:
+    """Return the least difference of two means that the permutation test shows at a given p.
+
+    A t-test with k_a + k_b - 2 degrees of freedom is one of k_a + k_b - 1 differences: only the error differs.
+    """
+    k = old.clusters + new.clusters - 1
+    std = math.hypot(old.error, new.error) * math.sqrt(k)
+    divisions = math.comb(old.clusters + new.clusters, old.clusters)
+
+    def least(alpha: float) -> float:
+        return _detectable(k, std, alpha, divisions)
+
+    return least
+
+
+def _detectable(n: int, std: float, alpha: float, patterns: float) -> float:
+    """What a test with so many equally likely patterns shows at `alpha`; their number bounds its p from below."""
+    lowest_p = 2.0 / patterns if patterns <= RESAMPLES else 2.0 / (RESAMPLES + 1)
+    if lowest_p >= alpha or math.isnan(std):
+        return math.inf
+    return detectable_difference(n, std, POWER, 1.0 - alpha) if std > 0.0 else 0.0
+
+
+def _least_count(p_of: Callable[[int], float], start: int, most: int) -> Callable[[float], float]:
+    """The least count above `start`, where p is largest, whose p is below alpha; infinite above `most`."""
+
+    def least(alpha: float) -> float:
+        below, above = start, start + 1
+        while above <= most and p_of(above) >= alpha:
+            below, above = above, (min(2 * above, most) if above < most else most + 1)
+        if above > most:
+            return math.inf
+        while above - below > 1:
+            middle = (above + below) // 2
+            below, above = (middle, above) if p_of(middle) >= alpha else (below, middle)
+        return above
+
+    return least

@@ -25,6 +25,7 @@ import numpy as np
 
 from cdtool.evaluation.explanation.departure import Track
 from cdtool.evaluation.explanation.transient import Loss, Transient, losses, shown_by_position, transients
+from cdtool.motion import MotionClass
 from cdtool.recording import Recording
 
 # Transients and lost samples this long before the signal left its band for good may be the cause [s].
@@ -83,21 +84,29 @@ class Cause:
         return found.channel if found else ""
 
 
-def likely_cause(  # noqa: PLR0913  the recording, and what is known of the alarm
-    recording: Recording,
-    tracks: Sequence[Track],
-    leading: str,
-    direction: int,
-    left: float,
-    alarm: float,
-    end: float,
-    read: Sequence[str] = (),
-) -> Cause:
-    """The likely cause of an alarm at `alarm` [s] of a signal that left its band for good at `left` [s].
+@dataclass(frozen=True)
+class Event:
+    """An alarm at `alarm` [s] of a signal that left its band for good at `left` [s]; `inputs`: what its detector reads.
 
-    `tracks` reach to `end` [s]. `leading` is the joint that leads the motion, `direction` its sign. `read`: the
-    channels that the detector needs; samples of others may be lost without harm.
+    `joint` is the signal's: one of the machine's, or the whole machine. `motion` is the operation's.
     """
+
+    joint: str
+    left: float
+    alarm: float
+    inputs: tuple[str, ...]
+    motion: MotionClass
+
+
+def likely_cause(
+    recording: Recording, tracks: Sequence[Track], leading: str, direction: int, event: Event, end: float
+) -> Cause:
+    """Return the likely cause of an alarm.
+
+    `tracks` reach to `end` [s]. `leading` is the joint that leads the motion, `direction` its sign. Samples of channels
+    that the detector does not read may be lost without harm.
+    """
+    left, alarm, read = event.left, event.alarm, event.inputs
     joints = list(dict.fromkeys(track.joint for track in tracks))
     by_name = {(track.channel, track.joint): track for track in tracks}
     ended = max(end - _AT_THE_END, alarm - 0.02), end
@@ -122,7 +131,7 @@ def likely_cause(  # noqa: PLR0913  the recording, and what is known of the alar
         # What the detector does not read cannot have raised its alarm.
         if channel in read or not read
     }
-    return _transient_cause(recording, found) or _lost(recording, tuple(read), left, alarm) or Cause(CauseKind.UNCLEAR)
+    return _transient_cause(recording, found) or _lost(recording, read, left, alarm) or Cause(CauseKind.UNCLEAR)
 
 
 def _contact(

@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE
-from cdtool.evaluation.explanation.cause import Cause, CauseKind, likely_cause
+from cdtool.evaluation.explanation.cause import Cause, CauseKind, Event, likely_cause
 from cdtool.evaluation.explanation.departure import Track, tracks_of
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.transient import Transient
-from cdtool.motion import MotionClass
 from cdtool.recording import REFERENCES, Recording
 from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
 
@@ -48,20 +47,6 @@ class Diagnosis:
     runs: int = 0
 
 
-@dataclass(frozen=True)
-class Event:
-    """An alarm at `alarm` [s] of a signal that left its band for good at `left` [s]; `inputs`: what its detector reads.
-
-    `joint` is the signal's: one of the machine's, or the whole machine. `motion` is the operation's.
-    """
-
-    joint: str
-    left: float
-    alarm: float
-    inputs: tuple[str, ...]
-    motion: MotionClass
-
-
 def diagnose_alarm(
     recording: Recording, event: Event, normals: NormalMotions, own_past: Callable[[], Sequence[Movement]]
 ) -> Diagnosis:
@@ -79,7 +64,7 @@ def diagnose_alarm(
     leading, direction = recording.joints[motion.joint], motion.direction or 1
     cause = Cause(CauseKind.UNCLEAR)
     if normal is not None or _steady(tracks, leading, begin):
-        cause = likely_cause(recording, tracks, leading, direction, event.left, event.alarm, end, event.inputs)
+        cause = likely_cause(recording, tracks, leading, direction, event, end)
     moved = list(own_past()) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
     if cause.transient is not None:
         moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
@@ -165,4 +150,4 @@ def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequenc
     return [*others, replace(told, brief=True)]
 
 
-__all__ = ["Absence", "CauseKind", "Diagnosis", "Event", "NormalMotions", "diagnose_alarm", "diagnose_contact"]
+__all__ = ["Absence", "CauseKind", "Diagnosis", "NormalMotions", "diagnose_alarm", "diagnose_contact"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -12,8 +12,8 @@ import numpy as np
 from cdtool.activation import Activation
 from cdtool.detection import Alarm
 from cdtool.errors import UsageError
-from cdtool.evaluation.explanation.cause import Cause
-from cdtool.evaluation.explanation.diagnosis import Event, diagnose_alarm, diagnose_contact
+from cdtool.evaluation.explanation.cause import Cause, Event
+from cdtool.evaluation.explanation.diagnosis import diagnose_alarm, diagnose_contact
 from cdtool.evaluation.explanation.margin import Approach, JointMargin, Moment, joint_margins
 from cdtool.evaluation.explanation.movement import Movement, which_moved_first
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
@@ -115,8 +115,9 @@ def explain_operation(
     margins = joint_margins(detection)
     detecting = {item.alarm: item.contact for item in matching.matches if item.alarm}
     found: list[Explanation] = [
-        explain_alarm(detection, alarm, activation, *_belonging(alarm, detection, matching), inputs, margins, normals)
+        _as_role(role, explain_alarm(detection, alarm, activation, contact, inputs, margins, normals))
         for alarm in {*detection.verdict.alarms, *detecting}
+        for contact, role in [_belonging(alarm, detection, matching)]
     ]
     found += [
         explain_miss(detection, item, activation, inputs, margins, normals)
@@ -126,12 +127,11 @@ def explain_operation(
     return tuple(sorted(found, key=_order))
 
 
-def explain_alarm(  # noqa: PLR0913  an alarm, and optional context
+def explain_alarm(
     detection: Detection,
     alarm: Alarm,
     activation: Activation,
     contact: Contact | None = None,
-    role: Role | None = None,
     inputs: Sequence[str] = (),
     margins: Sequence[JointMargin] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
@@ -152,6 +152,7 @@ def explain_alarm(  # noqa: PLR0913  an alarm, and optional context
     left = float(margin.time[first])
     times = [alarm.time + step for step in _TO_ALARM]
     recording = detection.operation.recording.without_ground_truth()
+    role: Role = "detection" if contact else "alarm"
     if contact is not None and contact.in_progress:
         contact, role = None, "in progress"
     if contact:
@@ -166,7 +167,7 @@ def explain_alarm(  # noqa: PLR0913  an alarm, and optional context
         detector=detection.detector,
         unit=detection.statistic.unit,
         joint=margin.name,
-        role=role or ("detection" if contact else "alarm"),
+        role=role,
         alarm=alarm,
         contact=contact,
         left=left,
@@ -236,6 +237,11 @@ def _moved_at_contact(detection: Detection, joint: str, contact: Contact, until:
         lead=_LEAD_OF_ONSET + contact.uncertainty,
         after=max(_AFTERMATH, until - contact.start),
     )
+
+
+def _as_role(role: Role, item: AlarmExplanation) -> AlarmExplanation:
+    """Return the explanation of an alarm that is known to be a `role`; in a contact in progress it stays that."""
+    return item if item.role == "in progress" else replace(item, role=role)
 
 
 def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[Contact | None, Role]:

@@ -10,7 +10,6 @@ import numpy as np
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.trends import Course
 from cdtool.evaluation.upkeep.deviation import Axis
-from cdtool.evaluation.upkeep.words import verdicts
 from cdtool.motion import MotionClass
 from cdtool.recording import FloatArray
 
@@ -75,11 +74,6 @@ class JointDrift:
         """The runs' deviation (runs,) at the nearest of the places."""
         column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
         return column
-
-    @property
-    def verdicts(self) -> tuple[str, ...]:
-        """What the runs say, in plain words; a line each."""
-        return verdicts(self)
 
     @property
     def runs_left(self) -> float:

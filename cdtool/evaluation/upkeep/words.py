@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.trends import LEAST_RUNS
+from cdtool.evaluation.upkeep.audit import JointDrift, Shown
 from cdtool.plain_text import counted, digits
-
-if TYPE_CHECKING:
-    from cdtool.evaluation.upkeep.audit import JointDrift, Shown
 
 NOTHING_SHOWN = "no drift shown"
 _INSPECT = "inspect the machine there before relearning"

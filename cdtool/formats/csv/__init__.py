@@ -1,7 +1,7 @@
 """CSV and its kin: text tables, one row a sample, with or without a header line.
 
-`dialect.py` finds how a table is written (text, lines, separator, head, marks, stamps: a file each), `table.py` and
-`rows.py` read it.
+`find_dialect.py` finds how a table is written (text, lines, separator, head, marks, stamps: a file each),
+`table.py` and `rows.py` read it.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Csv:
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
-    from cdtool.formats.csv.dialect import find_dialect
+    from cdtool.formats.csv.find_dialect import find_dialect
     from cdtool.formats.csv.text import read_sample
 
     sample = read_sample(path)

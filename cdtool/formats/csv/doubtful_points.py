@@ -7,20 +7,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import split_line
+from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import begins_comment
 from cdtool.formats.csv.marks import Marks, find_marks
 from cdtool.formats.csv.row_kernel import Integers
 from cdtool.formats.csv.text import Bytes
-
-if TYPE_CHECKING:
-    from cdtool.formats.csv.dialect import Dialect
 
 _WHOLE = re.compile(r"[+-]?(?:0|[1-9][0-9]*)")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from cdtool.formats.csv.cells import kind, split_line
+from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import is_ruler, shown_lines
 from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
 from cdtool.recording import Finding
-
-if TYPE_CHECKING:
-    from cdtool.formats.csv.dialect import Dialect
 
 _MOST = 12
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum

@@ -8,11 +8,10 @@ from pathlib import Path
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import STAMP_LIKE, holds_numbers, kind, number, split_line
-from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
-from cdtool.formats.csv.shown_pins import quoted
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
 

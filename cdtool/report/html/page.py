@@ -20,12 +20,19 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import NOTHING, number
-from cdtool.report.html.forces import force_counts, force_table, points_table
 from cdtool.report.html.plots import plot_data
-from cdtool.report.html.provenance import provenance_tables
 from cdtool.report.html.recordings import not_judged_table, reasons_table, recordings_table, traces_of
 from cdtool.report.html.table import Table, seen
-from cdtool.report.html.tables import calibration_table, comparisons_table, limits_table, summary_table
+from cdtool.report.html.tables import (
+    calibration_table,
+    comparisons_table,
+    force_counts,
+    force_table,
+    limits_table,
+    points_table,
+    provenance_tables,
+    summary_table,
+)
 from cdtool.report.html.traces import plot_height, trace_data
 from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, tone, verdict_words
 

@@ -1,15 +1,16 @@
-"""The HTML report's tables of figures: limits, detectors, comparisons, calibration."""
+"""The HTML report's tables of results: limits, detectors, comparisons, calibration, forces; and of their provenance."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from cdtool.evaluation.comparison import Comparison
 from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import Results
+from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.summary import Summary
 from cdtool.plain_text import counted
@@ -31,6 +32,32 @@ from cdtool.report.verdict_words import allowed, value_of
 _TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
 _OPEN_END = f" to {NOT_REACHED}"
 _WORST_FIRST = ("violated", "not_assessable", "met")
+_PROVENANCE_WORDS = {
+    "tool": "tool",
+    "tool_version": "its version",
+    "machine": "machine",
+    "watched_joints": "joints watched, of all",
+    "threshold": "threshold",
+    "signature_rule": "how the normal band is made",
+    "safety_factor_set": "safety factor or limits set",
+    "false_alarm_budget": "false-alarm budget",
+    "operations": "operations cut by",
+    "window_s": "matching window [s]",
+    "debounce_samples": "debounce [samples]",
+    "rearm_s": "armed again after [s]",
+    "hysteresis": "hysteresis, share of the safety factor",
+    "latch": "alarms latch",
+    "onset": "onset of a contact",
+    "label_file": "label file",
+    "synchronisation_s": "synchronisation of the load cell [s]",
+    "mass_before_cell_kg": "mass before the load cell [kg]",
+    "benchmark_sha256": "SHA-256 of the benchmark file",
+    "machine_sha256": "SHA-256 of the machine file",
+    "plugins": "plug-ins",
+    "learned_runs": "operations learned from",
+}
+# Parts of the provenance that have tables of their own.
+_TABLES_APART = ("gains", "signature_sha256", "learned_sha256", "units", "short_names", "force_profiles")
 
 
 def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -241,3 +268,154 @@ def _split(words: str, value: float, tone: str = "") -> Cell:
     ends = (f"({low}", _OPEN_END.strip() + ")") if interval.endswith(_OPEN_END + ")") else (f"({interval}",)
     rest = (ends if bracket else ()) + ((bound,) if bound else ())
     return Cell(text, rest, key_of(value), tone)
+
+
+def force_table(results: Results, opens: Mapping[tuple[str, str], Sequence[int]]) -> Table:
+    """Every contact against its force profile; `opens`: the traces of each recording in its group."""
+    columns = (
+        Column("recording"),
+        Column("group", choice=True),
+        Column("contact", numeric=True),
+        Column("verdict", choice=True),
+        Column("peak [N]", numeric=True),
+        Column("first exceeded after [ms]", numeric=True),
+        Column("steps"),
+        Column("test point", choice=True),
+    )
+    rows = [
+        (
+            Cell(shown(item.recording)),
+            Cell(shown(item.group)),
+            count_cell(item.contact),
+            outcome_cell(item.verdict),
+            figure_cell(item.peak_n),
+            Cell("never" if item.time_budget_ms is None else number(item.time_budget_ms), key=_budget_key(item)),
+            Cell(_steps(item.steps)),
+            Cell(item.point or NOTHING),
+        )
+        for item in results.forces
+    ]
+    return Table(
+        "forces-table",
+        "Every contact against its force limits",
+        columns,
+        rows,
+        opens=[opens.get((item.group, item.recording), ()) for item in results.forces],
+    )
+
+
+def force_counts(results: Results) -> Table:
+    """How many contacts of each group keep their profile."""
+    names = ("group", "profile", "pass", "fail", "not assessable", "largest peak [N]")
+    columns = [Column(name, numeric=i > 1) for i, name in enumerate(names)]
+    parts: dict[tuple[str, str], list[ForceResult]] = {}
+    for item in results.forces:
+        parts.setdefault((item.group, item.profile), []).append(item)
+    return Table("force-counts", "Contacts by force verdict", columns, [_force_count(*part) for part in parts.items()])
+
+
+def points_table(results: Results) -> Table:
+    """Test points, averaged as their profile asks."""
+    names = ("test point", "group", "profile", "verdict", "tests", "steps", "why")
+    rows = [_point_row(item) for item in results.points]
+    return Table("points-table", "Test points against their force limits", [Column(name) for name in names], rows)
+
+
+def _force_count(key: tuple[str, str], forces: Sequence[ForceResult]) -> Row:
+    counts = Counter(item.verdict for item in forces)
+    peaks = [item.peak_n for item in forces if item.peak_n is not None]
+    verdicts = [
+        Cell(str(counts[verdict]), key=counts[verdict], tone=tone_of(verdict) if counts[verdict] else "")
+        for verdict in ("pass", "fail", "not_assessable")
+    ]
+    return (*(Cell(shown(name)) for name in key), *verdicts, figure_cell(max(peaks, default=None)))
+
+
+def _point_row(item: PointResult) -> Row:
+    return (
+        Cell(shown(item.point)),
+        Cell(shown(item.group)),
+        Cell(item.profile),
+        outcome_cell(item.verdict),
+        Cell(item.note),
+        Cell(_steps(item.steps)),
+        Cell(item.reason or ""),
+    )
+
+
+def _steps(steps: Sequence[ForceStepResult]) -> str:
+    return "; ".join(
+        f"{item.name} {number(item.peak_n)} of {item.at_most_n:g} N: {spoken(item.verdict)}" for item in steps
+    )
+
+
+def _budget_key(item: ForceResult) -> float:
+    return key_of(math.inf if item.time_budget_ms is None else item.time_budget_ms)
+
+
+def provenance_tables(results: Results) -> list[Table]:
+    """Every entry of the provenance, those that this version does not know under their own names."""
+    provenance = results.provenance
+    entries = [
+        (key, value) for key, value in provenance.items() if key not in _TABLES_APART and value not in (None, "", {})
+    ]
+    made = [
+        _table(
+            "provenance-table",
+            "How the figures came about",
+            ("what", "value"),
+            [(Cell(_PROVENANCE_WORDS.get(key, shown(key))), Cell(_in_words(value))) for key, value in entries],
+        ),
+        _table(
+            "gains-table",
+            "Detectors",
+            ("detector", "compared in", "gains", "SHA-256 of its threshold"),
+            _gains(results),
+        ),
+        _table(
+            "profiles-table", "Force profiles", ("group", "profile", "limits", "source", "note"), _profiles(provenance)
+        ),
+        _table(
+            "learned-table",
+            "Recordings learned from",
+            ("recording", "SHA-256"),
+            [(Cell(shown(name)), Cell(str(digest))) for name, digest in part_of(provenance, "learned_sha256").items()],
+        ),
+    ]
+    return [table for table in made if table.rows]
+
+
+def _table(name: str, caption: str, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
+    return Table(name, caption, [Column(heading) for heading in headings], rows)
+
+
+def _gains(results: Results) -> list[Sequence[Cell]]:
+    units, digests = (part_of(results.provenance, key) for key in ("units", "signature_sha256"))
+    return [
+        (
+            detector_cell(results, name),
+            Cell(str(units.get(name, NOTHING))),
+            Cell(_in_words(gains)),
+            Cell(str(digests.get(name, NOTHING))),
+        )
+        for name, gains in part_of(results.provenance, "gains").items()
+    ]
+
+
+def _profiles(provenance: Mapping[str, Any]) -> list[Sequence[Cell]]:
+    return [
+        (
+            Cell(shown(group)),
+            *(Cell(_in_words(profile.get(key, NOTHING))) for key in ("title", "steps", "source", "note")),
+        )
+        for group, profile in part_of(provenance, "force_profiles").items()
+        if isinstance(profile, Mapping)
+    ]
+
+
+def _in_words(value: object) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} = {_in_words(item)}" for key, item in value.items()) or NOTHING
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "; ".join(map(_in_words, value)) or NOTHING
+    return str(value) or NOTHING

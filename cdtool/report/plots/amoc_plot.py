@@ -1,25 +1,29 @@
-"""Median latency against false alarms, with the limits of every detector moved (AMOC): a panel a group."""
+"""Median latency against false alarms, with the limits of every detector moved (AMOC): a panel a group.
+
+The horizontal axis has rates, and left of them a zone without a false alarm.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.evaluation.amoc import AmocCurve, amoc_curves
+from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
 from cdtool.report.figure_text import NOTHING, number
-from cdtool.report.plots.amoc_axes import RateFrame, explain, rate_frame, set_latencies, set_rates
-from cdtool.report.plots.direct_labels import Labelled, write_labels
-from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
-from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range
+from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.labels import Labelled, write_labels
+from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
 from cdtool.report.plots.side_table import Column, SideTable, key_height
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import BAND, look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +39,8 @@ _FIGURES = (
 _NAME = 24
 _PANEL = 2.5
 _ARROW = 15.0
+# Share of a panel's width for the points without a false alarm.
+_ZONE = 0.27
 
 
 def plot_amoc(evaluated: Evaluated, path: Path) -> None:
@@ -60,11 +66,11 @@ def _figure(evaluated: Evaluated) -> Figure:
     heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in rows.values()]
     margins = Margins(0.75, table.width + 0.1, 0.5, 0.9)
     figure, panels = stacked_panels(margins.left + 5.2 + margins.right, heights, margins, gap=0.36)
-    frame = rate_frame(curves)
-    set_rates(panels[-1], frame)
+    frame = _rate_frame(curves)
+    _set_rates(panels[-1], frame)
     low, high, logarithmic = latency_range(np.array([point.median for item in curves for point in item.points]))
     for axes, group in zip(panels, groups, strict=True):
-        set_latencies(axes, low, high, logarithmic)
+        _set_latencies(axes, low, high, logarithmic)
         frame.shade(axes)
         shown = [item for item in curves if item.group == group]
         for item in shown:
@@ -75,7 +81,7 @@ def _figure(evaluated: Evaluated) -> Figure:
         for i, row in enumerate(_by_median(rows[group], by_name)):
             _write_row(table, axes, i, row, by_name.get(row.detector))
     table.write_headings(panels[0])
-    explain(panels[-1], curves, floored=logarithmic)
+    _explain(panels[-1], curves, floored=logarithmic)
     return figure
 
 
@@ -85,7 +91,7 @@ def _heights(axes: Axes, item: AmocCurve) -> FloatArray:
     return np.maximum(medians, FLOOR_MS) if axes.get_yscale() == "log" else medians
 
 
-def _draw_curve(axes: Axes, item: AmocCurve, frame: RateFrame) -> None:
+def _draw_curve(axes: Axes, item: AmocCurve, frame: _RateFrame) -> None:
     look, x = look_of(item.detector), frame.x(item.detector, item.points)
     y = _heights(axes, item)
     inside = np.array([point.false_alarms == 0 for point in item.points])
@@ -148,7 +154,7 @@ def _arrow(colour: str) -> dict[str, object]:
     return {"arrowstyle": "<-", "color": colour, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
 
 
-def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: RateFrame) -> None:
+def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: _RateFrame) -> None:
     """Names where there are rates, from low ones on; in the zone without a false alarm there is no room."""
     named = []
     for item in curves:
@@ -188,3 +194,116 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: Am
     )
     loud = (False, False, False, point.missed > 0, curve.not_assessable > 0, point.false_alarms > 0)
     table.write_key(axes, place, row.detector, cells, loud)
+
+
+@dataclass(frozen=True)
+class _RateFrame:
+    """The horizontal axis: a zone without a false alarm from `left` to `least`, then rates up to `most`.
+
+    In the zone each detector has a column of its own: a point's place there is no rate.
+    """
+
+    left: float
+    least: float
+    most: float
+    columns: tuple[str, ...]
+
+    def x(self, detector: str, points: Sequence[AmocPoint]) -> FloatArray:
+        """Where the points of a detector are drawn."""
+        share = (self.columns.index(detector) + 0.5) / len(self.columns)
+        column = self.left * (self.least / self.left) ** share
+        return np.array([point.rate if point.false_alarms else column for point in points])
+
+    def shade(self, axes: Axes) -> None:
+        """Mark the zone."""
+        axes.axvspan(self.left, self.least, color=BAND, linewidth=0, zorder=0)
+
+
+def _rate_frame(curves: Sequence[AmocCurve]) -> _RateFrame:
+    """Rates begin a little below that of one single false alarm."""
+    exposures = [item.hours if item.per == "hour" else float(item.operations) for item in curves]
+    least = 1.0 / max(exposures) / 1.6
+    most = max([10.0 * least, *(1.6 * point.rate for item in curves for point in item.points)])
+    columns = tuple(dict.fromkeys(item.detector for item in curves))
+    return _RateFrame(least / (most / least) ** (_ZONE / (1.0 - _ZONE)), least, most, columns)
+
+
+def _set_rates(axes: Axes, frame: _RateFrame) -> None:
+    """Make the horizontal axis one of rates."""
+    from matplotlib.ticker import FixedLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.set_xlim(frame.left, frame.most)
+    decades = range(math.ceil(math.log10(frame.least)), math.floor(math.log10(frame.most)) + 1)
+    minor = [step * 10.0**power for power in (*decades, decades.start - 1) for step in range(2, 10)]
+    axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in decades]))
+    axes.xaxis.set_minor_locator(FixedLocator([tick for tick in minor if frame.least <= tick <= frame.most]))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:.12g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _set_latencies(axes: Axes, low: float, high: float, logarithmic: bool) -> None:
+    """Make the vertical axis one of latencies [ms]."""
+    if logarithmic:
+        axes.set_yscale("log")
+        set_ticks(axes.yaxis, low, high)
+    # Room above the highest point for an arrow.
+    axes.set_ylim(low, high * (high / low) ** 0.08 if logarithmic else 1.08 * high)
+    axes.set_ylabel("median latency [ms]")
+    axes.grid(color="0.9", linewidth=0.6)
+
+
+def _explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
+    """Below the zone what no false alarm means, below the rates what they are and what the marks mean.
+
+    `floored`: the axis of latencies is logarithmic, so that medians below its floor are drawn there.
+    """
+    hours, bounds = [item.hours for item in curves], [item.at_most for item in curves]
+    per, counts = curves[0].per, sorted({item.operations for item in curves})
+    operations = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else str(counts[0])
+    zone = "\n".join(
+        (
+            f"none in {operations} operations,",
+            f"{between(min(hours), max(hours))} h",
+            f"(at most {between(min(bounds), max(bounds))} per {per})",
+        )
+    )
+    rates = f"false alarms per {per}"
+    for text, share, lift, size, side in (
+        (zone, 0.5 * _ZONE, -4.0, 7.5, "center"),
+        (rates, _ZONE + 0.5 * (1.0 - _ZONE), -22.0, 9.0, "center"),
+        (_marks(curves, floored), 0.0, -46.0, 8.0, "left"),
+    ):
+        axes.annotate(
+            text,
+            (share, 0.0),
+            xycoords="axes fraction",
+            xytext=(0.0, lift),
+            textcoords="offset points",
+            ha=side,
+            va="top",
+            fontsize=size,
+            linespacing=1.35,
+            annotation_clip=False,
+        )
+
+
+def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:
+    points = [point for item in curves for point in item.points]
+    words = ["mark: one safety factor, the large one is in use"]
+    if any(point.missed for point in points):
+        words.append("open: contacts were missed")
+    if any(math.isinf(point.median) for point in points):
+        words.append("arrow: the median is not reached, half of them or more were missed")
+    if floored and any(point.median < FLOOR_MS for point in points):
+        words.append(f"medians below {FLOOR_MS:.0f} ms are drawn there")
+    return "; ".join(words)
+
+
+def write_amoc(report: Report, folder: Path) -> list[Image]:
+    """Draw amoc.png for a report folder, where limits were moved; raises CdtoolError (see `save`)."""
+    if not report.evaluated.results.sweep:
+        return []
+    image = Image("amoc.png", "median latency against false alarms, with the limits of each detector moved")
+    plot_amoc(report.evaluated, folder / image.name)
+    return [image]

@@ -1,4 +1,7 @@
-"""One log and one detector: signal and band, trigger and load cell over time (thesis figures 5.6 to 5.8)."""
+"""One log and one detector: signal and band, trigger and load cell over time (thesis figures 5.6 to 5.8).
+
+Above it stands one line that says in words what it shows.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,9 @@ from cdtool.detection import Alarm
 from cdtool.evaluation.traces.trace import Course, Span
 from cdtool.evaluation.truth.matching import Match
 from cdtool.pipeline import Detection
+from cdtool.plain_text import counted
 from cdtool.recording import Contact
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
-from cdtool.report.plots.outcome import outcome_words
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -96,7 +99,7 @@ def _figure(found: Detected) -> Figure:
         late = next(item.latency for item in matches if item.alarm is event.alarm)
         _write_latency(grid[len(joints), -1], event, late)
     figure.suptitle(
-        f"{label(recording.name, 60)}  ·  {label(detector)}\n{outcome_words(found, alarming, joints)}",
+        f"{label(recording.name, 60)}  ·  {label(detector)}\n{_outcome_words(found, alarming, joints)}",
         fontsize=10,
         x=0.01,
         ha="left",
@@ -219,3 +222,60 @@ def _zoom(event: _Event, whole: Span) -> Span | None:
 def _overlap(detection: Detection, span: Span) -> bool:
     time = detection.statistic.time
     return len(time) > 0 and bool(time[0] <= span[1] and time[-1] >= span[0])
+
+
+def _outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> str:
+    """Return what became of the contacts and alarms, what could not be judged, and which joints are drawn.
+
+    Parameters
+    ----------
+    found : Detected
+        The log with what the detector says of each of its operations.
+    alarming, joints : list of int
+        The columns of the joints that alarm, and of those that are drawn.
+
+    """
+    matches = [item for matching in found.matchings for item in matching.matches]
+    words = _words_of_contacts(matches) + _words_of_alarms(found, bool(matches))
+    blind = _words_of_unjudged(found)
+    if blind:
+        words = [word for word in words if word not in ("no alarm", "not assessable")]
+    operations = [counted(len(found.detections), "operation")] if len(found.detections) > 1 else []
+    return "  ·  ".join([*words, *blind, *operations, *_words_of_joints(found, alarming, joints)])
+
+
+def _words_of_contacts(matches: list[Match]) -> list[str]:
+    late = [1e3 * item.latency for item in matches if item.outcome == "detected"]
+    if not matches:
+        return []
+    if len(matches) == 1:
+        return [f"detected after {late[0]:.0f} ms" if late else matches[0].outcome.replace("_", " ")]
+    spread = f" after {min(late):.0f} to {max(late):.0f} ms" if late else ""
+    return [f"{len(late)} of {counted(len(matches), 'contact')} detected{spread}"]
+
+
+def _words_of_alarms(found: Detected, has_contacts: bool) -> list[str]:
+    """Beside contacts only the alarms that belong to none are worth a word."""
+    if has_contacts:
+        extra = sum(len(matching.false_alarms) for matching in found.matchings)
+        return [counted(extra, "false alarm")] if extra else []
+    alarms = sum(len(item.verdict.alarms) for item in found.detections)
+    return [counted(alarms, "alarm") if alarms else "no alarm"]
+
+
+def _words_of_unjudged(found: Detected) -> list[str]:
+    unjudged = [item for item in found.detections if item.verdict.outcome == "not_assessable"]
+    if not unjudged:
+        return []
+    operations = len(found.detections)
+    share = f" in {len(unjudged)} of {operations} operations" if operations > 1 else ""
+    return [f"not assessable{share}: {label(unjudged[0].verdict.reason, 70)}"]
+
+
+def _words_of_joints(found: Detected, alarming: list[int], joints: list[int]) -> list[str]:
+    if len(alarming) > len(joints):
+        return [f"{len(joints)} of {len(alarming)} alarming joints shown"]
+    if len(found.joints) > len(joints):
+        which = "those that alarm" if alarming else "the leading one"
+        return [f"{len(joints)} of {len(found.joints)} joints shown: {which}"]
+    return []

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.evaluation.upkeep.audit import DriftAudit, JointDrift
+from cdtool.evaluation.upkeep.words import verdicts
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
@@ -68,7 +69,7 @@ def _figure(audit: DriftAudit) -> Figure:
 
 def _told(joint: JointDrift, *, named: bool) -> list[str]:
     name = f"{label(joint.joint, 24)}: " if named else ""
-    return [f"{name}{label(line, 220)}" for line in joint.verdicts[:_VERDICTS]]
+    return [f"{name}{label(line, 220)}" for line in verdicts(joint)[:_VERDICTS]]
 
 
 def _largest_margin(joint: JointDrift) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -59,6 +61,7 @@ _STYLE: dict[str, object] = {
 }
 # Settings that are no appearance: a backend is never chosen here, and asking for some warns.
 _NOT_STYLE = ("backend", "interactive", "toolbar", "timezone", "tk.", "webagg.", "keymap.", "docstring.", "savefig.dir")
+_LONGEST_NAME = 40
 
 
 @contextmanager
@@ -175,3 +178,15 @@ def _settle(figure: Figure) -> None:
     if title is not None:
         x, y = title.get_position()
         title.set_position((round(x, 6), round(y, 6)))
+
+
+def slug(name: str, taken: set[str]) -> str:
+    """A file name's part for a group or detector: letters, digits, hyphens; unlike any in `taken`, and added to it."""
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    base = re.sub(r"[^a-z0-9]+", "-", letters.lower())[:_LONGEST_NAME].strip("-") or "unnamed"
+    found, number = base, 1
+    while found in taken:
+        number += 1
+        found = f"{base}-{number}"
+    taken.add(found)
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -13,14 +14,16 @@ import numpy as np
 
 from cdtool.detection import Status
 from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.traced import TracedForce, force_profiles, traced_forces
 from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
+from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
-from cdtool.report.plots.figures import drawing, label, new_figure, save
-from cdtool.report.plots.force_time_axis import set_time, time_nodes
-from cdtool.report.plots.limit_labels import LineLabel, place_labels
+from cdtool.report.plots.figures import drawing, label, new_figure, save, slug
+from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -36,6 +39,11 @@ _WHOLE = 0.99
 _PIXELS = 700
 _UNSEEN = HATCHES[Status.GAP]
 _ORDER = ("fail", "not_assessable", "pass")
+# The first part of the time axis [s] is the shortest of these that shows what happens; what follows is compressed.
+_VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
+_VIEW_SHARE = 0.72
+_TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+_MOST_TICKS = 8.01
 
 
 @dataclass(frozen=True)
@@ -74,11 +82,11 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
         figure.text(0.5, 0.5, "no contact with a load-cell force: nothing to show", ha="center", va="center")
         return figure
     ranked = [sorted(panel.curves, key=_badness) for panel in shown]
-    nodes = time_nodes(ranked, profile)
+    nodes = _time_nodes(ranked, profile)
     figure = new_figure(9.5, 1.5 + 2.3 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel, curves in zip(rows, shown, ranked, strict=True):
-        set_time(axes, nodes)
+        _set_time(axes, nodes)
         _draw_limits(axes, profile, nodes)
         axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
         _draw_curves(axes, curves)
@@ -233,3 +241,76 @@ def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]
         text = f"alarm {label(name, 24)}"
         handles.append(Line2D([], [], color=look.colour, marker=look.marker, linestyle="none", label=text))
     return handles
+
+
+def _time_nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -> list[float]:
+    """Where the time axis bends [s]: 0, the end of its first part, the later limits' beginnings, the end."""
+    moments = [0.0]
+    for curves in ranked:
+        worst = curves[0]
+        moments += [1.15 * time for time in worst.alarms.values() if math.isfinite(time)]
+        moments += [2.0 * step.peak_at for step in worst.verdict.steps[:1] if math.isfinite(step.peak_at)]
+    view = next((view for view in _VIEWS if view >= max(moments)), _VIEWS[-1])
+    later = [step.from_s for step in profile.steps if step.from_s > view]
+    ends = [float(curve.time[-1]) for curves in ranked for curve in curves]
+    end = _rounded_up(max([1e-3, 1.2 * profile.steps[-1].from_s, *ends]))
+    return [0.0, end] if not later and end <= 2.0 * view else [0.0, view, *later, end]
+
+
+def _set_time(axes: Axes, nodes: Sequence[float]) -> None:
+    """A time axis that is linear between its bends; nothing beyond its end is drawn."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    shares = np.linspace(_VIEW_SHARE, 1.0, len(nodes) - 1) if len(nodes) > 2 else np.array([1.0])
+    times, places = np.asarray(nodes), np.concatenate(([0.0], shares))
+    to_place, to_time = partial(np.interp, xp=times, fp=places), partial(np.interp, xp=places, fp=times)
+    axes.set_xscale("function", functions=(to_place, to_time))
+    axes.set_xlim(nodes[0], nodes[-1])
+    step = next((step for step in _TICKS if nodes[1] / step <= _MOST_TICKS), _TICKS[-1])
+    ticks = [tick for tick in np.arange(0.0, nodes[1], step).tolist() if nodes[1] - tick > 0.6 * step]
+    axes.xaxis.set_major_locator(FixedLocator([*ticks, *nodes[1:]]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(lambda value, _: f"{1e3 * value:.0f}")
+    for bend in nodes[1:-1]:
+        axes.axvline(bend, color="0.75", linewidth=0.7, zorder=0.5)
+
+
+def _rounded_up(time: float) -> float:
+    """To two digits, for the axis's last label."""
+    digit = 10.0 ** (math.floor(math.log10(time)) - 1)
+    return round(math.ceil(time / digit - 1e-9) * digit, 9)
+
+
+def write_forces(report: Report, folder: Path) -> list[Image]:
+    """Draw forces.png for a report folder, forces_<profile>.png with several profiles; raises CdtoolError (see `save`).
+
+    Only where there are force limits and curves.
+    """
+    results = report.evaluated.results
+    curves = traced_forces(results, report.traces)
+    used = {name: [item for item in curves if item.verdict.profile == name] for name in force_profiles(results)}
+    shown = {name: items for name, items in used.items() if items}
+    images, taken = [], set[str]()
+    for name, items in shown.items():
+        file = "forces.png" if len(shown) == 1 else f"forces_{slug(name, taken)}.png"
+        judged = sum(row.profile == name for row in results.forces)
+        images.append(Image(file, _force_caption(results, name, len(items), judged)))
+        plot_forces(_panels(items), force_profiles(results)[name], folder / file)
+    return images
+
+
+def _force_caption(results: Results, profile: str, drawn: int, judged: int) -> str:
+    caption = f"contact force over time against {profile}"
+    if drawn < judged:
+        caption += f": the {drawn} of {judged} contacts whose curves were kept"
+    if results.provenance.get("mass_before_cell_kg"):
+        caption += "; curves as the load cell saw them, verdicts corrected for the mass before it"
+    return caption
+
+
+def _panels(items: Sequence[TracedForce]) -> list[ForcePanel]:
+    groups: dict[str, list[ForceCurve]] = {}
+    for item in items:
+        name = item.recording if item.contact == 1 else f"{item.recording}, contact {item.contact}"
+        groups.setdefault(item.group, []).append(ForceCurve(name, item.time, item.force, item.verdict, item.alarms))
+    return [ForcePanel(group, tuple(curves)) for group, curves in groups.items()]

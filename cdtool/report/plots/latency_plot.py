@@ -20,6 +20,7 @@ from cdtool.report.plots.figures import Margins, between, drawing, label, new_fi
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable
 from cdtool.report.plots.style import look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -243,3 +244,10 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
     if any(few):
         lines[-1] += f"; no bar below {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
     return "\n".join(lines)
+
+
+def write_latencies(report: Report, folder: Path) -> list[Image]:
+    """Draw latency.png for a report folder; raises CdtoolError (see `save`)."""
+    image = Image("latency.png", "latency of every detector in every group")
+    plot_latencies(report.evaluated, folder / image.name)
+    return [image]

@@ -26,6 +26,17 @@ class Column:
 
 
 @dataclass(frozen=True)
+class _Line:
+    """Where the cells of a line stand: at `y` in `coordinates`, lifted by `lift` [points]; `size` of their letters."""
+
+    coordinates: object
+    y: float
+    lift: float = 0.0
+    side: str = "center"
+    size: float = _SIZE
+
+
+@dataclass(frozen=True)
 class SideTable:
     """Columns right of the panels of a figure, the first one `gap` [points] from their edge."""
 
@@ -40,12 +51,12 @@ class SideTable:
     def write_headings(self, axes: Axes) -> None:
         """The headings above the panel's upper edge."""
         for i, column in enumerate(self.columns):
-            self._write(axes, i, column.heading, "axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE)
+            self._write(axes, i, column.heading, _Line("axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE))
 
     def write_row(self, axes: Axes, y: float, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """A row at height `y` of the panel's own scale; `loud` cells are bold."""
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
-            self._write(axes, i, cell, axes.get_yaxis_transform(), y, 0.0, "center", _SIZE, bold)
+            self._write(axes, i, cell, _Line(axes.get_yaxis_transform(), y), bold)
 
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """A row counted from the panel's upper edge, the detector's mark before it."""
@@ -67,33 +78,21 @@ class SideTable:
         )
         axes.add_line(mark)
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
-            self._write(axes, i, cell, "axes fraction", 1.0, lift, "center", _SIZE, bold, _INDENT if i == 0 else 0.0)
+            self._write(axes, i, cell, _Line("axes fraction", 1.0, lift), bold, _INDENT if i == 0 else 0.0)
 
-    def _write(  # noqa: PLR0913  a cell's text, position and style
-        self,
-        axes: Axes,
-        number: int,
-        text: str,
-        across: object,
-        y: float,
-        lift: float,
-        side: str,
-        size: float,
-        bold: bool = False,
-        indent: float = 0.0,
-    ) -> None:
+    def _write(self, axes: Axes, number: int, text: str, line: _Line, bold: bool = False, indent: float = 0.0) -> None:
         column = self.columns[number]
         before = self.gap + sum(item.width for item in self.columns[:number])
         offset = before + (indent if column.left else 0.5 * column.width)
         axes.annotate(
             text,
-            (1.0, y),
-            xycoords=across,  # type: ignore[arg-type]
-            xytext=(offset, lift),
+            (1.0, line.y),
+            xycoords=line.coordinates,  # type: ignore[arg-type]
+            xytext=(offset, line.lift),
             textcoords="offset points",
             ha="left" if column.left else "center",
-            va=side,
-            fontsize=size,
+            va=line.side,
+            fontsize=line.size,
             fontweight="bold" if bold else "normal",
             annotation_clip=False,
         )

@@ -17,6 +17,7 @@ from cdtool.report.plots.figures import Margins, drawing, label, new_figure, sav
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable, key_height
 from cdtool.report.plots.style import look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -162,3 +163,12 @@ def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
     if any(not _enough(item) for items in few for item in items):
         words.append(f"no band below {FEWEST} contacts")
     return "\n".join(["time from contact onset [ms]", "; ".join(words)]).rstrip()
+
+
+def write_survival(report: Report, folder: Path) -> list[Image]:
+    """Draw survival.png for a report folder, where there are contacts; raises CdtoolError (see `save`)."""
+    if not report.evaluated.results.contacts:
+        return []
+    image = Image("survival.png", "share of the contacts that are still undetected over time")
+    plot_survival(report.evaluated, folder / image.name)
+    return [image]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
 from cdtool.plain_text import counted
-from cdtool.report.plots.figures import Margins, drawing, label, save, stacked_panels, text_width, unit_label
+from cdtool.report.plots.figures import Margins, drawing, label, save, slug, stacked_panels, text_width, unit_label
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -21,6 +21,7 @@ from cdtool.report.plots.panels import (
     trigger_spans,
 )
 from cdtool.report.plots.style import look_of
+from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -189,3 +190,27 @@ def _title(trace: Trace) -> str:
     if contact and math.isfinite(contact.peak_force):
         words.append(f"peak {contact.peak_force:.0f} N")
     return "  ·  ".join(words)
+
+
+def write_triggers(report: Report, folder: Path) -> list[Image]:
+    """Draw triggers_<group>.png of one operation of each group for a report folder; raises CdtoolError (see `save`)."""
+    images, taken = [], set[str]()
+    for group in report.evaluated.results.groups:
+        of_group = [trace for trace in report.traces if trace.group == group]
+        if of_group:
+            trace = most_telling(of_group)
+            name = f"triggers_{slug(group, taken)}.png"
+            images.append(Image(name, f"{trace.recording}: all detectors", group))
+            plot_triggers(trace, folder / name)
+    return images
+
+
+def most_telling(traces: Sequence[Trace]) -> Trace:
+    """The trace with a contact, then that of most detectors, then where most of them could judge; the first of equals.
+
+    There is at least one.
+    """
+    return max(
+        traces,
+        key=lambda trace: (trace.shown is not None, len(trace.panels), sum(not panel.blind for panel in trace.panels)),
+    )

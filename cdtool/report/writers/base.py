@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.foreign_files import Kind
 
-if TYPE_CHECKING:
-    from cdtool.report.markdown.markdown import Image
+
+@dataclass(frozen=True)
+class Image:
+    """A figure beside the report: its file name, caption, and group (None: of all groups)."""
+
+    name: str
+    caption: str
+    group: str | None = None
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from cdtool.workflows.benchmark.benchmark_file import (
 from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.scoring import Scored, detect_with, score_log
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import Progress, in_order, load_runs, shown_path
+from cdtool.workflows.runs import Progress, RunReading, in_order, load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 
@@ -84,7 +84,7 @@ def benchmark(
     compile_loaded()
     begin = perf_counter()
     base = setup.path.parent
-    learn = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=base)
+    learn = load_runs(setup.learn, machine_file, RunReading(setup.operations, onset=setup.onset, base=base, jobs=jobs))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[Skipped] = []
     if list(detectors) == ["all"]:

@@ -17,7 +17,7 @@ from cdtool.signature_store import read_signature
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
-from cdtool.workflows.runs import load_runs
+from cdtool.workflows.runs import RunReading, load_runs
 from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, notes_on
 
 
@@ -97,7 +97,8 @@ def prepare_benchmark(
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])
-    runs = load_runs(setup.learn, machine_file, setup.operations, onset=setup.onset, jobs=jobs, base=setup.path.parent)
+    reading = RunReading(setup.operations, onset=setup.onset, base=setup.path.parent, jobs=jobs)
+    runs = load_runs(setup.learn, machine_file, reading)
     fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
     used = fitted.learned_from(runs.operations)
     many = counted(len(used), "impact-free run")

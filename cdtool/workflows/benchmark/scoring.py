@@ -24,7 +24,7 @@ from cdtool.workflows.benchmark.force_rows import force_rows
 from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.contacts.impact_free import without_contacts
 from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
-from cdtool.workflows.contacts.matched_log import MatchedLog, match_log
+from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
 from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
@@ -137,7 +137,8 @@ def score_log(
             return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     found = detect(operations, scored)
-    matched = match_log(recording, operations, contacts, found, group, rules, setup.activation.wait, setup.operations)
+    detected = DetectedLog(recording, operations, setup.operations, contacts, found)
+    matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
     scored.findings += matched.warnings
     scored.matched, courses = matched, matched.courses

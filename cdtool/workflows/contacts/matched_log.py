@@ -42,26 +42,26 @@ class MatchedLog:
     warnings: tuple[Skipped, ...]
 
 
-def match_log(  # noqa: PLR0913  a log, its contacts, its detections and the rules to match them by
-    recording: Recording,
-    operations: Sequence[Operation],
-    contacts: Sequence[Contact],
-    found: Sequence[Sequence[Detection]],
-    group: str,
-    rules: ScoringRules,
-    rearm: float,
-    cut_by: str,
-) -> MatchedLog:
-    """Match the detections of each operation with the log's contacts.
+@dataclass(frozen=True)
+class DetectedLog:
+    """A log with its contacts, cut into operations as `cut_by` says, and the detections of each operation."""
 
-    `rearm` [s] is the activation's; `cut_by` says how the log was cut into its operations.
-    """
-    inside = _by_operation(operations, contacts)
+    recording: Recording
+    operations: Sequence[Operation]
+    cut_by: str
+    contacts: Sequence[Contact]
+    detections: Sequence[Sequence[Detection]]
+
+
+def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -> MatchedLog:
+    """Match the detections of each operation with the log's contacts; `rearm` [s] is the activation's."""
+    recording, contacts, found = log.recording, log.contacts, log.detections
+    inside = _by_operation(log.operations, contacts)
     courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
     crossings = _pooled(found)
     judged = []
-    for operation, own, detections in zip(operations, inside, found, strict=True):
+    for operation, own, detections in zip(log.operations, inside, found, strict=True):
         matchings = tuple(
             match(
                 item.verdict,
@@ -80,8 +80,8 @@ def match_log(  # noqa: PLR0913  a log, its contacts, its detections and the rul
         tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
-        (*_not_scored(recording, contacts, inside, cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_uncut_log(recording, found, cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+        (*_not_scored(recording, contacts, inside, log.cut_by), *_unseen_onsets(recording, contacts, rules.window)),
+        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
     )
 
 

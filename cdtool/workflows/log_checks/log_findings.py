@@ -1,18 +1,30 @@
-"""What is wrong with a log itself, whatever detector looks at it: one answer for every command."""
+"""What is wrong with a log itself, whatever detector looks at it: one answer for every command.
+
+Two channels check each other: the accelerometer's sign and scale against the derivative of the speed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
-from cdtool.recording import Contact, Finding, Recording, worst_first
-from cdtool.workflows.log_checks.accelerometer_check import accelerometer_findings
+from cdtool.recording import Contact, Finding, FloatArray, Recording, worst_first
 from cdtool.workflows.log_checks.motion_check import motion_findings
 
 # Of a contact without an onset; where contacts are scored it is named as left out.
 IN_PROGRESS = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"
+# Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.
+_WINDOW = 0.2
+# Below this correlation the motion does not say enough about the sign, or about the scale.
+_TELLING, _TELLING_SCALE = 0.5, 0.8
+# Below this share of the fastest joint's range of speed a joint hardly moves: its drive's vibration is all that shows.
+_HARDLY = 0.1
+_STANDARD_GRAVITY = 9.80665
 
 
 def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> tuple[Finding, ...]:
@@ -28,3 +40,78 @@ def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     """Return the warnings among the findings of a log, under its name; losses are reported by `runs.lost`."""
     found = log_findings(recording, contacts, rule)
     return [Skipped(recording.name, str(item)) for item in found if item.severity == "warning"]
+
+
+def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
+    """Slope of the measured acceleration over the speed's derivative before the first contact, joint by joint."""
+    recording = _before_contact(recording, contacts)
+    if "acceleration" not in recording or "speed" not in recording:
+        return []
+    found = []
+    ranges = [_range(recording["speed"].values[:, j]) for j in range(len(recording.joints))]
+    for j, joint in enumerate(recording.joints):
+        name = f" of {joint}" if len(recording.joints) > 1 else ""
+        if ranges[j] < _HARDLY * max(ranges):
+            text = f"accelerometer{name} cannot be checked: the joint hardly moves"
+            found.append(Finding(text, "acceleration", "note"))
+            continue
+        expected, measured = _pairs(recording, j)
+        found.append(_judge(expected, measured, name))
+    return found
+
+
+def _range(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if len(known) else 0.0
+
+
+def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Recording:
+    """In a contact the elastic drive parts motor and load: only what lies before the first one can be compared."""
+    since = contacts[0].end if contacts and contacts[0].in_progress else -np.inf
+    first = next((contact.start for contact in contacts if not contact.in_progress), np.inf)
+    return recording.between(since, first) if contacts else recording
+
+
+def _judge(expected: FloatArray, measured: FloatArray, name: str) -> Finding:
+    if len(expected) < 5 or np.std(expected) == 0.0 or np.std(measured) == 0.0:
+        return Finding(f"accelerometer{name} cannot be checked: the speed hardly changes", "acceleration", "note")
+    correlation = float(np.corrcoef(expected, measured)[0, 1])
+    slope = float(np.polyfit(expected, measured, 1)[0])
+    if abs(correlation) < _TELLING:
+        text = f"accelerometer{name} cannot be checked: correlation with the speed's derivative {correlation:.2f}"
+        return Finding(text, "acceleration", "note")
+    figures = f"slope {slope:.3g}, correlation {correlation:.2f} over the speed's derivative"
+    if slope < 0.0:
+        return Finding(f"accelerometer{name} has the opposite sign ({figures}): give scale = -1", "acceleration")
+    if 0.7 < slope < 1.4:
+        return Finding(f"accelerometer{name} fits the speed ({figures})", "acceleration", "note")
+    if correlation < _TELLING_SCALE:
+        return Finding(f"accelerometer{name}: its scale cannot be checked ({figures})", "acceleration", "note")
+    for factor, advice in (
+        (_STANDARD_GRAVITY, "the log may hold m/s2, not g"),
+        (1 / _STANDARD_GRAVITY, "the log may hold g"),
+    ):
+        if 0.7 < slope / factor < 1.4:
+            return Finding(f"accelerometer{name} has the wrong scale ({figures}): {advice}", "acceleration")
+    return Finding(f"accelerometer{name} has the wrong scale ({figures}): check unit and ratio", "acceleration")
+
+
+def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
+    """Over successive windows: the speed's gain / window, and the mean acceleration."""
+    speed, acceleration = recording["speed"], recording["acceleration"]
+    edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), _WINDOW)
+    if len(edges) < 3:
+        return np.empty(0), np.empty(0)
+    known = np.isfinite(speed.values[:, joint])
+    if np.count_nonzero(known) < 2:
+        return np.empty(0), np.empty(0)
+    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / _WINDOW
+    bounds = np.searchsorted(acceleration.time, edges).tolist()
+    means = np.full(len(edges) - 1, np.nan)
+    for i, (start, end) in enumerate(pairwise(bounds)):
+        part = acceleration.values[start:end, joint]
+        part = part[np.isfinite(part)]
+        if len(part):
+            means[i] = part.mean()
+    good = np.isfinite(means) & np.isfinite(gained)
+    return gained[good], means[good]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from pathlib import Path
 
 from cdtool.activation import Activation, ActivationSettings
@@ -17,7 +17,8 @@ from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import Progress, check_joints, load_runs
+from cdtool.workflows.keyword_options import by_keywords
+from cdtool.workflows.runs import Progress, RunReading, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
@@ -34,37 +35,46 @@ class Learned:
     findings: tuple[Skipped, ...]
 
 
-def learn_signature(  # noqa: PLR0913  keyword options of the Python API
-    logs: Sequence[str | Path],
-    machine: str | Path | MachineFile,
-    detector: str,
-    *,
-    rule: Threshold | None = None,
-    joints: Sequence[str] = (),
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
-    false_alarm_budget: str | None = None,
-    onset: OnsetRule | None = None,
-    jobs: int = 1,
-    progress: Progress | None = None,
-) -> Learned:
-    """Learn one detector's threshold from impact-free logs: a signature for each class of motion, or another `rule`.
+@dataclass(frozen=True)
+class LearningOptions:
+    """The machine, the detector and how its threshold is learned.
 
-    `rule` is any threshold's with its settings (safety factor, sides, alignment, force ...); `joints` are those to
-    watch, all where none is named; `activation` are settings other than the default's. `false_alarm_budget`, as
-    1/300op or 0.1/h, sets the safety factor on these runs by cross-validation. A run in which the load cell shows a
-    contact by the `onset` rule is left out. Raises SignatureError where runs are too few, UsageError where they are too
-    few for the budget, CdtoolError where nothing can be read. Write the result with
+    `rule` is any threshold's with its settings (safety factor, sides, alignment, force ...), a signature's where it is
+    None; `joints` are those to watch, all where none is named; `operations`: whole, motion or trigger; `activation` are
+    settings other than the default's. `false_alarm_budget`, as 1/300op or 0.1/h, sets the safety factor on these runs
+    by cross-validation. A run in which the load cell shows a contact by the `onset` rule is left out.
+    """
+
+    machine: str | Path | MachineFile
+    detector: str
+    _: KW_ONLY
+    rule: Threshold | None = None
+    joints: Sequence[str] = ()
+    operations: str = "whole"
+    activation: ActivationSettings | None = None
+    false_alarm_budget: str | None = None
+    onset: OnsetRule | None = None
+    jobs: int = 1
+    progress: Progress | None = None
+
+
+def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
+    """Learn one detector's threshold from impact-free logs: a signature for each class of motion, or another rule.
+
+    The options are those of `LearningOptions`. Raises SignatureError where runs are too few, UsageError where they are
+    too few for the budget, CdtoolError where nothing can be read. Write the result with
     `cdtool.signature_store.write_signature`.
     """
+    machine, joints, operations = options.machine, options.joints, options.operations
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    raised_by = Activation().changed(activation or {})  # refuses wrong settings before anything is read
-    budget = Budget.parse(false_alarm_budget) if false_alarm_budget is not None else None
+    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before anything is read
+    budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
-    wanted = for_machine(Signature() if rule is None else rule, machine_file.machine)
+    wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
-    instance = machine_file.detector(detector)
-    runs = load_runs([Path(log) for log in logs], machine_file, operations, onset=onset, jobs=jobs, progress=progress)
+    instance = machine_file.detector(options.detector)
+    reading = RunReading(operations, onset=options.onset, jobs=options.jobs, progress=options.progress)
+    runs = load_runs([Path(log) for log in logs], machine_file, reading)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)
     fitted = with_left_out(fit, [*runs.skipped, *skipped])(pairs)
@@ -92,6 +102,9 @@ def learn_signature(  # noqa: PLR0913  keyword options of the Python API
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)
+
+
+learn_signature = by_keywords(LearningOptions, learn)
 
 
 def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -26,7 +26,8 @@ from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import Progress, load_runs
+from cdtool.workflows.keyword_options import by_keywords
+from cdtool.workflows.runs import Progress, RunReading, Runs, load_runs
 from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
@@ -90,36 +91,70 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
     return tuple(pairs)
 
 
-def check_signature(  # noqa: PLR0913  keyword options of the Python API
-    path: str | Path,
-    logs: Sequence[str | Path],
-    machine: str | Path | MachineFile,
-    *,
-    operations: str | None = None,
-    target: float = TARGET,
-    onset: OnsetRule | None = None,
-    jobs: int = 1,
-    progress: Progress | None = None,
-) -> Checked:
+@dataclass(frozen=True)
+class SeasonOptions:
+    """Impact-free logs of a machine, and how they are read.
+
+    `operations`: how logs are cut; as for learning where None. A run in which the load cell shows a contact by the
+    `onset` rule is left out.
+    """
+
+    logs: Sequence[str | Path]
+    machine: str | Path | MachineFile
+    _: KW_ONLY
+    operations: str | None = None
+    onset: OnsetRule | None = None
+    jobs: int = 1
+    progress: Progress | None = None
+
+    def machine_file(self) -> MachineFile:
+        """Return the machine file, read."""
+        return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
+
+    def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
+        """Read the logs for a signature file; raises SignatureError where they are cut otherwise than for learning."""
+        operations = _cut(file, self.operations)
+        reading = RunReading(operations, onset=self.onset, jobs=self.jobs, progress=self.progress)
+        return load_runs([Path(log) for log in self.logs], machine_file, reading, file.plausible)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions(SeasonOptions):
+    """`target`: the chance of a false alarm in an operation that the runs have to show."""
+
+    target: float = TARGET
+
+
+@dataclass(frozen=True, kw_only=True)
+class UpdateOptions(SeasonOptions):
+    """`forget`: effective number of runs; None: all count alike.
+
+    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
+    was first learned.
+    """
+
+    forget: float | None = None
+    cap: float = CAP
+    reserve: float = RESERVE
+
+
+def check_by(path: str | Path, options: CheckOptions) -> Checked:
     """Hold a signature against impact-free logs: those that it was learned from, and those of a season since.
 
-    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is the
-    chance of a false alarm in an operation that they have to show. In the second, taken in the order given, drift is
-    looked for. Which log is which is told by its bytes. `operations`: how logs are cut; as for learning where None. A
-    run in which the load cell shows a contact by the `onset` rule is left out. Raises SignatureError where the file
-    does not belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
+    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is what
+    they have to show. In the second, taken in the order given, drift is looked for. Which log is which is known by its
+    bytes. The options are those of `CheckOptions` and `SeasonOptions`. Raises SignatureError where the file does not
+    belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
     """
+    target = options.target
     if not LEAST_TARGET <= target < 1.0:
         raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
-    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    machine_file = options.machine_file()
     file = read_signature(path)
     signatures = signatures_in(file)
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
-    cut = _cut(file, operations)
-    runs = load_runs(
-        [Path(log) for log in logs], machine_file, cut, onset=onset, ranges=file.plausible, jobs=jobs, progress=progress
-    )
+    runs = options.runs(file, machine_file)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
     known = {(run.sha256, run.operation) for run in file.runs}
@@ -153,6 +188,9 @@ def check_signature(  # noqa: PLR0913  keyword options of the Python API
     return Checked(file, tuple(classes), tuple(skipped), runs.findings)
 
 
+check_signature = by_keywords(CheckOptions, check_by)
+
+
 def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
     """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
     return replace(cast(Signature, file.rule), safety_factor=current.safety_factor, force=True)
@@ -169,44 +207,23 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
         return None
 
 
-def update_with_runs(  # noqa: PLR0913  keyword options of the Python API
-    path: str | Path,
-    logs: Sequence[str | Path],
-    machine: str | Path | MachineFile,
-    *,
-    operations: str | None = None,
-    forget: float | None = None,
-    cap: float = CAP,
-    reserve: float = RESERVE,
-    onset: OnsetRule | None = None,
-    jobs: int = 1,
-    progress: Progress | None = None,
-) -> Updated:
-    """Add impact-free runs to a signature file, by Welford or by forgetting (`forget`: effective number of runs).
+def update_by(path: str | Path, options: UpdateOptions) -> Updated:
+    """Add impact-free runs to a signature file, by Welford or by forgetting.
 
-    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
-    was first learned. Refused are such a run, one with an alarm, one in which the load cell shows a contact by the
-    `onset` rule, one that is in the signature already, one that ends early, and one that cannot be assessed. Raises
-    SignatureError where the file does not belong.
+    Refused are a run that brings a limit too far, one with an alarm, one in which the load cell shows a contact, one
+    that is in the signature already, one that ends early, and one that cannot be assessed. The options are those of
+    `UpdateOptions` and `SeasonOptions`. Raises SignatureError where the file does not belong.
     """
+    forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
         raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
     for name, value in (("cap", cap), ("reserve", reserve)):
         if not value > 0.0:
             raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
-    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
+    machine_file = options.machine_file()
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
-    cut = _cut(stored, operations)
-    runs = load_runs(
-        [Path(log) for log in logs],
-        machine_file,
-        cut,
-        onset=onset,
-        ranges=stored.plausible,
-        jobs=jobs,
-        progress=progress,
-    )
+    runs = options.runs(stored, machine_file)
     added: list[str] = []
     refused = list(runs.skipped)
 
@@ -222,6 +239,9 @@ def update_with_runs(  # noqa: PLR0913  keyword options of the Python API
         return file
 
     return Updated(update_signature(path, change), tuple(added), tuple(refused), runs.findings)
+
+
+update_with_runs = by_keywords(UpdateOptions, update_by)
 
 
 def _cut(file: SignatureFile, operations: str | None) -> str:

@@ -11,16 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import UsageError
+from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
 from cdtool.impact.sensor_ranking import ImpactCase
 from cdtool.impact.sensors import Sensor
 from cdtool.impact.transmission import ElasticTransmission
 from cdtool.machine_file import MachineFile
+from cdtool.machines.axis import Axis
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
 from cdtool.tables import Table, read_toml
-from cdtool.workflows.study.joint import StudiedJoint, studied_joint
-from cdtool.workflows.study.number_reader import StudyReader
 
 _DRIVE_FREQUENCY = 10.0
 _LOOP_FREQUENCY = 2.0
@@ -51,7 +52,7 @@ def read_study(
             raise UsageError(f"{name} is {value:g}", "a number above 0 is needed")
     root = Table(_merged(read_toml(Path(file)) if file else {}, options), str(file or "study"))
     reader = StudyReader(root)
-    part = studied_joint(machine, joint, reader)
+    part = _studied_joint(machine, joint, reader)
     case = _case(part, reader)
     frequency = reader.optional("impact", "first_frequency", "the load is rigid but for its drive")
     sensors = _sensors(part, reader)
@@ -192,3 +193,122 @@ def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
         Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
         Sensor("motor_speed", "on the motor", "motor_position", "m/s", speed_noise, step, bandwidth, rate, True),
     )
+
+
+@dataclass(frozen=True)
+class StudiedJoint:
+    """A joint referred to the contact: `load_mass` [kg], `motor_inertia` [kg m2], `ratio` [m/rad], `motor_friction`.
+
+    `motor_friction` is at the motor [N m s/rad]. A rotary joint is hit `lever` l [m] from its axis, so that its inertia
+    there is J/l^2 and its ratio n l; of a linear one the lever is 1.
+    """
+
+    name: str
+    load_mass: float
+    motor_inertia: float
+    ratio: float
+    motor_friction: float
+    lever: float
+    rotary: bool
+
+    @property
+    def square(self) -> float:
+        """l^2 [m2]: a stiffness of the joint [N m/rad] over it is that at the contact [N/m]."""
+        return self.lever**2
+
+    @property
+    def mass(self) -> float:
+        """Load and motor together at the contact [kg]."""
+        return self.load_mass + self.motor_inertia / self.ratio**2
+
+    def unit(self, linear: str) -> str:
+        """The load-side unit: N/m of a linear axis is N m/rad of a rotary one."""
+        return linear.replace("/m", "/rad").replace("N", "N m") if self.rotary else linear
+
+
+def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> StudiedJoint:
+    """The joint `wanted` ("" where there is only one) of any machine with joints.
+
+    Of an arm or a robot, whose joints are coupled, the others are taken to stand: the inertia is the diagonal of M.
+    Raises UsageError for an unknown joint and a lever that is missing or without meaning, ConfigurationError where an
+    inertia is missing.
+    """
+    machine = file.machine
+    if not isinstance(machine, Axis | CoupledMachine) or machine.load_units not in (LINEAR_UNITS, ROTARY_UNITS):
+        raise ConfigurationError(
+            f"{file.path}: no joint of this machine can be studied", "its joints have to turn all or slide all"
+        )
+    if not wanted and len(machine.joints) > 1:
+        names = ", ".join(machine.joints)
+        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"name one with --joint: {names}")
+    if wanted and wanted not in machine.joints:
+        raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
+    at = machine.joints.index(wanted) if wanted else 0
+    load, motor = _load_inertia(machine, at), machine.motor_inertia[at]
+    key = machine.inertia_key if isinstance(machine, Axis) else "the load's inertia"
+    needs = "a study needs the inertias of load and motor"
+    if machine.coordinates == "load":
+        needs += ", so coordinates = 'motor' with motor_inertia and transmission_ratio"
+    for name, value in ((key, load), ("motor_inertia", motor)):
+        if value <= 0.0:
+            raise ConfigurationError(f"{file.path}: machine.{name} is missing or 0", needs)
+    rotary = machine.load_units == ROTARY_UNITS
+    lever = _lever(machine, rotary, reader)
+    if not isinstance(machine, Axis):
+        inertia = f"{load:.4g} {'kg m2' if rotary else 'kg'}"
+        reader.assumed.append(f"the other joints stand: {inertia} at {machine.joints[at]}, without its motor")
+    ratio = abs(machine.transmission_ratio[at]) * lever
+    return StudiedJoint(machine.joints[at], load / lever**2, motor, ratio, machine.viscous_friction[at], lever, rotary)
+
+
+def _load_inertia(machine: Axis | CoupledMachine, at: int) -> float:
+    """Without the motor [kg m2, kg]; of coupled joints on the diagonal of M, at home."""
+    if isinstance(machine, Axis):
+        return machine.load_inertia[at]
+    return float(machine.nominal_inertia[at] - machine.reflected_inertia[at])
+
+
+def _lever(machine: JointMachine, rotary: bool, reader: StudyReader) -> float:
+    given = "lever" in reader.table("impact")
+    if not rotary:
+        if given:
+            raise UsageError("a lever is given for a linear axis", "it belongs to a rotary axis")
+        return 1.0
+    if not given and not isinstance(machine, Axis):
+        raise UsageError("no lever is given", "--lever: how far from the joint's axis the contact is [m]")
+    return reader.number("impact", "lever", 1.0, "m", "contact to axis", above=0.0)
+
+
+class StudyReader:
+    """Tables by their names; `assumed` has a line for every default that was taken."""
+
+    def __init__(self, root: Table) -> None:
+        self._tables = {"": root}
+        self.assumed: list[str] = []
+
+    def table(self, name: str) -> Table:
+        """A table such as sensors.encoder, always the same one."""
+        if name not in self._tables:
+            above, _, last = name.rpartition(".")
+            self._tables[name] = self.table(above).table(last)
+        return self._tables[name]
+
+    def number(self, table: str, key: str, default: float, unit: str, why: str = "", **bounds: float) -> float:
+        """A number of a table; the default is told with its reason."""
+        part = self.table(table)
+        if key not in part:
+            self.assumed.append(f"{table}.{key} = {default:.4g} {unit}".rstrip() + (f": {why}" if why else ""))
+        return part.number(key, default, **bounds)
+
+    def optional(self, table: str, key: str, none: str) -> float | None:
+        """A positive number that may be absent; then it is told what its absence means."""
+        part = self.table(table)
+        if key in part:
+            return part.number(key, above=0.0)
+        self.assumed.append(f"{table}.{key} = none: {none}")
+        return None
+
+    def finish(self) -> None:
+        """Raise ConfigurationError if a key of any table is left that nobody asked for."""
+        for table in self._tables.values():
+            table.finish()

@@ -22,7 +22,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import judge, run_detector
 from cdtool.recording import Recording
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.runs import load_runs
+from cdtool.workflows.runs import RunReading, load_runs
 from cdtool.workflows.signature.normal_runs import normal_motions
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
@@ -34,7 +34,7 @@ def machine(folder: str) -> MachineFile:
 
 
 def free_runs(folder: str) -> list[Operation]:
-    return load_runs(sorted((LOGS / folder / "free").iterdir()), machine(folder), "whole").operations
+    return load_runs(sorted((LOGS / folder / "free").iterdir()), machine(folder), RunReading("whole")).operations
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ from cdtool.detection import Status
 from cdtool.errors import SignatureError, UsageError
 from cdtool.evaluation.statistics.prediction import prediction_of
 from cdtool.evaluation.sweep import critical_factor
-from cdtool.evaluation.upkeep.coverage import Coverage, LeftOut, check_coverage
-from cdtool.evaluation.upkeep.gaps import gaps_of
+from cdtool.evaluation.upkeep.coverage import Coverage, LeftOut, check_coverage, gaps_of
 from cdtool.motion import MotionClass
 from cdtool.pipeline import judge
 from cdtool.thresholds.signature import Signature

@@ -14,6 +14,7 @@ from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.upkeep.advice import advice
 from cdtool.evaluation.upkeep.coverage import check_coverage
 from cdtool.evaluation.upkeep.drift import audit_drift
+from cdtool.evaluation.upkeep.words import verdicts
 from cdtool.pipeline import judge
 from cdtool.thresholds.signature import Signature
 from tests.evaluation.upkeep.seasons import ACTIVATION, learned, season
@@ -36,7 +37,7 @@ def test_a_steady_season_shows_nothing():
     found = audited()
     (joint,) = found.joints
     assert not found.drifts and not found.alarms and joint.runs_left == math.inf
-    (line,) = joint.verdicts
+    (line,) = verdicts(joint)
     assert line.startswith("no drift shown at a level of 1 %: ") and " spreads per run (" in line
     assert advice(None, found) == "keep the signature"
 
@@ -57,7 +58,7 @@ def test_a_drift_of_the_whole_stroke_is_told_with_its_slope_and_the_runs_left():
     assert joint.runs_left == pytest.approx(expected)
     left = joint.overall.runs_left
     assert left.low < left.value < left.high
-    (line,) = joint.verdicts
+    (line,) = verdicts(joint)
     assert line.startswith("drifts by +0.0") and "used up in about" in line and line.endswith(": relearn")
 
 
@@ -79,8 +80,8 @@ def test_what_grows_at_one_place_is_told_with_its_place_and_is_no_drift_of_the_w
     (joint,) = found.joints
     assert joint.overall is None and joint.local.outward
     assert joint.local.place == pytest.approx(0.40, abs=0.021)
-    assert any(line.startswith(("grows at 0.4", "grows at 0.3")) for line in joint.verdicts)
-    assert joint.verdicts[-1].endswith("inspect the machine there before relearning")
+    assert any(line.startswith(("grows at 0.4", "grows at 0.3")) for line in verdicts(joint))
+    assert verdicts(joint)[-1].endswith("inspect the machine there before relearning")
     assert advice(None, found).startswith("inspect the machine at 0.")
     assert joint.runs[-1].local_at == pytest.approx(0.40, abs=0.041)
     assert joint.runs[-1].local > 3.0 > abs(joint.runs[-1].overall)
@@ -90,7 +91,7 @@ def test_both_at_once_are_told_both_the_place_first():
     found = audited(lambda number, travel: 0.04 * number + 0.1 * number * near(travel, 0.25))
     (joint,) = found.joints
     assert joint.local.place == pytest.approx(0.25, abs=0.021)
-    texts = [line.split(" ")[0] for line in joint.verdicts if "alarm" not in line]
+    texts = [line.split(" ")[0] for line in verdicts(joint) if "alarm" not in line]
     assert texts == ["grows", "drifts"]
     assert advice(None, found).endswith("before anything is learned; then relearn")
 
@@ -104,17 +105,17 @@ def test_a_step_is_told_with_its_run():
     (joint,) = audited(lambda number, _: 1.5 * (number >= 25)).joints
     assert joint.overall.course.kind == "step" and joint.overall.course.step.run == 25
     assert joint.overall.runs_left.value == math.inf
-    (line,) = [line for line in joint.verdicts if "step" in line]
+    (line,) = [line for line in verdicts(joint) if "step" in line]
     assert line.startswith("step of +1.") and "at run 26 (run25): if something was changed then" in line
     (place,) = audited(lambda number, travel: 3.0 * (number >= 25) * near(travel, 0.3)).joints
-    (line,) = [line for line in place.verdicts if "step" in line]
+    (line,) = [line for line in verdicts(place) if "step" in line]
     assert "at run 26 (run25) at 0." in line and "before relearning" in line
 
 
 def test_with_one_side_what_goes_away_from_the_limit_leaves_no_runs_to_count():
     (joint,) = audited(lambda number, _: -0.05 * number).joints
     assert not joint.overall.outward and joint.runs_left == math.inf
-    assert "drifts away from the limit by -0.0" in joint.verdicts[0] and "detected later" in joint.verdicts[0]
+    assert "drifts away from the limit by -0.0" in verdicts(joint)[0] and "detected later" in verdicts(joint)[0]
     (place,) = audited(lambda number, travel: -0.1 * number * near(travel, 0.4)).joints
     assert place.local is None
 
@@ -141,7 +142,7 @@ def test_with_two_sides_what_comes_back_to_the_middle_leaves_no_runs_to_count():
     found = audited(lambda number, _: 2.0 - 0.045 * number, sides="two")
     (joint,) = found.joints
     assert not joint.overall.outward and joint.runs_left == math.inf
-    assert joint.verdicts[-1].startswith("drifts back towards the middle of the band by -0.0")
+    assert verdicts(joint)[-1].startswith("drifts back towards the middle of the band by -0.0")
     assert advice(None, found) == "keep the signature"
 
 
@@ -155,7 +156,7 @@ def test_each_run_has_its_critical_factor_and_its_alarm():
         assert run.margin_used == pytest.approx(run.critical_factor / 5.5)
         assert run.alarm == (detection.verdict.outcome == "alarm")
     assert found.alarms == (7,) and joint.runs[7].local_at == pytest.approx(0.4, abs=0.03)
-    assert joint.verdicts[0] == "an alarm in 1 of 12 runs, first in run 8 (run7)"
+    assert verdicts(joint)[0] == "an alarm in 1 of 12 runs, first in run 8 (run7)"
     assert advice(None, found) == "look at the alarms with cdtool explain: no drift is shown"
 
 
@@ -180,7 +181,7 @@ def test_joints_are_audited_apart():
 def test_by_time_alone_a_place_is_a_time():
     found = audited(lambda number, travel: 0.1 * number * near(travel, 0.40), alignment="time")
     assert (found.axis, found.unit) == ("time", "s")
-    assert "s after the motion began" in found.joints[0].verdicts[-1]
+    assert "s after the motion began" in verdicts(found.joints[0])[-1]
 
 
 def test_few_runs_show_nothing_and_a_run_that_cannot_be_judged_is_named():
@@ -190,7 +191,7 @@ def test_few_runs_show_nothing_and_a_run_that_cannot_be_judged_is_named():
     assert found.names == tuple(f"run{i}" for i in range(9) if i != 4)
     ((name, reason),) = found.not_assessable
     assert name == "run4" and "not applicable" in reason
-    assert "8 runs: too few to show a drift; at least 10 are needed" in found.joints[0].verdicts
+    assert "8 runs: too few to show a drift; at least 10 are needed" in verdicts(found.joints[0])
     with pytest.raises(SignatureError, match=r"no run to hold against the signature.*not applicable"):
         audit_drift(FITTED, [late[4]], ACTIVATION)
 

@@ -27,8 +27,9 @@ from cdtool.evaluation.results import (
     Results,
     Skipped,
 )
-from cdtool.report.markdown.markdown import Image, to_markdown
+from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.markdown.text import escape
+from cdtool.report.writers.base import Image
 from tests.report.conftest import contact, contacts_of
 from tests.report.hostile import HOSTILE
 

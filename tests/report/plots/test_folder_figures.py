@@ -12,7 +12,8 @@ from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.report.plots.folder_figures import most_telling, write_figures
+from cdtool.report.plots.folder_figures import write_figures
+from cdtool.report.plots.trigger_plot import most_telling
 from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept

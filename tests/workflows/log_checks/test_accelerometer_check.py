@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.recording import Recording, Series
-from cdtool.workflows.log_checks.accelerometer_check import accelerometer_findings
+from cdtool.workflows.log_checks.log_findings import accelerometer_findings
 from cdtool.workflows.runs import read_log
 
 LOGS = Path(__file__).parents[3] / "sample_logs"

@@ -1,23 +1,33 @@
-"""Names written beside curves where they hide nothing; where there is no room, none is written."""
+"""Names of curves and of limits in a plot, written where they hide nothing.
+
+A curve without room for its name has none; a limit always has one, on white where it would hide something.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import text_width
+from cdtool.report.plots.style import LIMIT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.transforms import Bbox
 
-_SIZE = 7.5
+_SIZE, _LIMIT_SIZE = 7.5, 7
 # Distances in points: from a point to its name, to all else, which has to be further away; between samples of a line.
 _AWAY, _CLEAR, _SAMPLED = 3.5, 5.0, 3.0
+# From a line to the label's foot, tried in this order [points]; steps along the line.
+_LIFTS = (2.0, 9.0, 18.0, 27.0)
+_STEPS = 30
+_BESIDE = 4.0
+_HEIGHT = 9.0
 
 
 @dataclass(frozen=True)
@@ -94,3 +104,62 @@ def _filled(corner: FloatArray, size: FloatArray) -> FloatArray:
     """Points all over a name: other names keep clear of it."""
     x, y = np.meshgrid(np.arange(0.0, size[0] + _SAMPLED, _SAMPLED), np.arange(0.0, size[1] + _SAMPLED, _SAMPLED))
     return np.asarray(corner + np.column_stack((x.ravel(), y.ravel())))
+
+
+@dataclass(frozen=True)
+class LineLabel:
+    """What stands at a horizontal line from `begin` to `end` at `height`, in the units of the axes."""
+
+    text: str
+    begin: float
+    end: float
+    height: float
+
+
+def place_labels(axes: Axes, labels: Sequence[LineLabel], curves: Sequence[tuple[FloatArray, FloatArray]]) -> None:
+    """Write each label above its line, as far left as nothing crosses it; else at the left end, on white.
+
+    To be called when the figure is arranged and everything else is in it.
+    """
+    from matplotlib.transforms import Bbox
+
+    points = axes.figure.dpi / 72.0
+    to_pixels = axes.transData.transform
+    drawn = [to_pixels(np.column_stack(curve)) for curve in curves]
+    taken = [text.get_window_extent() for text in axes.texts]
+    for label in labels:
+        (left, line), (right, _) = to_pixels([(label.begin, label.height), (label.end, label.height)])
+        width = text_width([label.text], _LIMIT_SIZE) * 72.0 * points
+        starts = np.linspace(left + _BESIDE * points, max(right - width - points, left + _BESIDE * points), _STEPS)
+        boxes = [
+            Bbox.from_bounds(start, line + lift * points, width, _HEIGHT * points)
+            for lift, start in product(_LIFTS, starts.tolist())
+        ]
+        free = next((box for box in boxes if _free(box, drawn, taken)), None)
+        box = free or boxes[0]
+        taken.append(box)
+        axes.annotate(
+            label.text,
+            (label.begin, label.height),
+            # In whole tenths: the last bits of a place differ from run to run.
+            xytext=(round((box.x0 - left) / points, 1), round((box.y0 - line) / points, 1)),
+            textcoords="offset points",
+            fontsize=_LIMIT_SIZE,
+            color=LIMIT,
+            bbox=None if free else {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.5},
+            zorder=5,
+        )
+
+
+def _free(box: Bbox, curves: Sequence[FloatArray], taken: Sequence[Bbox]) -> bool:
+    return not (any(box.overlaps(other) for other in taken) or any(_crosses(curve, box) for curve in curves))
+
+
+def _crosses(curve: FloatArray, box: Bbox) -> bool:
+    """Whether a curve (n, 2) with rising x runs through the box, between its samples too."""
+    x, y = curve.T
+    if box.x1 < x[0] or box.x0 > x[-1]:
+        return False
+    inside = y[(x > box.x0) & (x < box.x1)]
+    heights = np.concatenate((inside, np.interp([box.x0, box.x1], x, y)))
+    return bool(heights.min() <= box.y1 and heights.max() >= box.y0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.report.plots.direct_labels import Labelled, write_labels
 from cdtool.report.plots.figures import Margins, drawing, stacked_panels
+from cdtool.report.plots.labels import Labelled, write_labels
 
 X = np.linspace(0.0, 10.0, 21)
 
