@@ -15,8 +15,8 @@ import cdtool as api
 from cdtool.evaluation.builds.comparison import compare_builds
 from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.summary import summarise
-from tests.builds import build
 from tests.command import cdtool
+from tests.made_up.builds import build
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs" / "gate"
 BEGUN = "a contact is in progress when it begins, until 0.599 s: its onset is not recorded, it is not scored"

@@ -14,9 +14,9 @@ from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
 from cdtool.report.plots.style import look_of
-from tests.motions import moving
-from tests.robots import JOINTS as ROBOT_JOINTS
-from tests.robots import six_joint_robot
+from tests.made_up.motions import moving
+from tests.made_up.robots import JOINTS as ROBOT_JOINTS
+from tests.made_up.robots import six_joint_robot
 
 NAMES = DETECTORS.names(plugins=True)
 

@@ -18,7 +18,7 @@ from cdtool.signature_file import FactorOrigin, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.signature import Signature
 from tests.conftest import GATE, machine_of
-from tests.motions import moving
+from tests.made_up.motions import moving
 
 NAMES = [name for name in DETECTORS.names() if fields(DETECTORS.load(name))]
 

@@ -27,8 +27,8 @@ from cdtool.evaluation.results_file import migrated, read_results, to_json
 from cdtool.report.html.page import to_html
 from cdtool.report.junit import to_junit
 from cdtool.report.markdown.markdown import to_markdown
-from tests.builds import BLIND, MISSED, build
 from tests.command import cdtool
+from tests.made_up.builds import BLIND, MISSED, build
 
 GATE = "en_12453_reducing_gap"
 PROFILE = asdict(read_force_limits()[GATE])

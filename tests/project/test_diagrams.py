@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import matplotlib
 import pytest
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 SVG = "{http://www.w3.org/2000/svg}"
 NAMES = [
     "desired_dynamics",

@@ -16,7 +16,7 @@ import pytest
 
 import cdtool
 
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "structure.py"
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "structure.py"
 _numbers = itertools.count()
 
 

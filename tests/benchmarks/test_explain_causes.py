@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "explain_causes.py"
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "explain_causes.py"
 
 
 @pytest.fixture(scope="module")

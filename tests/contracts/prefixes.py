@@ -1,9 +1,9 @@
 """No verdict, status or band up to a sample changes when later samples do, from the recording to the verdict.
 
-`python -m tests.prefixes --count 2000 --seed 1` tries random prefixes over every detector and threshold, on three
-machines, with and without reference channels. Each log holds strokes of several classes of motion, one of a speed that
-was not learned, a contact, missing values, gaps, and channels on clocks of their own; what comes after the prefix is
-cut off, or replaced by something else.
+`python -m tests.contracts.prefixes --count 2000 --seed 1` tries random prefixes over every detector and threshold, on
+three machines, with and without reference channels. Each log holds strokes of several classes of motion, one of a
+speed that was not learned, a contact, missing values, gaps, and channels on clocks of their own; what comes after the
+prefix is cut off, or replaced by something else.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from cdtool.recording import Recording, Series
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
 from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
-from tests.robots import six_joint_robot
+from tests.made_up.robots import six_joint_robot
 
 PERIOD = 2e-3
 RUNS = 10

@@ -30,7 +30,7 @@ main()
 
 def on_a_full_disk(limit: int, *arguments: object) -> subprocess.CompletedProcess[str]:
     pytest.importorskip("resource")
-    package = str(Path(__file__).parents[1])
+    package = str(Path(__file__).parents[2])
     return subprocess.run(
         [sys.executable, "-c", LIMITED, str(limit), *map(str, arguments)],
         env=os.environ | {"PYTHONPATH": package},

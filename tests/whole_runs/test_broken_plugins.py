@@ -14,7 +14,7 @@ from cdtool.detectors.look import Look
 from cdtool.report.plots.style import look_of
 from tests.command import Outcome, cdtool
 
-GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
+GATE = Path(__file__).parents[2] / "sample_logs" / "gate"
 LOG = GATE / "stiff" / "03.csv"
 
 DETECTOR = """

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 # Files that name what is called: code, pages, and what the report's page is made of.
 SHOWS_NAMES = (".py", ".md", ".js", ".j2")
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "mcap", "typer", "rich")

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from cdtool.detection import Signal, Status
 from cdtool.thresholds.cusum import Cusum
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 PERIOD = 1e-3
 
 

@@ -19,7 +19,7 @@ from cdtool.workflows.signature.fitting import fit_operations
 from tests.command import cdtool as run
 from tests.data_folder import DATA, needs_data
 
-EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 CONTACTS = ((3.46, 4.14), (9.67, 9.96), (16.63, 17.08))
 
 

@@ -16,7 +16,7 @@ import pytest
 
 from cdtool.detectors import DETECTORS
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
 CONTRACTS = "torque_rate or robust_limit"
 MAIN = "from cdtool.cli.app import main; main()"

@@ -20,7 +20,7 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import run_detector
 from tests.data_folder import data, needs_data
 
-EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "ur10e_collisions.py"
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "ur10e_collisions.py"
 DETECTORS = ("momentum", "kalman_momentum", "velocity", "direct", "energy")
 UR10 = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 PANDA = tuple(f"panda_joint{k}" for k in range(1, 8))

@@ -11,7 +11,7 @@ import cdtool
 from cdtool.evaluation.summary import summarise
 from cdtool.simulation.arm_recordings import write_arm_recordings
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def script() -> ModuleType:

@@ -12,7 +12,7 @@ import typer.main
 
 from cdtool.cli.app import app
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 # What a command's parameters are called that name what it writes.
 WRITTEN = {"output", "plot"}
 

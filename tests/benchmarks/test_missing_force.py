@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "missing_force.py"
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "missing_force.py"
 
 
 @pytest.fixture(scope="module")
