@@ -17,7 +17,7 @@ from cdtool.evaluation.results import SCHEMA_VERSION, Results
 from cdtool.evaluation.results_file import to_json
 from cdtool.evaluation.results_schema import results_schema
 from cdtool.workflows.benchmark.benchmark import benchmark
-from tests.evaluation.test_results import FULL
+from tests.evaluation.full_results import FULL
 
 ROOT = Path(__file__).parents[2]
 VALIDATOR = jsonschema.Draft202012Validator(results_schema())

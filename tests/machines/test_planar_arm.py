@@ -10,7 +10,7 @@ import pytest
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording, Series
-from tests.conftest import ARM, arm_of
+from tests.made_up.machines import ARM, arm_of
 from tests.made_up.motions import moving
 
 RNG = np.random.default_rng(6)

@@ -15,7 +15,7 @@ from cdtool.files import replaced
 from cdtool.formats.groups import Part
 from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
-from tests.workflows.convert.test_converting import KINDS, needs, table
+from tests.workflows.convert.kinds import KINDS, needs, table
 
 # A disk that is full as far as a process can tell: no file may grow beyond some KiB.
 LIMITED = """
