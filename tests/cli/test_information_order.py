@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cdtool.cli.console import print_skipped
-from cdtool.evaluation.alike import grouped
 from cdtool.evaluation.results import Skipped
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.workflows.information import info
@@ -63,15 +62,6 @@ def test_losses_come_first(tmp_path):
         line.split(":")[0] for line in cdtool("info", path).out.splitlines() if line[:4] in ("loss", "warn", "note")
     ]
     assert shown == words
-
-
-def test_what_is_said_of_many_is_one_line_with_a_count():
-    items = [(f"ch{i}", f"the sample period varies by {i} % (std) about 10 ms") for i in range(46)]
-    assert grouped([*items, ("ch1", "stuck?")]) == [
-        ("ch0", "the sample period varies by 0 % (std) about 10 ms; 45 more like it (ch1, ch2, ch3, ...)"),
-        ("ch1", "stuck?"),
-    ]
-    assert grouped(items[:3]) == items[:3]
 
 
 def test_many_warnings_bury_no_loss_on_screen(capsys):
