@@ -1,4 +1,4 @@
-"""Recordings that many tests share: a simulated axis of known parameters, and the simulated gate."""
+"""The markers of the tests, and recordings that many tests share: an axis of known parameters, the simulated gate."""
 
 from __future__ import annotations
 
@@ -14,11 +14,17 @@ from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import Recording
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
+from tests import markers
 from tests.made_up.machines import ARM, GATE, arm_of, machine_of
 
 # No test is timed: a busy machine needs longer for an example.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses among the tests
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    markers.mark(items)
 
 
 @pytest.fixture(scope="session")

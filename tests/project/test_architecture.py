@@ -56,6 +56,18 @@ def test_every_module_says_what_it_is():
         assert path.read_text(encoding="utf-8").startswith('"""'), path
 
 
+def test_the_tests_mirror_the_package():
+    """A folder of tests is one of cdtool/, or says in its __init__.py what it holds."""
+    tests, package = ROOT / "tests", ROOT / "cdtool"
+    for file in sorted(tests.rglob("test_*.py")):
+        folder = file.parent
+        if not (package / folder.relative_to(tests)).is_dir():
+            assert (folder / "__init__.py").read_text(encoding="utf-8").startswith('"""'), file
+        elif folder == tests:
+            tested = package / file.stem.removeprefix("test_")
+            assert tested.is_dir() or tested.with_suffix(".py").is_file(), file
+
+
 def words_of(*folders: Path) -> Counter[str]:
     files = [file for folder in folders for file in sorted(folder.rglob("*")) if file.suffix in SHOWS_NAMES]
     return Counter(word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8")))

@@ -26,7 +26,7 @@ from cdtool.recording import CHANNELS
 from cdtool.units import UNITS
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.command import Outcome, cdtool
-from tests.data_folder import DATA
+from tests.data_folder import DATA, needs_data
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -252,13 +252,17 @@ CLAIMS: dict[str, Callable[[], None]] = {
 }
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if any(steps_of(page))], ids=name_of)
+RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", "ur10e/link4.csv")
+
+
+def page_with_its_recordings(page: Path) -> object:
+    real = any("$CDTOOL_DATA" in step.text for step in steps_of(page))
+    return pytest.param(page, marks=[needs_data(*RECORDINGS)] if real else [], id=name_of(page))
+
+
+@pytest.mark.parametrize("page", [page_with_its_recordings(page) for page in PAGES if any(steps_of(page))])
 def test_every_command_and_example_of_a_page_runs_in_order(page, folder):
     steps, name = list(steps_of(page)), name_of(page)
-    if any("$CDTOOL_DATA" in step.text for step in steps):
-        for needed in ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", "ur10e/link4.csv"):
-            if DATA is None or not (DATA / needed).exists():
-                pytest.skip(f"{name}: no recording {needed} (set CDTOOL_DATA)")
     names: dict[str, object] = {}
     for step in steps:
         if step.kind == "python":

@@ -1,0 +1,1 @@
+"""The columns of MCAP's messages, by the messages' encoding."""
