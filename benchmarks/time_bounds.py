@@ -20,10 +20,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.noted_times import FILE  # noqa: E402  found where the line above looks
+from tests.noted_times import FILE
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def files_that_note() -> list[str]:

@@ -4,7 +4,7 @@
 prints the share for each folder of cdtool/, and ends with status 1 where the whole is below 90 %. Compiled loops count
 in neither, nor does what a test runs in a program that it starts.
 
-    coverage run --data-file fast.coverage --source cdtool -m pytest -q -m "not slow" -p no:xdist
+    coverage run --data-file fast.coverage --source cdtool -m pytest -q -p no:xdist -m "not slow"
     coverage run --data-file full.coverage --source cdtool -m pytest -q -p no:xdist
 """
 
