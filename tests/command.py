@@ -18,6 +18,11 @@ class Outcome:
     err: str
 
 
+def one_line(text: str) -> str:
+    """A text without its line ends and the frames of the help: the same wherever a terminal wraps it."""
+    return " ".join(text.replace("│", " ").split())
+
+
 def cdtool(*arguments: object) -> Outcome:
     """`cdtool ARGUMENTS`: exit status, standard output, standard error."""
     out, err = io.StringIO(), io.StringIO()

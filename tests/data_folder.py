@@ -1,4 +1,4 @@
-"""Where the real recordings are, and a mark that skips a test, by name, where one of them is absent."""
+"""Where the real recordings are, and the marker of a test that needs one of them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ _GIVEN = Path(os.environ.get("CDTOOL_DATA", Path(__file__).resolve().parents[2] 
 DATA: Path | None = _GIVEN if _GIVEN.is_dir() else None
 
 
-def needs_data(name: str) -> pytest.MarkDecorator:
-    """Skip a test where the file or folder `name` of the recordings is absent."""
-    present = DATA is not None and (DATA / name).exists()
-    return pytest.mark.skipif(not present, reason=f"no recording {name} (set CDTOOL_DATA)")
+def is_present(name: str) -> bool:
+    """Whether the file or folder `name` of the recordings is there."""
+    return DATA is not None and (DATA / name).exists()
+
+
+def needs_data(*names: str) -> pytest.MarkDecorator:
+    """Mark a test that is skipped, by name, where one of these files or folders of the recordings is absent."""
+    return pytest.mark.real_data(*names)
 
 
 def data(name: str) -> Path:

@@ -11,7 +11,7 @@ import typer.main
 
 from cdtool.cli.app import app
 from cdtool.exit_status import STATUSES, STATUSES_OF, ExitStatus, Fact, status_of
-from tests.command import cdtool
+from tests.command import cdtool, one_line
 
 ROOT = Path(__file__).parents[1]
 ORDER = [2, 1, 3, 4, 0]
@@ -70,13 +70,13 @@ def test_the_docs_say_which_command_has_which_status():
 
 
 def test_help_shows_the_table_and_every_command_its_statuses():
-    shown = " ".join(cdtool("--help").out.replace("│", " ").split())
+    shown = one_line(cdtool("--help").out)
     for status, meaning in STATUSES.items():
         assert f"{int(status)}: {meaning}" in shown
     assert "2 before 1 before 3 before 4" in shown
     for name in commands():
         numbers = ", ".join(str(int(status)) for status in sorted(STATUSES_OF[name]))
-        assert f"Exit status: {numbers};" in " ".join(cdtool(*name.split(), "--help").out.split()), name
+        assert f"Exit status: {numbers};" in one_line(cdtool(*name.split(), "--help").out), name
 
 
 def test_every_command_has_its_statuses_listed():

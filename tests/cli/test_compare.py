@@ -13,8 +13,8 @@ import pytest
 import cdtool as api
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
-from tests.builds import BLIND, MISSED, build
 from tests.command import cdtool
+from tests.made_up.builds import BLIND, MISSED, build
 from tests.report.hostile import HOSTILE
 
 LATENCIES = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()

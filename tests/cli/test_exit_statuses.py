@@ -13,10 +13,10 @@ from cdtool.evaluation.limits import LimitRule
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from cdtool.exit_status import STATUSES_OF
-from tests.builds import MISSED, build
 from tests.command import Outcome, cdtool
-from tests.evaluation.test_conclusion import results as judged_results
+from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
+from tests.made_up.builds import MISSED, build
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from tests.command import Outcome, cdtool
+from tests.command import Outcome, cdtool, one_line
 
 GATE = Path(__file__).parents[2] / "sample_logs" / "gate"
 
@@ -41,7 +41,7 @@ def is_number(text: str) -> bool:
 
 def test_the_help_holds_an_example():
     done = cdtool("explain", "--help")
-    assert done.status == 0 and "Example: cdtool explain" in done.out
+    assert done.status == 0 and "Example: cdtool explain" in one_line(done.out)
 
 
 def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_first(explain, feekf_signature, tmp_path):

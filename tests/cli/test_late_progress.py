@@ -10,8 +10,8 @@ import pytest
 from cdtool.cli.late_progress import late_progress
 from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.recovering import recover
-from tests.workflows.convert.test_converting import table
-from tests.workflows.convert.test_converting_parts import write_part
+from tests.workflows.convert.bags import write_part
+from tests.workflows.convert.kinds import table
 
 
 class Terminal:

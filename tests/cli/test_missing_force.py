@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cdtool.evaluation.results_file import read_results
-from tests.cli.test_load_cell_truth import changed, folder_of
+from tests.cli.changed_logs import changed, folder_of
 from tests.command import cdtool
 
 PROFILE = """

@@ -13,7 +13,7 @@ import pytest
 
 from tests.command import cdtool
 
-OLDER = Path(__file__).parents[1] / "older_files"
+OLDER = Path(__file__).parent / "older_files"
 SAID = "of an earlier version, without the speed profiles, plausible ranges and normal motions of its runs"
 
 

@@ -19,8 +19,8 @@ from cdtool.evaluation.statistics.sample_size import (
     impacts_for_unpaired,
 )
 from cdtool.workflows.planning import measured_std
-from tests.builds import BLIND, MISSED, Outcome, build
 from tests.command import cdtool
+from tests.made_up.builds import BLIND, MISSED, Outcome, build
 
 FIRST = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
 SECOND = [x + y for x, y in zip(FIRST, np.random.default_rng(2).normal(20.0, 2.0, 30), strict=True)]

@@ -1,0 +1,1 @@
+"""What every registered class keeps: detectors, thresholds, machines, formats, writers."""

@@ -1,11 +1,11 @@
-"""Causality through the whole path; `python -m tests.prefixes` tries 2,000 prefixes, here are 60."""
+"""Causality through the whole path; `python -m tests.contracts.prefixes` tries 2,000 prefixes, here are 60."""
 
 from __future__ import annotations
 
 import pytest
 
 from cdtool.detectors import DETECTORS
-from tests.prefixes import MACHINES, Combination, combinations, try_prefixes
+from tests.contracts.prefixes import MACHINES, Combination, combinations, try_prefixes
 
 SHORT = [
     item

@@ -3,52 +3,31 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.force.limits import read_force_limits
 from cdtool.evaluation.limits import LimitRule
 from cdtool.evaluation.results import (
     ConclusionResult,
     ContactResult,
     ExposureResult,
-    ForceResult,
-    ForceStepResult,
     LimitResult,
     PointResult,
-    Results,
     Skipped,
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
 from cdtool.report.html.page import to_html
 from cdtool.report.junit import to_junit
 from cdtool.report.markdown.markdown import to_markdown
-from tests.builds import BLIND, MISSED, build
 from tests.command import cdtool
+from tests.evaluation.judged_results import GATE, results
+from tests.made_up.builds import BLIND, MISSED, build
 
-GATE = "en_12453_reducing_gap"
-PROFILE = asdict(read_force_limits()[GATE])
-KEY = ("momentum", "stiff")
 MET = LimitRule("*.false_alarms", "*", "*", "false_alarms", largest=0)
-
-
-def results(outcomes, verdicts=(), point=None, points=(), **more) -> Results:
-    """Contacts of one detector, and one force verdict a contact in the order given."""
-    made = build({KEY: outcomes}, force_profiles={"stiff": PROFILE} if verdicts or points else {}, **more)
-    return replace(
-        made, forces=tuple(force(made, i, verdict, point) for i, verdict in enumerate(verdicts)), points=tuple(points)
-    )
-
-
-def force(made: Results, number: int, verdict: str, point: str | None = None) -> ForceResult:
-    reason = {"fail": "dynamic: 3600 N where 400 N are allowed", "not_assessable": "residual: the record ends"}
-    step = ForceStepResult("dynamic", 0.0, 400.0, 3600.0, 3.1, verdict, reason.get(verdict))
-    name = made.contacts[number].recording
-    return ForceResult(name, "stiff", 1, GATE, verdict, 3600.0, (step,), point, 3.1, reason.get(verdict))
 
 
 def averaged(verdict: str, name: str = "A") -> PointResult:

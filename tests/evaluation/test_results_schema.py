@@ -16,7 +16,7 @@ import pytest
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
 from cdtool.evaluation.results_file import results_schema, to_json
 from cdtool.workflows.benchmark.benchmark import benchmark
-from tests.evaluation.test_results import FULL
+from tests.evaluation.full_results import FULL
 
 ROOT = Path(__file__).parents[2]
 VALIDATOR = jsonschema.Draft202012Validator(results_schema())

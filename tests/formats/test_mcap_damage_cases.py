@@ -24,8 +24,10 @@ from tests.formats.mcap_damage.generator import KINDS, cases, kind_of
 from tests.formats.mcap_damage.judge import faults, judged, warm_up
 from tests.formats.mcap_damage.truth import Message, Truth
 from tests.formats.mcap_damage.ways import Reading, value_key
+from tests.noted_times import note
 
 SEED, COUNT, STEP = 1, 2000, 100
+SECONDS = 5.0  # of a processor, for a bomb: held by benchmarks/time_bounds.py
 ROOT = Path(__file__).parents[2]
 
 
@@ -86,10 +88,12 @@ def test_the_judge_sees_what_it_is_there_for():
 
 
 @pytest.mark.skipif(not measurable(), reason="memory is measured as Linux has it")
-def test_bombs_are_refused_in_5_s_of_cpu_and_300_mb_and_the_messages_beside_them_are_given(tmp_path):
+def test_bombs_are_refused_in_300_mb_and_the_messages_beside_them_are_given(tmp_path):
     command = [sys.executable, "-m", "tests.formats.mcap_damage.bomb_probe", str(tmp_path)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert ran.returncode == 0, ran.stderr
     taken = [json.loads(line) for line in ran.stdout.splitlines()]
     assert len(taken) == 2 * len(bombs())
-    assert not [took for took in taken if took["faults"] or took["seconds"] >= 5.0 or took["bytes"] >= 300e6]
+    for took in taken:
+        note(took["seconds"], SECONDS)
+    assert not [took for took in taken if took["faults"] or took["bytes"] >= 300e6]

@@ -10,8 +10,8 @@ import pytest
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording, Series
-from tests.conftest import ARM, arm_of
-from tests.motions import moving
+from tests.made_up.machines import ARM, arm_of
+from tests.made_up.motions import moving
 
 RNG = np.random.default_rng(6)
 POSITION, SPEED, ACCELERATION = RNG.uniform(-3.0, 3.0, (3, 200, 2))

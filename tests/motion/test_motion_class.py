@@ -13,7 +13,7 @@ from cdtool.operations import Operation, operations_of
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
 from cdtool.workflows.signature.grouping import by_class
-from tests.motion.test_applicable import log
+from tests.motion.speed_logs import log
 
 
 def jittered(speed: float, rate: float, seed: int) -> Recording:

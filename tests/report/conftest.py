@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,43 +12,18 @@ from cdtool.activation import Activation
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.results import (
-    ContactResult,
     ExposureResult,
     FalseAlarmResult,
     RecordingResult,
     Results,
     Skipped,
 )
-from cdtool.evaluation.traces.trace import Trace, make_trace
-from cdtool.evaluation.truth.matching import match
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, detect_operation, run_detector
 from cdtool.recording import Recording
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.detection import Detected
-
-NAMES = ("pure_inertia", "friction_ekf", "momentum", "pure_torque")
-RULE = OnsetRule(above=20.0, back_to=8.0)
-
-
-@dataclass(frozen=True)
-class Bench:
-    """Detectors with their signatures."""
-
-    detect: Callable[[Recording, str], Detection]
-
-    def detected(self, recording: Recording, name: str) -> Detected:
-        detection, contacts = self.detect(recording, name), tuple(find_contacts(recording, RULE))
-        matching = match(detection.verdict, contacts, detection.statistic)
-        return Detected(recording, (detection,), contacts, (matching,), "limit 1 N set by hand")
-
-    def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
-        detections = tuple(self.detect(recording, name) for name in names)
-        contacts = tuple(find_contacts(recording, RULE))
-        matchings = tuple(match(item.verdict, contacts, item.statistic) for item in detections)
-        return make_trace(group, operations_of(recording)[0], contacts, detections, matchings)
+from tests.report.bench import NAMES, Bench, contacts_of
 
 
 @pytest.fixture(scope="session")
@@ -66,27 +41,6 @@ def bench(gate: LinearAxis, simulated: Callable[[str, int], Recording]) -> Bench
         return detect_operation(operation, gate, detectors[name], (learned_for_it,), Activation())
 
     return Bench(detect)
-
-
-def contact(
-    detector: str, group: str, latency: float | None, outcome: str = "detected", name: str = "01"
-) -> ContactResult:
-    alarm = None if latency is None else 5.0 + 1e-3 * latency
-    return ContactResult(
-        name, group, detector, "gate", 5.0, 5e-4, alarm, latency, outcome, None, 3600.0, watched_ms=1000.0
-    )
-
-
-def contacts_of(detector: str, group: str, latencies: Sequence[float | str | None]) -> list[ContactResult]:
-    """One recording a contact; None is missed, text says why it is not assessable."""
-    made = []
-    for i, late in enumerate(latencies, 1):
-        name = f"{group}/{i:02}.csv"
-        if isinstance(late, str):
-            made.append(replace(contact(detector, group, None, "not_assessable", name), reason=late))
-        else:
-            made.append(contact(detector, group, late, "detected" if late is not None else "missed", name))
-    return made
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
 from cdtool.report.contacts_csv import contacts_csv
 from cdtool.report.forces_csv import forces_csv
-from tests.report.conftest import contact
+from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 
 RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠")

@@ -12,9 +12,9 @@ from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule, not_met
 from cdtool.evaluation.results import LimitResult, Results, Skipped
 from cdtool.report.junit import to_junit
-from tests.report.conftest import contact, contacts_of
+from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
-from tests.report.markdown.test_markdown import named
+from tests.report.named_results import named
 
 # What Jenkins' schema allows; it refuses a file with another attribute.
 ALLOWED = {

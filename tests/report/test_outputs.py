@@ -18,7 +18,7 @@ from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
-from tests.report.conftest import Bench
+from tests.report.bench import Bench
 from tests.report.hostile import HOSTILE
 
 ALL = "".join(HOSTILE.values())

@@ -9,38 +9,16 @@ import numpy as np
 import pytest
 
 from cdtool.errors import ConfigurationError, UsageError
-from cdtool.evaluation.builds.comparison import BuildComparison, compare_builds
-from cdtool.evaluation.builds.rows import BuildRow, Question
-from cdtool.evaluation.results import Results
+from cdtool.evaluation.builds.comparison import compare_builds
 from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.results_file import to_json as results_json
 from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p
 from cdtool.evaluation.statistics.rates import poisson_difference_p
 from cdtool.evaluation.statistics.sample_size import detectable_difference, impacts_for_unpaired
 from cdtool.report.build_report import to_json
-from tests.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
+from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
+from tests.made_up.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
 from tests.report.hostile import HOSTILE
-
-KEY = ("momentum", "stiff")
-
-
-def latencies(n: int = 30, mean: float = 40.0, std: float = 6.0, seed: int = 1) -> list[float]:
-    return (np.random.default_rng(seed).normal(mean, std, n)).tolist()
-
-
-def single(outcomes, **options) -> Results:
-    return build({KEY: outcomes}, **options)
-
-
-def row_of(comparison: BuildComparison) -> BuildRow:
-    (row,) = comparison.rows
-    return row
-
-
-def asked(comparison: BuildComparison, figure: str) -> Question:
-    found = row_of(comparison).question(figure)  # type: ignore[arg-type]
-    assert found is not None
-    return found
 
 
 def test_a_shift_of_every_latency_is_told_with_its_size_both_ways():

@@ -16,8 +16,8 @@ from cdtool.evaluation.statistics.rates import (
     poisson_increase_at_most,
 )
 from cdtool.exit_status import Fact, status_of
-from tests.builds import BLIND, MISSED, build
-from tests.evaluation.builds.test_build_comparison import KEY, asked, latencies, row_of, single
+from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
+from tests.made_up.builds import BLIND, MISSED, build
 
 OTHERS = {"bytes_of": "other", "names": "x"}
 

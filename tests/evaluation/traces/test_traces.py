@@ -15,7 +15,7 @@ from cdtool.evaluation.traces.file import encode_traces, read_traces
 from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.matching import match
 from cdtool.recording import Contact, Series
-from tests.evaluation.test_sweep import OPERATION, TIME, detection
+from tests.evaluation.detections import OPERATION, TIME, detection
 
 CONTACT = Contact(3.0, 3.2, 0.005, 900.0)
 

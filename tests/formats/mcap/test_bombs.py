@@ -20,6 +20,7 @@ from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.container import chunks
 from cdtool.formats.mcap.container.records import MAGIC
 from tests.formats.mcap.small_files import read_or_refused
+from tests.noted_times import note
 
 MEBIBYTE = 1 << 20
 _CHILD = """
@@ -41,6 +42,9 @@ base, begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_coun
 found = run(sys.argv[2])
 print(json.dumps([found, time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base]))
 """
+
+# What a bomb may take [s]: held by benchmarks/time_bounds.py.
+SECONDS = 5.0
 
 
 def record(opcode, body):
@@ -96,7 +100,7 @@ def zeros(compression):
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 @pytest.mark.parametrize("stated", [8 * MEBIBYTE, 120 * MEBIBYTE, 300 * MEBIBYTE])
-def test_a_bomb_is_refused_in_less_than_five_seconds_and_300_megabytes(tmp_path, compression, stated):
+def test_a_bomb_is_refused_in_less_than_300_megabytes(tmp_path, compression, stated):
     bomb = file_of(tmp_path / "bomb.mcap", *[chunk(zeros(compression), stated, compression)] * 3)
     small = file_of(
         tmp_path / "small.mcap",
@@ -107,7 +111,7 @@ def test_a_bomb_is_refused_in_less_than_five_seconds_and_300_megabytes(tmp_path,
     )
     found, seconds, kilobytes = json.loads(done.stdout)
     assert "damaged at byte" in found[0]
-    assert seconds < 5.0
+    note(seconds, SECONDS)
     assert kilobytes < 300_000
 
 
@@ -121,7 +125,7 @@ def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
     )
     found, seconds, kilobytes = json.loads(done.stdout)
     assert any("in all" in text for text in found)
-    assert seconds < 5.0
+    note(seconds, SECONDS)
     assert kilobytes < 300_000
 
 

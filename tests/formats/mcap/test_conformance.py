@@ -11,7 +11,7 @@ from cdtool.formats.mcap.container.chunks import Decompressor, chunk_header
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.records import MAGIC, Chunk, MessageIndex
 from cdtool.formats.mcap.container.summary import parsed
-from tests.data_folder import DATA, data, needs_data
+from tests.data_folder import data, needs_data
 from tests.formats.mcap.small_files import read
 
 GROUPS = ("NoData", "OneAttachment", "OneMessage", "OneMetadata", "OneSchemalessMessage", "TenMessages")
@@ -105,7 +105,7 @@ def test_a_summary_gives_the_records_that_stand_in_it():
         assert [type(record).__name__ for record in log.summary.records] == behind, path.name
 
 
-@pytest.mark.skipif(not DATA, reason="no recordings")
+@needs_data("mcap_samples")
 def test_samples_of_other_writers_read_without_loss():
     for path in sorted(data("mcap_samples").glob("*.mcap")):
         found, findings, log = read(path)

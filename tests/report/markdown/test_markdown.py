@@ -19,10 +19,7 @@ from cdtool.evaluation.results import (
     CalibrationResult,
     ExposureResult,
     FalseAlarmResult,
-    ForceResult,
-    ForceStepResult,
     LimitResult,
-    PointResult,
     RecordingResult,
     Results,
     Skipped,
@@ -30,8 +27,9 @@ from cdtool.evaluation.results import (
 from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.markdown.text import escape
 from cdtool.report.writers.base import Image
-from tests.report.conftest import contact, contacts_of
+from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
+from tests.report.named_results import forces, named
 
 OWN_TAGS = re.compile(r"<details>\n<summary>[A-Za-z -]+ \(\d+\)</summary>\n?|</details>\n?")
 NO_WIDTH = "\u200b"
@@ -206,19 +204,6 @@ def test_the_slower_detector_named_first_makes_the_same_sentence(results):
     assert shown[2].startswith("30.8 (")
 
 
-def forces(name: str = "reducing gap") -> tuple[tuple[ForceResult, ...], tuple[PointResult, ...]]:
-    steps = (
-        ForceStepResult(name, 0.0, 400.0, 500.0, 12.0, "fail", f"500 N where 400 N are allowed {name}"),
-        ForceStepResult("static", 0.75, 150.0, None, None, "not_assessable", name),
-    )
-    kept = (ForceStepResult(name, 0.0, 400.0, 300.0, None, "pass"),)
-    made = (
-        ForceResult("stiff/01.csv", "stiff", 1, name, "fail", 500.0, steps, name, 12.0, name),
-        ForceResult("stiff/02.csv", "stiff", 1, name, "pass", 300.0, kept),
-    )
-    return made, (PointResult(name, "stiff", name, 3, "fail", steps, "mean of 3 tests", name),)
-
-
 def test_force_verdicts_say_what_was_exceeded_when_and_against_which_source(results):
     made, points = forces()
     profile = {"title": "EN 1: a gap", "source": "EN 1, table 1", "checked": False}
@@ -237,44 +222,6 @@ def test_images_are_linked_by_relative_name_below_their_group(evaluated):
     text = to_markdown(evaluated, [Image("latency.png", "all"), Image("triggers_soft.png", "soft [x]", "soft")])
     assert text.index("![all](latency.png)") < text.index("## stiff") < text.index("## soft")
     assert text.index("## soft") < text.index("](triggers_soft.png)") < text.index("## holdout")
-
-
-def named(results: Results, name: str) -> Evaluated:
-    """Results in which everything that may come from a file is this name."""
-    made, points = forces(name)
-    limit = LimitResult(name, name, name, name, 1.0, None, 0.0, "violated", name)
-    changed = replace(
-        results,
-        groups=(name,),
-        detectors=(name,),
-        contacts=(
-            contact(name, name, 30.0),
-            contact(name, name, None, "missed", name),
-            replace(contact(name, name, None, "not_assessable", name), reason=name, contact=2),
-        ),
-        false_alarms=(FalseAlarmResult(name, name, name, name, 1.0, name, 1.0, 1.0),),
-        exposure=(ExposureResult(name, name, 1, 1, 1.0, 1, {name: 1.0}),),
-        recordings=(RecordingResult(name, name, name, 1.0, 1, 1, name, name),),
-        forces=tuple(replace(item, recording=name, group=name, profile=name) for item in made),
-        points=tuple(replace(item, group=name, note=name) for item in points),
-        calibration=(CalibrationResult(name, name, 1.0, 1, 1.0, 1),),
-        limits=(limit,) * 9,
-        skipped=(Skipped(name, name),),
-        findings=(Skipped(name, name),),
-        provenance={
-            "onset": name,
-            "machine": name,
-            "plugins": [name],
-            "window_s": {name: name},
-            "units": {name: name},
-            "short_names": {name: name},
-            "gains": {name: {name: name}},
-            "signature_sha256": {name: name},
-            "learned_sha256": {name: name},
-            "force_profiles": {name: {"title": name, "source": name}, "other": name},
-        },
-    )
-    return evaluate(changed)
 
 
 def nothing_is_active(text: str, tables: int) -> None:

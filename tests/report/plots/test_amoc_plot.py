@@ -15,7 +15,7 @@ from cdtool.report.plots.amoc_plot import plot_amoc
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.style import look_of
 from tests.evaluation.sweeps import CONTACTS, swept
-from tests.report.conftest import contacts_of
+from tests.report.bench import contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
 

@@ -29,7 +29,7 @@ from cdtool.report.plots.style import HATCHES, look_of
 from cdtool.report.plots.trigger_plot import plot_triggers
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.detection import Detected
-from tests.report.conftest import NAMES, Bench
+from tests.report.bench import NAMES, Bench
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
 

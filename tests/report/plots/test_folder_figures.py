@@ -17,7 +17,7 @@ from cdtool.report.plots.trigger_plot import most_telling
 from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept
-from tests.report.conftest import Bench, contact
+from tests.report.bench import Bench, contact
 from tests.report.hostile import HOSTILE
 
 PROFILE = ForceProfile("gap", "A gap", "a standard", False, (ForceStep(0.0, 400.0, "dynamic"),))

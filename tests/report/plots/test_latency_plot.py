@@ -13,7 +13,7 @@ from cdtool.evaluation.results import Results
 from cdtool.report.plots import latency_plot
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.latency_plot import plot_latencies
-from tests.report.conftest import contact, contacts_of
+from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
 

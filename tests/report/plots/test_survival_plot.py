@@ -13,7 +13,7 @@ from cdtool.evaluation.results import Results
 from cdtool.report.plots import survival_plot
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.survival_plot import plot_survival
-from tests.report.conftest import contacts_of
+from tests.report.bench import contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
 

@@ -11,7 +11,7 @@ from cdtool.formats import time_order
 from cdtool.formats.csv import text
 from cdtool.ingest.reading import survey
 from cdtool.workflows.convert.converting import convert
-from tests.workflows.convert.test_converting import SEVERAL_CLOCKS, needs, table
+from tests.workflows.convert.kinds import SEVERAL_CLOCKS, needs, table
 
 
 def shuffled(path: Path) -> Path:

@@ -12,7 +12,7 @@ from cdtool.ingest.reading import survey
 from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
-from tests.workflows.convert.test_converting import KINDS, needs
+from tests.workflows.convert.kinds import KINDS, needs
 
 EPOCH = 1_700_000_000.25
 ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # whose start is a date in whole microseconds

@@ -1,0 +1,44 @@
+"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py tries five and 100 alarms."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "explain_causes.py"
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    """The script as a module; it looks for its neighbours in its own folder."""
+    kept = list(sys.path)
+    sys.path.insert(0, str(SCRIPT.parent))
+    try:
+        spec = importlib.util.spec_from_file_location("explain_causes", SCRIPT)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["explain_causes"] = module
+        spec.loader.exec_module(module)
+    finally:
+        sys.path[:] = kept
+    two = (module.benches()[1], module.benches()[2])
+    module.benches = lambda: two
+    return module
+
+
+def test_causes_and_first_movers_of_a_dozen_alarms_are_right(script):
+    told = script.score(70, 12)
+    assert {item.case.cause for item in told} == set(script.CAUSES)
+    causes, first = script.right(told)
+    assert causes >= 11 and first >= 11, [(item.case.cause, item.cause, item.first) for item in told]
+
+
+def test_a_score_below_the_bar_ends_with_1(script, capsys):
+    (case,) = script.score(70, 1)
+    wrong = script.Told(script.replace(case.case, cause="lost samples"), case.explanation)
+    assert not script.report(70, [wrong])
+    assert "right: 0 of 1 causes" in capsys.readouterr().out

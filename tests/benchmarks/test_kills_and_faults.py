@@ -1,0 +1,48 @@
+"""Kills and failing calls at random points of every command that writes: the benchmark, reduced."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from cdtool.cli.app import app
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+# What a command's parameters are called that name what it writes.
+WRITTEN = {"output", "plot"}
+
+
+def commands() -> set[str]:
+    """Every command with a parameter for what it writes, and the one that writes into the file that it reads."""
+    found = {"signature update"}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        for subname, item in getattr(command, "commands", {"": command}).items():
+            if WRITTEN & {parameter.name for parameter in item.params}:
+                found.add(f"{name} {subname}".strip())
+    return found
+
+
+def test_every_command_that_writes_is_tried(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    from writing_commands import cases
+
+    tried = [" ".join(case.new[:2]) for case in cases(Path("inputs"))]
+    missing = [name for name in commands() if not any(words == name or words.startswith(f"{name} ") for words in tried)]
+    assert not missing and len(tried) >= len(commands())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills and failing calls need fork")
+def test_fifty_kills_and_fifty_failing_calls_leave_old_or_new_files_and_nothing_else():
+    arguments = [sys.executable, str(BENCHMARKS / "kills_and_faults.py"), "--kills", "50", "--faults", "50"]
+    package = {"PYTHONPATH": str(BENCHMARKS.parent)}
+    done = subprocess.run(arguments, env=os.environ | package, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    if "skipped: " in done.stdout:
+        pytest.skip(next(line for line in done.stdout.splitlines() if line.startswith("skipped: ")))
+    rows = [line.split()[:7] for line in done.stdout.splitlines() if line.startswith(("kills ", "faults "))]
+    assert rows == [["kills", "50", "50", *"0000"], ["faults", "50", "50", *"0000"]]

@@ -1,0 +1,42 @@
+"""Missing load-cell samples on a dozen drawn contacts; benchmarks/missing_force.py tries 200."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "missing_force.py"
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    """The script as a module; it looks for its neighbours in its own folder."""
+    kept = list(sys.path)
+    sys.path.insert(0, str(SCRIPT.parent))
+    try:
+        spec = importlib.util.spec_from_file_location("missing_force", SCRIPT)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["missing_force"] = module
+        spec.loader.exec_module(module)
+    finally:
+        sys.path[:] = kept
+    return module
+
+
+def test_no_hole_gives_a_wrong_onset_without_a_mark_or_a_pass_that_nobody_saw(script):
+    counts, wrong = script.score(31, 12, 12)
+    assert wrong == []
+    assert sum(count.marked for count in counts.values()) > 10
+    assert counts["single samples"].passes > 5 and counts["single samples"].marked == 0
+
+
+def test_what_is_wrong_is_found(script, monkeypatch, capsys):
+    monkeypatch.setattr(script, "is_wrong", lambda found, _: found.hole > 0.0)
+    monkeypatch.setattr(sys, "argv", ["missing_force.py", "--seeds", "31", "--contacts", "3", "--faults", "6"])
+    assert script.main() == 1
+    assert "onset" in capsys.readouterr().out

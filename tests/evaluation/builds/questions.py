@@ -1,0 +1,31 @@
+"""What is asked of two made-up builds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdtool.evaluation.builds.comparison import BuildComparison
+from cdtool.evaluation.builds.rows import BuildRow, Question
+from cdtool.evaluation.results import Results
+from tests.made_up.builds import build
+
+KEY = ("momentum", "stiff")
+
+
+def latencies(n: int = 30, mean: float = 40.0, std: float = 6.0, seed: int = 1) -> list[float]:
+    return (np.random.default_rng(seed).normal(mean, std, n)).tolist()
+
+
+def single(outcomes, **options) -> Results:
+    return build({KEY: outcomes}, **options)
+
+
+def row_of(comparison: BuildComparison) -> BuildRow:
+    (row,) = comparison.rows
+    return row
+
+
+def asked(comparison: BuildComparison, figure: str) -> Question:
+    found = row_of(comparison).question(figure)  # type: ignore[arg-type]
+    assert found is not None
+    return found

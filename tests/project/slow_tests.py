@@ -1,0 +1,68 @@
+"""Which tests are slow, and which are listed as slow in tests/slow_tests.txt?
+
+`python -m pytest -n auto --junitxml times.xml`, on a machine that does nothing else, measures. Then
+`python -m tests.project.slow_tests times.xml` prints what the list lacks, what it holds without need and what no longer
+exists, and ends with status 1 where it lacks a test. `--write` corrects the list.
+
+A test is slow where all cases of its function, set-up included, together take longer than the bound of
+tests/markers.py. A listed one stays until it takes less than half of that: runs on several machines then do not turn
+the list to and fro.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from tests.markers import BOUND_S, SLOW_TESTS, slow_tests
+
+HEAD = """\
+# Test functions whose cases together take longer than {bound} s on two idle cores: they have the marker `slow`.
+# Made from a run with `--junitxml times.xml` by `python -m tests.project.slow_tests times.xml --write`, not by hand.
+"""
+
+
+def durations(report: Path) -> dict[str, float | None]:
+    """Test function -> what all of its cases took [s]; None: one was skipped, so that nothing is known of it."""
+    took: dict[str, float | None] = defaultdict(float)
+    for case in ElementTree.parse(report).iter("testcase"):
+        name = f"{case.attrib['classname'].replace('.', '/')}.py::{case.attrib['name'].partition('[')[0]}"
+        so_far = took[name]
+        skipped = case.find("skipped") is not None
+        took[name] = None if skipped or so_far is None else so_far + float(case.attrib["time"])
+    return dict(took)
+
+
+def corrected(listed: Sequence[str], took: Mapping[str, float | None], bound: float = BOUND_S) -> list[str]:
+    """The list as it should be."""
+    slow = {name for name, seconds in took.items() if seconds is not None and seconds > bound}
+    stay = {name for name in listed if name in took and ((seconds := took[name]) is None or seconds > bound / 2)}
+    return sorted(slow | stay)
+
+
+def main() -> int:
+    """Compare the list with the report; 1 where a slow test is not listed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("report", type=Path, help="what pytest wrote with --junitxml, of the whole suite")
+    parser.add_argument("--write", action="store_true", help="correct tests/slow_tests.txt")
+    chosen = parser.parse_args()
+    listed, took = slow_tests(), durations(chosen.report)
+    wanted = corrected(listed, took)
+    lacking, needless = sorted(set(wanted) - set(listed)), sorted(set(listed) - set(wanted))
+    for name in lacking:
+        print(f"not listed: {name} took {took[name]:.2f} s")
+    for name in needless:
+        print(f"listed, but {'took less than half of the bound' if name in took else 'there is no such test'}: {name}")
+    fast = sum(seconds or 0.0 for name, seconds in took.items() if name not in wanted)
+    print(f"{len(took)} test functions, {len(wanted)} of them slow; the others together took {fast:.0f} s")
+    if chosen.write:
+        SLOW_TESTS.write_text(HEAD.format(bound=BOUND_S) + "\n".join(wanted) + "\n", encoding="utf-8")
+        return 0
+    return int(bool(lacking))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

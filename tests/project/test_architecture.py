@@ -1,0 +1,94 @@
+"""The shape of the code: imports run downward, importing is light, every module says what it is."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import typer.main
+
+ROOT = Path(__file__).parents[2]
+# Files that name what is called: code, pages, and what the report's page is made of.
+SHOWS_NAMES = (".py", ".md", ".js", ".j2")
+HEAVY = ("numba", "pandas", "scipy", "matplotlib", "mcap", "typer", "rich")
+
+
+def loaded_after(statement: str) -> set[str]:
+    code = f"import sys\n{statement}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    return set(done.stdout.split())
+
+
+def test_importing_cdtool_loads_nothing_heavy():
+    assert not loaded_after("import cdtool") & {*HEAVY, "numpy"}
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "cdtool.workflows.benchmark.benchmark",
+        "cdtool.detectors.friction_ekf",
+        "cdtool.ingest.reading",
+        "cdtool.report.outputs",
+    ],
+)
+def test_importing_a_module_loads_no_library_that_only_its_use_needs(module):
+    assert not loaded_after(f"import {module}") & set(HEAVY)
+
+
+def test_the_command_line_loads_typer_and_nothing_heavier():
+    assert not loaded_after("import cdtool.cli.app") & (set(HEAVY) - {"typer", "rich"})
+
+
+def test_imports_run_downward():
+    pytest.importorskip("importlinter")
+    from importlinter.cli import lint_imports
+
+    assert lint_imports(config_filename=str(ROOT / "pyproject.toml")) == 0
+
+
+def test_every_module_says_what_it_is():
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        assert path.read_text(encoding="utf-8").startswith('"""'), path
+
+
+def test_the_tests_mirror_the_package():
+    """A folder of tests is one of cdtool/, or says in its __init__.py what it holds."""
+    tests, package = ROOT / "tests", ROOT / "cdtool"
+    for file in sorted(tests.rglob("test_*.py")):
+        folder = file.parent
+        if not (package / folder.relative_to(tests)).is_dir():
+            assert (folder / "__init__.py").read_text(encoding="utf-8").startswith('"""'), file
+        elif folder == tests:
+            tested = package / file.stem.removeprefix("test_")
+            assert tested.is_dir() or tested.with_suffix(".py").is_file(), file
+
+
+def words_of(*folders: Path) -> Counter[str]:
+    files = [file for folder in folders for file in sorted(folder.rglob("*")) if file.suffix in SHOWS_NAMES]
+    return Counter(word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8")))
+
+
+def test_what_is_public_is_used_or_shown_by_more_than_tests():
+    code, shown = words_of(ROOT / "cdtool"), words_of(ROOT / "docs", ROOT / "benchmarks")
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                assert code[node.name] > 1 or shown[node.name], (path, node.name)
+
+
+def test_the_python_api_names_functions_that_exist_and_every_command_has_one():
+    import cdtool
+    from cdtool.cli.app import app
+
+    assert all(callable(getattr(cdtool, name)) for name in cdtool.__all__ if name != "__version__")
+    members = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    # A command with subcommands is several functions.
+    commands = {name.replace("-", "_") for name, command in members if not hasattr(command, "commands")}
+    # `report` writes files of what `benchmark` gave; `list` shows the registries.
+    assert commands - {"report", "list"} <= set(cdtool.__all__)

@@ -1,0 +1,177 @@
+"""The pipeline files in docs/examples: they parse, ask for little, and their shell lines do what the page says."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from cdtool.evaluation.limits import read_limits
+from cdtool.evaluation.summary import FIGURES
+from cdtool.tables import Table
+
+yaml = pytest.importorskip("yaml")
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "docs" / "examples"
+PAGE = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
+
+
+def parsed(name: str) -> dict[Any, Any]:
+    values = yaml.safe_load((EXAMPLES / name).read_text(encoding="utf-8"))
+    assert isinstance(values, dict)
+    return values
+
+
+def github_job() -> dict[str, Any]:
+    (job,) = parsed("github-actions.yml")["jobs"].values()
+    return dict(job)
+
+
+def github_step(words: str) -> str:
+    """The shell lines of the one step that holds these words."""
+    (found,) = [step["run"] for step in github_job()["steps"] if words in step.get("run", "")]
+    return str(found)
+
+
+class Shell:
+    """Runs lines as a runner would: bash that stops at the first failure, in a checkout with sample logs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "sample_logs").symlink_to(ROOT / "sample_logs")
+        programs = folder / "programs"
+        programs.mkdir()
+        program = programs / "cdtool"
+        program.write_text(f"#!{sys.executable}\nfrom cdtool.cli.app import main\nmain()\n", encoding="utf-8")
+        program.chmod(0o755)
+        self.environment = {
+            **os.environ,
+            "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": str(ROOT),
+            "GITHUB_STEP_SUMMARY": str(folder / "step_summary.md"),
+            "BENCHMARK": str(github_job()["env"]["BENCHMARK"]),
+        }
+
+    def __call__(self, lines: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["bash", "-e", "-c", lines],
+            capture_output=True,
+            text=True,
+            cwd=self.folder,
+            env=self.environment,
+            check=False,
+        )
+
+    def names(self, folder: str) -> set[str]:
+        return {path.name for path in (self.folder / folder).iterdir()}
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Shell:
+    if shutil.which("bash") is None:
+        pytest.skip("bash is not installed")
+    return Shell(tmp_path)
+
+
+REPORTS = {"junit.xml", "summary.md", "report.html", "results.json", "results.traces.json.gz"}
+
+
+def test_the_steps_of_github_make_every_report_compare_and_show_the_summary(shell):
+    compare, show = github_step("cdtool compare"), github_step("GITHUB_STEP_SUMMARY")
+    done = shell(github_step("cdtool benchmark"))
+    assert done.returncode == 0, done.stderr
+    assert shell.names("out") == REPORTS
+    assert shell(compare).returncode == 0 and shell.names("out") == REPORTS  # the first time there is nothing of main
+    (shell.folder / "baseline").mkdir()
+    shutil.copy(shell.folder / "out" / "results.json", shell.folder / "baseline")
+    done = shell(compare)
+    assert done.returncode == 0 and "no change shown" in done.stdout, done.stderr
+    assert shell(show).returncode == 0
+    shown = (shell.folder / "step_summary.md").read_text(encoding="utf-8")
+    parts = [(shell.folder / "out" / name).read_text(encoding="utf-8") for name in ("summary.md", "compare.md")]
+    assert shown == "".join(parts)
+
+
+def test_a_broken_limit_fails_the_job_and_the_reports_are_there_all_the_same(shell):
+    gate = shell.folder / "sample_logs" / "gate"
+    text = f'machine = "{gate}/machine.toml"\ndetectors = ["pi"]\n[learn]\nlogs = ["{gate}/free/*"]\n'
+    text += f'[impacts.stiff]\nlogs = ["{gate}/stiff/03.csv"]\n[limits]\n"pi.stiff.max_ms" = {{ max = 20 }}\n'
+    (shell.folder / "broken.toml").write_text(text, encoding="utf-8")
+    shell.environment["BENCHMARK"] = "broken.toml"
+    done = shell(github_step("cdtool benchmark"))
+    assert done.returncode == 1 and "limit violated: pure_inertia.stiff.max_ms" in done.stdout
+    assert shell.names("out") == REPORTS
+    assert ElementTree.parse(shell.folder / "out" / "junit.xml").findall(".//failure")
+    assert shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
+
+
+def test_a_benchmark_that_cannot_run_fails_the_job_and_the_later_steps_bear_it(shell):
+    shell.environment["BENCHMARK"] = "none.toml"
+    assert shell(github_step("cdtool benchmark")).returncode == 2
+    assert shell(github_step("cdtool compare")).returncode == shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
+
+
+def test_the_scripts_of_gitlab_are_the_same_benchmark_and_compare_where_there_is_something(shell):
+    values = parsed("gitlab-ci.yml")
+    benchmark, compare = values["collision-benchmark"], values["collision-compare"]
+    assert values["variables"]["BENCHMARK"] == shell.environment["BENCHMARK"]
+    assert "\n".join(benchmark["script"]) == github_step("cdtool benchmark").strip()
+    assert benchmark["artifacts"]["reports"]["junit"] == "out/junit.xml" and benchmark["artifacts"]["paths"] == ["out/"]
+    (fetch,) = [line for line in compare["script"] if line.startswith("curl ")]
+    assert "--output baseline/results.json" in fetch and "|| rm -f baseline/results.json" in fetch
+    others = "\n".join(line for line in compare["script"] if line != fetch)
+    done = shell(others)
+    assert done.returncode == 0 and "nothing to compare with" in done.stdout
+    made = shell('cdtool benchmark "$BENCHMARK" --detectors pi -o out/results.json -o baseline/results.json')
+    assert made.returncode == 0, made.stderr
+    done = shell(others)
+    assert done.returncode == 0 and "no change shown" in done.stdout, done.stderr
+    assert compare["artifacts"]["paths"] == ["out/compare.md"] and (shell.folder / "out" / "compare.md").is_file()
+
+
+def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
+    values, job = parsed("github-actions.yml"), github_job()
+    assert values["permissions"] == {} and job["permissions"] == {"contents": "read", "actions": "read"}
+    assert job["timeout-minutes"] <= 30
+    used = [step["uses"] for step in job["steps"] if "uses" in step]
+    assert [item.partition("@")[0] for item in used] == [
+        "actions/checkout",
+        "actions/setup-python",
+        "actions/upload-artifact",
+    ]
+    assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", item) for item in used)
+    (python,) = [step["with"] for step in job["steps"] if "setup-python" in step.get("uses", "")]
+    assert python["cache"] == "pip"
+    keep = job["steps"][-1]
+    assert keep["if"] == "always()" and keep["with"]["path"] == "out/"
+    fetch = github_step("gh run download")
+    assert f"--name {keep['with']['name']} --dir baseline" in fetch and "--branch main" in fetch
+
+
+def test_gitlab_keeps_artifacts_whatever_happens_and_compares_after_a_broken_limit_too():
+    values = parsed("gitlab-ci.yml")
+    for name in ("collision-benchmark", "collision-compare"):
+        assert values[name]["artifacts"]["when"] == "always"
+        assert values[name]["stage"] in values["stages"]
+    assert values["collision-compare"]["rules"] == [
+        {"if": '$CI_PIPELINE_SOURCE == "merge_request_event"', "when": "always"}
+    ]
+    assert values["default"]["timeout"] == "30 minutes"
+
+
+def test_the_page_names_every_figure_and_its_limits_are_valid():
+    table = [line for line in PAGE.splitlines() if line.startswith("| `")]
+    assert set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in table))) == set(FIGURES)
+    (block,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    limits = Table(tomllib.loads(block)["limits"], "ci.md", "limits.")
+    known = [("friction_ekf", "feekf"), ("momentum", "gm")]
+    assert len(read_limits(limits, known, ("stiff", "soft"))) == len(block.strip().splitlines()) - 1

@@ -1,0 +1,102 @@
+"""The block diagrams: made by their script, valid, described, and nothing in them lies over anything else."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from itertools import combinations
+from pathlib import Path
+from types import ModuleType
+from xml.etree import ElementTree
+
+import matplotlib
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+SVG = "{http://www.w3.org/2000/svg}"
+NAMES = [
+    "desired_dynamics",
+    "direct",
+    "energy_observer",
+    "friction_ekf",
+    "impact_control",
+    "impact_elastic",
+    "impact_momentum",
+    "impact_rigid",
+    "inertial_momentum",
+    "kalman_momentum",
+    "momentum_observer",
+    "structure",
+    "velocity_observer",
+]
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is no package."""
+    for name in ("make_diagrams", "make_impact_diagrams"):
+        spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+        assert spec and spec.loader
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules["make_diagrams"]
+
+
+@pytest.fixture(scope="module")
+def made(script, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("diagrams")
+    assert script.main(folder) == 0
+    return folder
+
+
+def content(path: Path) -> tuple[list[str], list[str]]:
+    """Words and formulas of a drawing, which no version of matplotlib changes."""
+    text = path.read_text(encoding="utf-8")
+    words = [element.text or "" for element in ElementTree.fromstring(text).iter(f"{SVG}text")]
+    return words, re.findall(r"<!-- (\$.*?\$) -->", text)
+
+
+def test_the_scripts_make_exactly_the_diagrams_of_the_docs(made):
+    for folder in (made, DOCS / "images"):
+        assert sorted(path.stem for path in folder.glob("*.svg")) == NAMES, folder
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_diagram_is_valid_small_and_described_for_those_who_do_not_see_it(name):
+    path = DOCS / "images" / f"{name}.svg"
+    root = ElementTree.fromstring(path.read_text(encoding="utf-8"))
+    title, description = root.findtext(f"{SVG}title"), root.findtext(f"{SVG}desc")
+    assert root.tag == f"{SVG}svg" and title and description and len(description) > 100
+    assert path.stat().st_size < 60_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_diagram_of_the_docs_says_what_its_script_draws(name, made):
+    words, formulas = content(made / f"{name}.svg")
+    assert words and formulas
+    assert content(DOCS / "images" / f"{name}.svg") == (words, formulas)
+
+
+def test_the_same_script_gives_the_same_bytes(script, made):
+    for name in NAMES:
+        assert (made / f"{name}.svg").read_text(encoding="utf-8") == script.svg(name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_text_leaves_the_sheet_or_lies_over_another(name, script):
+    with matplotlib.rc_context(script.STYLE):
+        figure = script.diagram(name).figure
+        boxes = {item: item.get_window_extent() for item in figure.axes[0].texts if item.get_text()}
+    assert len(boxes) > 5
+    for item, box in boxes.items():
+        inside = figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+        assert inside and figure.bbox.y0 <= box.y0 and box.y1 <= figure.bbox.y1, item.get_text()
+    for (one, box), (other, other_box) in combinations(boxes.items(), 2):
+        assert not box.overlaps(other_box), (one.get_text(), other.get_text())
+
+
+def test_a_wire_that_would_run_askew_is_an_error(script):
+    sheet = script.Diagram(50)
+    with pytest.raises(ValueError, match="neither horizontally nor vertically"):
+        sheet.wire(sheet.block(20, 10, "one"), sheet.block(60, 40, "two"))

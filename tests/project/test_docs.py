@@ -1,0 +1,450 @@
+"""What the docs say is true: every command runs, every example gives what it shows, every link and key is there."""
+
+from __future__ import annotations
+
+import doctest
+import json
+import re
+import runpy
+import shlex
+import shutil
+import statistics
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdtool.channels import ChannelMap
+from cdtool.detectors import DETECTORS
+from cdtool.errors import ConfigurationError
+from cdtool.machine_file import read_machine_file
+from cdtool.recording import CHANNELS
+from cdtool.units import UNITS
+from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from tests.command import Outcome, cdtool
+from tests.data_folder import DATA, needs_data
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+
+# Pages and how many commands they show at least; a page that loses its commands is noticed.
+COMMANDS = {
+    "README.md": 4,
+    "docs/quick-start.md": 6,
+    "docs/recordings.md": 4,
+    "docs/benchmark-file.md": 1,
+    "docs/evaluation.md": 2,
+    "docs/choosing.md": 6,
+    "docs/signature.md": 7,
+    "docs/simulators.md": 2,
+    "docs/real-recordings.md": 10,
+    "docs/explain.md": 4,
+    "docs/reports.md": 2,
+    "docs/ci.md": 3,
+    "docs/own-detector.md": 1,
+    "docs/comparing.md": 7,
+    "docs/study.md": 2,
+    "docs/containers.md": 4,
+}
+EXAMPLES = {
+    "docs/python.md": 13,
+    "docs/own-detector.md": 2,
+    "docs/comparing.md": 1,
+    "docs/impact.md": 8,
+    "docs/transmission.md": 3,
+    "docs/signature.md": 1,
+    "docs/simulators.md": 3,
+    "docs/detectors/friction-ekf.md": 1,
+}
+# Lines of shell blocks that set something up or take long: they are run by CI or by hand, not here.
+NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
+
+_FENCE = re.compile(
+    r"^(?:<!-- exit (?P<status>\d) -->\n)?```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL
+)
+_LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command line or a Python example of a page, and the exit status that it should have."""
+
+    kind: str
+    text: str
+    status: int = 0
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def steps_of(page: Path) -> Iterator[Step]:
+    for block in _FENCE.finditer(page.read_text(encoding="utf-8")):
+        body, status = block["body"], int(block["status"] or 0)
+        if block["kind"] == "python":
+            yield Step("python", body)
+        elif block["kind"] == "console":
+            for line in re.findall(r"^\$ (.*)$", body, re.MULTILINE):
+                yield Step("command", line, status)
+        elif block["kind"] == "sh":
+            for line in body.replace("\\\n", " ").splitlines():
+                if line.strip() and not line.startswith(("#", *NOT_RUN_HERE)):
+                    yield Step("command", line, status)
+
+
+def run_command(line: str) -> Outcome:
+    """A line as a shell would run it: variable and wildcards expanded, in the current folder."""
+    words: list[str] = []
+    for word in shlex.split(line.replace("$CDTOOL_DATA", str(DATA))):
+        matches = sorted(map(str, Path().glob(word))) if "*" in word else [word]
+        assert matches, f"nothing matches {word} in: {line}"
+        words += matches
+    if words[0] == "cdtool":
+        return cdtool(*words[1:])
+    assert words[0] == "python" and words[1].startswith("docs/examples/"), f"this test cannot run: {line}"
+    kept = sys.argv
+    sys.argv = words[1:]
+    try:
+        runpy.run_path(words[1], run_name="__main__")
+    except SystemExit as end:
+        return Outcome(int(end.code or 0), "", "")
+    finally:
+        sys.argv = kept
+    return Outcome(0, "", "")
+
+
+def run_example(text: str, names: dict[str, object], page: str) -> None:
+    """A Python block: as a doctest where it has prompts, else as a program."""
+    if ">>>" not in text:
+        exec(compile(text, page, "exec"), names)
+        return
+    test = doctest.DocTestParser().get_doctest(text, names, page, page, 0)
+    said: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=_FLAGS, verbose=False)
+    failed = runner.run(test, out=said.append, clear_globs=False).failed
+    names.update(test.globs)
+    assert not failed, "".join(said)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A fresh folder that looks like a checkout to the commands of a page."""
+    assert (ROOT / "sample_logs" / "gate" / "benchmark.toml").is_file()
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
+    (tmp_path / "docs" / "examples").symlink_to(DOCS / "examples")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def the_tables_of_choosing_are_what_the_runs_gave() -> None:
+    both = (("stiff", "soft"), 1)
+    columns = {"results.json": both, "arm1.json": both, "arm2.json": (("stiff", "soft"), 3)}
+    rows: dict[int, dict[str, list[str]]] = {2: {}, 4: {}}
+    for line in (DOCS / "choosing.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if re.match(r"\| `\w+` \|", line) and len(cells) - 1 in rows:
+            rows[len(cells) - 1][cells[0].strip("`")] = cells
+    for name, (groups, first) in columns.items():
+        results = json.loads(Path(name).read_text(encoding="utf-8"))
+        stated = rows[2 if name == "results.json" else 4]
+        assert sorted(stated) == sorted(results["detectors"])
+        assert not results["false_alarms"]
+        for detector, cells in stated.items():
+            for group, cell in zip(groups, cells[first:], strict=False):
+                seen = [c for c in results["contacts"] if (c["detector"], c["group"]) == (detector, group)]
+                assert len(seen) == 15
+                agrees_with(cell, seen)
+
+
+def agrees_with(cell: str, contacts: list[dict[str, Any]]) -> None:
+    """A cell such as `27 ± 1`, `116 ± 5, 11 missed`, `30 missed` or `not assessable` against the contacts' outcomes."""
+    found = re.fullmatch(r"(?:(\d+) ± (\d+))?(?:, )?(?:(\d+) missed)?(not assessable)?", cell)
+    assert found and cell, cell
+    mean, deviation, missed, blind = found.groups()
+    outcomes = [contact["outcome"] for contact in contacts]
+    assert outcomes.count("missed") == int(missed or 0), cell
+    assert outcomes.count("not_assessable") == (len(contacts) if blind else 0), cell
+    latencies = [contact["latency_ms"] for contact in contacts if contact["outcome"] == "detected"]
+    assert bool(mean) == bool(latencies), cell
+    if latencies:
+        assert statistics.mean(latencies) == pytest.approx(float(mean), abs=1.5), cell
+        assert statistics.stdev(latencies) == pytest.approx(float(deviation), abs=1.5), cell
+
+
+def a_narrow_tracking_limit_misses_the_stiff_impacts_as_stated() -> None:
+    stated = (DOCS / "detectors" / "desired-dynamics.md").read_text(encoding="utf-8")
+    limit = re.search(r"with `tracking_limit = (\S+)`\s+all 15 stiff impacts .* are missed", stated)
+    assert limit
+    gate = Path("gate")
+    machine = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "narrow.toml").write_text(f"{machine}\n[detectors.ddd]\ntracking_limit = {limit[1]}\n", encoding="utf-8")
+    text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"narrow.toml"')
+    (gate / "narrow_benchmark.toml").write_text(text, encoding="utf-8")
+    assert cdtool("benchmark", gate / "narrow_benchmark.toml", "--detectors", "ddd", "-o", "narrow.json").status == 0
+    contacts = json.loads(Path("narrow.json").read_text(encoding="utf-8"))["contacts"]
+    assert [c["outcome"] for c in contacts if c["group"] == "stiff"] == ["missed"] * 15
+
+
+def choosing_says_what_the_runs_gave() -> None:
+    the_tables_of_choosing_are_what_the_runs_gave()
+    a_narrow_tracking_limit_misses_the_stiff_impacts_as_stated()
+
+
+def the_thesis_rule_alarms_in_every_impact_free_run() -> None:
+    gate = Path("gate")
+    machine, free, holdout = gate / "machine.toml", sorted(gate.glob("free/*")), sorted(gate.glob("holdout/*"))
+    for detector in ("feekf", "gm", "igm", "pi", "pt"):
+        rule = ("-m", machine, "-d", detector, "--rule", "thesis", "-o", "rule.json")
+        assert cdtool("learn-signature", *free, *rule).status == 0
+        found = json.loads(cdtool("detect", *holdout, "-m", machine, "-s", "rule.json", "--json").out)
+        assert [item["verdict"] for item in found] == ["alarm"] * 40, detector
+
+
+def the_alarms_in_the_real_recordings_are_as_stated() -> None:
+    assert DATA is not None
+    text = (DOCS / "real-recordings.md").read_text(encoding="utf-8")
+    limits = ("-d", "pt", "--limit", "33,inf,53,inf,inf,inf", "--debounce", "2")
+    limits = ("-m", "docs/examples/ur10e.toml", *limits, "--json")
+    link4 = json.loads(cdtool("detect", DATA / "ur10e" / "link4.csv", *limits).out)
+    times = [f"{alarm['time_s'] - 3262.867:.3f}" for alarm in link4[0]["alarms"]]
+    assert times == ["3.576", "4.208", "9.702", "9.712", "16.628", "16.958"]
+    assert all(time in text for time in times)
+    free = json.loads(cdtool("detect", DATA / "ur10e" / "no_torque.csv", *limits).out)
+    static = json.loads(cdtool("detect", DATA / "ur10e" / "ur-static.csv", *limits).out)
+    assert (len(free[0]["alarms"]), len(static[0]["alarms"])) == (2, 0)
+    emps = ("-m", "docs/examples/emps.toml", "--operations", "motion", "--json")
+    learned, limit = {1, 2}, {0}
+    tried = ((learned, "-s", "emps.gm.json"), (learned, "-s", "emps.pt.json"), (limit, "-d", "gm", "--limit", 15))
+    for alarms, *threshold in tried:
+        strokes = json.loads(cdtool("detect", DATA / "emps" / "DATA_EMPS_PULSES.mat", *emps, *threshold).out)
+        assert len(strokes) == 8 and {len(stroke["alarms"]) for stroke in strokes} == alarms, threshold
+
+
+def the_results_file_has_the_fields_of_the_page() -> None:
+    results = json.loads(Path("results.json").read_text(encoding="utf-8"))
+    named = named_in("benchmark-file.md")
+    assert set(results) <= named
+    assert set(results["exposure"][0]) <= named
+    schema = json.loads((DOCS / "results.schema.json").read_text(encoding="utf-8"))
+    assert set(results) == set(schema["properties"])
+
+
+def the_table_of_the_readme_is_what_its_benchmark_prints() -> None:
+    lines = {" ".join(line.split()) for line in cdtool("benchmark", "sample_logs/gate/benchmark.toml").out.splitlines()}
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = [" ".join(line.split()) for line in text.splitlines() if re.match(r"(stiff|soft) +\w+ +\d", line)]
+    assert len(rows) == 10 and set(rows) <= lines
+
+
+CLAIMS: dict[str, Callable[[], None]] = {
+    "README.md": the_table_of_the_readme_is_what_its_benchmark_prints,
+    "docs/benchmark-file.md": the_results_file_has_the_fields_of_the_page,
+    "docs/choosing.md": choosing_says_what_the_runs_gave,
+    "docs/signature.md": the_thesis_rule_alarms_in_every_impact_free_run,
+    "docs/real-recordings.md": the_alarms_in_the_real_recordings_are_as_stated,
+}
+
+
+RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", "ur10e/link4.csv")
+
+
+def page_with_its_recordings(page: Path) -> object:
+    real = any("$CDTOOL_DATA" in step.text for step in steps_of(page))
+    return pytest.param(page, marks=[needs_data(*RECORDINGS)] if real else [], id=name_of(page))
+
+
+@pytest.mark.parametrize("page", [page_with_its_recordings(page) for page in PAGES if any(steps_of(page))])
+def test_every_command_and_example_of_a_page_runs_in_order(page, folder):
+    steps, name = list(steps_of(page)), name_of(page)
+    names: dict[str, object] = {}
+    for step in steps:
+        if step.kind == "python":
+            run_example(step.text, names, name)
+            continue
+        done = run_command(step.text)
+        assert done.status == step.status, f"{step.text}\n{done.out}\n{done.err}"
+        assert "Traceback" not in done.out + done.err
+    if name in CLAIMS:
+        CLAIMS[name]()
+
+
+def test_the_pages_show_as_many_commands_and_examples_as_they_should():
+    for kind, expected in (("command", COMMANDS), ("python", EXAMPLES)):
+        found = {name_of(page): sum(step.kind == kind for step in steps_of(page)) for page in PAGES}
+        assert {name for name, count in found.items() if count} == set(expected)
+        for name, least in expected.items():
+            assert found[name] >= least, name
+    assert set(CLAIMS) <= set(COMMANDS)
+
+
+def test_every_link_and_image_resolves():
+    checked = 0
+    for page in [*PAGES, ROOT / "sample_logs" / "README.md", ROOT / "CONTRIBUTING.md"]:
+        prose = _FENCE.sub("", page.read_text(encoding="utf-8"))
+        for target in _LINK.findall(prose):
+            if re.match(r"https?://", target):
+                continue
+            path, _, anchor = target.partition("#")
+            linked = (page.parent / path).resolve() if path else page
+            assert linked.exists(), f"{name_of(page)}: {target}"
+            if anchor:
+                headings = re.findall(r"^#+ (.*)$", linked.read_text(encoding="utf-8"), re.MULTILINE)
+                slugs = [re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings]
+                assert anchor in slugs, f"{name_of(page)}: {target}"
+            checked += 1
+    assert checked > 60
+
+
+def test_every_page_and_image_is_reached_and_no_image_is_large():
+    listed = {
+        (index.parent / target).resolve()
+        for index in DOCS.rglob("index.md")
+        for target in _LINK.findall(index.read_text(encoding="utf-8"))
+    }
+    everything = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for page in DOCS.rglob("*.md"):
+        assert page == DOCS / "index.md" or page.resolve() in listed, page
+    images = list((DOCS / "images").iterdir())
+    assert images
+    for image in images:
+        assert f"images/{image.name})" in everything, f"{image.name} is used on no page"
+        assert image.stat().st_size < 200_000, image.name
+
+
+def test_the_list_of_detectors_is_made_from_the_registry_and_their_pages():
+    made = runpy.run_path(str(DOCS / "make_detector_index.py"))
+    assert made["FILE"].read_text(encoding="utf-8") == made["index_text"](), "run python docs/make_detector_index.py"
+
+
+def test_every_detector_has_a_page_whose_table_names_each_gain_with_default_and_unit():
+    detectors = json.loads(cdtool("list", "detectors", "--json").out)
+    assert len(detectors) >= len(DETECTORS.table)
+    for detector in detectors:
+        text = (DOCS / "detectors" / f"{detector['name'].replace('_', '-')}.md").read_text(encoding="utf-8")
+        assert f"`{detector['name']}`" in text and f"`{detector['short_name']}`" in text
+        for channel in detector["needs"]:
+            assert re.search(rf"Needs:[^.]*`{channel}`", text), (detector["name"], channel)
+        for part in ("## Equation", "## Signal", "## Gains", "## Start-up and not applicable", "## When it fails"):
+            assert part in text, (detector["name"], part)
+        rows = [[cell.strip() for cell in line.split("|")[1:4]] for line in text.splitlines() if line.startswith("| `")]
+        stated = {row[0].strip("`"): (float(row[1]), row[2]) for row in rows}
+        assert stated == {gain["name"]: (gain["default"], gain["unit"]) for gain in detector["gains"]}, detector["name"]
+
+
+def named_in(page: str) -> set[str]:
+    return set(re.findall(r"`([^`\n]+)`", _FENCE.sub("", (DOCS / page).read_text(encoding="utf-8"))))
+
+
+def known_keys(read: Callable[[Path], object], text: str, folder: Path) -> set[str]:
+    """The keys that an error about the unknown key `zzz` lists."""
+    file = folder / "asked.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"unknown (key|channel)") as fault:
+        read(file)
+    return set(fault.value.hint.partition("known: ")[2].split(", "))
+
+
+LINEAR = '[machine]\ntype = "linear_axis"\ntransmission_ratio = 1e-3\n'
+ARM = """[machine]
+type = "planar_arm"
+transmission_ratio = 0.02
+link_mass = 1
+link_length = 0.3
+centre_of_mass = 0.1
+"""
+ROBOT = """[machine]
+type = "urdf_robot"
+urdf = "scara.urdf"
+joints = ["lift_joint", "shoulder_joint", "elbow_joint"]
+locked = {finger_joint = 0}
+"""
+SECTIONS = {
+    "arm": ARM + "zzz = 1",
+    "robot": ROBOT + "zzz = 1",
+    "linear": LINEAR + "zzz = 1",
+    "rotary": '[machine]\ntype = "rotary_axis"\ntransmission_ratio = 1\nzzz = 1',
+    "file": LINEAR + "[zzz]",
+    "channels": LINEAR + "[channels]\ntime = {rate_hz = 1}\nzzz = {}",
+    "time": LINEAR + '[channels]\ntime = {column = "t", unit = "s", zzz = 1}',
+    "rate": LINEAR + "[channels]\ntime = {rate_hz = 1, zzz = 1}",
+    "channel": LINEAR + '[channels]\ntime = {rate_hz = 1}\nforce = {column = "f", unit = "N", zzz = 1}',
+    "duty": LINEAR
+    + '[channels]\ntime = {rate_hz = 1}\ntorque = {column = "u", unit = "V", kind = "duty", resistance = 1, '
+    + "back_emf_constant = 0, torque_constant = 1, zzz = 1}",
+    "clock": LINEAR + "[channels.mcap]\ntime = {zzz = 1}",
+    "topic": LINEAR + '[channels.mcap]\nforce = {topic = "/f", field = "data", zzz = 1}',
+}
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_machine_file_page_names_every_key(section, tmp_path):
+    if section == "robot":
+        pytest.importorskip("pinocchio")
+        shutil.copy(DOCS / "examples" / "scara.urdf", tmp_path)
+    known = known_keys(read_machine_file, SECTIONS[section], tmp_path)
+    assert known
+    words = " ".join(named_in("machine-file.md"))
+    headings = (DOCS / "machine-file.md").read_text(encoding="utf-8")
+    for key in known:
+        assert re.search(rf"\b{key}\b", words) or f"## [{key}" in headings, key
+
+
+def test_the_machine_file_page_names_every_channel_unit_and_setting():
+    named = named_in("machine-file.md")
+    assert set(CHANNELS) <= named
+    assert set(UNITS) <= named
+    assert {"speed_low_pass_hz", "kind", "saturation", "columns"} <= named
+    text = (DOCS / "machine-file.md").read_text(encoding="utf-8")
+    assert f"default {ChannelMap.speed_low_pass:g}" in text
+
+
+def test_the_machine_files_on_the_page_are_valid(tmp_path):
+    pytest.importorskip("pinocchio")
+    shutil.copy(DOCS / "examples" / "scara.urdf", tmp_path)
+    blocks = [b["body"] for b in _FENCE.finditer((DOCS / "machine-file.md").read_text("utf-8")) if b["kind"] == "toml"]
+    whole = [text for text in blocks if "[machine]" in text]
+    kinds = []
+    for i, text in enumerate(whole):
+        (tmp_path / f"{i}.toml").write_text(text, encoding="utf-8")
+        assert read_machine_file(tmp_path / f"{i}.toml").columns.sources
+        kinds.append(tomllib.loads(text)["machine"]["type"])
+    assert sorted(kinds) == ["linear_axis", "linear_axis", "planar_arm", "rotary_axis", "urdf_robot"]
+    for text in set(blocks) - set(whole):
+        (tmp_path / "part.toml").write_text(LINEAR + text, encoding="utf-8")
+        assert read_machine_file(tmp_path / "part.toml").gains
+
+
+def test_the_robot_on_the_machine_file_page_is_the_example_in_its_folder():
+    blocks = [b["body"] for b in _FENCE.finditer((DOCS / "machine-file.md").read_text("utf-8")) if b["kind"] == "toml"]
+    shown = [tomllib.loads(text) for text in blocks if "urdf_robot" in text]
+    assert shown == [tomllib.loads((DOCS / "examples" / "scara.toml").read_text(encoding="utf-8"))]
+
+
+def test_the_benchmark_file_page_is_valid_and_names_every_key(tmp_path):
+    for item in (ROOT / "sample_logs" / "gate").iterdir():
+        (tmp_path / item.name).symlink_to(item)
+    text = next(
+        b["body"] for b in _FENCE.finditer((DOCS / "benchmark-file.md").read_text("utf-8")) if b["kind"] == "toml"
+    )
+    (tmp_path / "example.toml").write_text(text, encoding="utf-8")
+    assert read_benchmark_file(tmp_path / "example.toml").groups == ("stiff", "soft", "holdout")
+    words = " ".join(named_in("benchmark-file.md"))
+    for section in ("[zzz]", "[signature]\nzzz = 1"):
+        known = known_keys(read_benchmark_file, text + section, tmp_path)
+        assert known
+        for key in known:
+            assert re.search(rf"\b{key}\b", words) or f"`[{key}]`" in words, key
+    for key in known_keys(read_benchmark_file, text + "zzz = 1", tmp_path):
+        assert key in words, key
+
+
+def test_the_docs_name_no_path_of_a_machine_of_ours():
+    for page in [*PAGES, *DOCS.rglob("*.py"), *DOCS.rglob("*.toml"), ROOT / "sample_logs" / "README.md"]:
+        assert not re.search(r"(?<![\w.])/(work|tmp|home|root)\b", page.read_text(encoding="utf-8")), page

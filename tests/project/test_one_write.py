@@ -1,0 +1,68 @@
+"""Every file that cdtool writes goes through cdtool/files.py: no module opens a name of the user's for writing."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# The blocks in which a temporary file or folder is written, which `files` flushes and puts in place.
+BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
+WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
+ELSEWHERE = {
+    "cdtool/cli/streams.py": "opens the null device",
+    "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
+}
+
+
+def writes(tree: ast.AST) -> Iterator[int]:
+    """Return the lines on which something is written outside the blocks."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.With) and BLOCKS & {_called(item.context_expr) for item in node.items}:
+            continue
+        if isinstance(node, ast.Call) and _is_write(node):
+            yield node.lineno
+        yield from writes(node)
+
+
+def _called(node: ast.expr) -> str:
+    return ast.unparse(node.func).rpartition(".")[2] if isinstance(node, ast.Call) else ""
+
+
+def _is_write(call: ast.Call) -> bool:
+    if isinstance(call.func, ast.Attribute) and call.func.attr in WRITES:
+        return True
+    given = [*call.args, *(item.value for item in call.keywords)]
+    modes = [item.value for item in given if isinstance(item, ast.Constant) and isinstance(item.value, str)]
+    return _called(call) in ("open", "fdopen", "File") and any(
+        set(mode) & set("wax+") and len(mode) < 4 for mode in modes
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ('path.open("wb")', 1),
+        ('open(path, mode="a")', 1),
+        ('path.write_text("x")', 1),
+        ('with path.open("r+") as file:\n    pass', 1),
+        ('path.open("rb")', 0),
+        ("write_text(path, text)", 0),
+        ('with replaced(path) as (part,), part.open("wb") as file:\n    part.write_bytes(b"")', 0),
+    ],
+)
+def test_a_write_is_recognised(code, count):
+    assert len(list(writes(ast.parse(code)))) == count
+
+
+def test_files_are_written_by_the_one_module_for_it_alone():
+    """The writers of formats fill the name that they are handed: the temporary file of a `replaced` block."""
+    found = set()
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        name = path.relative_to(ROOT).as_posix()
+        if name != "cdtool/files.py" and not name.startswith("cdtool/formats/"):
+            found |= {name for _ in writes(ast.parse(path.read_text(encoding="utf-8")))}
+    assert found == set(ELSEWHERE)

@@ -1,0 +1,84 @@
+"""What becomes of a file that cannot be written to its end: one line, status 2, nothing left behind."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cdtool.errors import OutputError, RecordingError
+from cdtool.files import replaced
+from cdtool.formats.groups import Part
+from cdtool.workflows.convert.converting import convert
+from cdtool.workflows.log_rows import LogRows
+from tests.workflows.convert.kinds import KINDS, needs, table
+
+# A disk that is full as far as a process can tell: no file may grow beyond some KiB.
+LIMITED = """
+import resource, sys
+limit = int(sys.argv.pop(1))
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+sys.argv[0] = "cdtool"
+from cdtool.cli.app import main
+main()
+"""
+
+
+def on_a_full_disk(limit: int, *arguments: object) -> subprocess.CompletedProcess[str]:
+    pytest.importorskip("resource")
+    package = str(Path(__file__).parents[2])
+    return subprocess.run(
+        [sys.executable, "-c", LIMITED, str(limit), *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": package},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("suffix", "limit"),
+    [*((suffix, 1 << 15) for suffix in KINDS), (".h5", 1 << 11)],
+    ids=[*KINDS, ".h5, as it is closed"],
+)
+def test_a_disk_that_gets_full_is_one_line_and_leaves_what_was_there(suffix, limit, tmp_path):
+    needs(suffix)
+    rows = 10_000 if limit == 1 << 15 else 20
+    log, target = table(tmp_path / "run.csv", rows=rows), tmp_path / "out" / f"out{suffix}"
+    target.parent.mkdir()
+    target.write_bytes(b"mine")
+    done = on_a_full_disk(limit, "convert", log, target, "--force")
+    expected = f"error: {target}: cannot be written: {os.strerror(errno.EFBIG)} (check the folder and its space)\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)
+    assert target.read_bytes() == b"mine" and len(list(target.parent.iterdir())) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_device_behind_a_written_file_names_the_file(tmp_path):
+    target = tmp_path / "out.csv"
+    with (
+        pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device") as told,
+        replaced(target),
+        Path("/dev/full").open("w") as file,
+    ):
+        file.write("1,2\n")
+    assert "\n" not in str(told.value) and list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_fails_while_the_log_is_read_is_no_fault_of_the_file_that_is_written(tmp_path, monkeypatch):
+    log = table(tmp_path / "run.csv")
+
+    def lost(*_: object):
+        yield [Part(None, ())]
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(LogRows, "parts", lost)
+    monkeypatch.setattr("cdtool.formats.csv_writing._lines", lambda *_: "")
+    monkeypatch.setattr(Part, "__len__", lambda _: 0)
+    with pytest.raises(RecordingError, match=r"run\.csv: cannot be read: Input/output error"):
+        convert(log, tmp_path / "out.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]

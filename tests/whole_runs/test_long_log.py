@@ -1,0 +1,188 @@
+"""The Python API on one long log of an axis that opens and closes, with contacts in both directions."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.activation import Activation
+from cdtool.errors import SignatureError, UsageError
+from cdtool.signature_store import write_signature
+from cdtool.thresholds.signature import Signature
+from cdtool.workflows.detection_options import DetectionOptions
+from tests.command import cdtool as run
+from tests.made_up.door import MACHINE, write_log
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("door")
+    (path / "machine.toml").write_text(MACHINE)
+    write_log(path / "free.csv", 24, {}, 1)
+    write_log(path / "quiet.csv", 6, {}, 2)
+    write_log(path / "hits.csv", 6, {1: 60.0, 2: 60.0, 5: 60.0}, 3)
+    return path
+
+
+def test_one_long_log_gives_a_signature_for_each_direction(folder):
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    assert [(motion.direction, runs) for motion, runs in learned.runs] == [(1, 12), (-1, 12)]
+    with pytest.raises(SignatureError, match="1 impact-free run "):
+        cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm")
+
+
+def test_contacts_are_found_in_both_directions_and_nothing_else(folder, tmp_path):
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    write_signature(tmp_path / "door.json", learned.signature)
+    found = cdtool.detect(
+        folder / "hits.csv", folder / "machine.toml", signature=tmp_path / "door.json", operations="motion"
+    )
+    outcomes = [detection.verdict.outcome for detection in found.detections]
+    assert outcomes == ["no alarm", "alarm", "alarm", "no alarm", "no alarm", "alarm"]
+    sides = [detection.verdict.alarms[0].side for detection in found.detections if detection.verdict.alarms]
+    assert sides == ["below", "above", "below"]
+    assert [contact.start for contact in found.contacts] == pytest.approx([6.0, 10.0, 22.0], abs=0.01)
+
+
+BENCHMARK = """
+machine = "machine.toml"
+detectors = ["gm", "pt"]
+operations = "motion"
+[learn]
+logs = ["free.csv"]
+[holdout]
+logs = ["quiet.csv"]
+[impacts.push]
+logs = ["hits.csv"]
+"""
+
+
+def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
+    (folder / "benchmark.toml").write_text(BENCHMARK)
+    results = cdtool.benchmark(folder / "benchmark.toml").results
+    exposure = {(item.group, item.detector): (item.recordings, item.operations) for item in results.exposure}
+    assert exposure["push", "momentum"] == (1, 6) and exposure["holdout", "pure_torque"] == (1, 6)
+    rows = [(row.recording, row.contact, row.detector, row.outcome) for row in results.contacts]
+    assert rows == [
+        ("hits.csv", number, detector, "detected") for number in (1, 2, 3) for detector in ("momentum", "pure_torque")
+    ]
+    assert all(10.0 < row.latency_ms < 150.0 for row in results.contacts)
+    assert results.false_alarms == () and results.skipped == ()
+    assert results.contacts[0].force_at_alarm_n > 10.0
+
+
+def test_the_plain_limit_serves_a_benchmark_too(folder):
+    text = BENCHMARK.replace('operations = "motion"', 'operations = "motion"\nthreshold = "limit"')
+    (folder / "limit.toml").write_text(text)
+    results = cdtool.benchmark(folder / "limit.toml").results
+    outcomes = {row.detector: row.outcome for row in results.contacts}
+    assert outcomes["momentum"] == "detected"
+    assert results.provenance["threshold"] == "limit"
+
+
+def test_labels_serve_as_ground_truth_where_no_load_cell_is_mapped(folder):
+    text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
+    (folder / "labels.toml").write_text(text)
+    (folder / "label_benchmark.toml").write_text(BENCHMARK.replace("machine.toml", "labels.toml"))
+    results = cdtool.benchmark(folder / "label_benchmark.toml").results
+    assert [row.outcome for row in results.contacts] == ["detected"] * 6
+    assert all(row.peak_force_n is None and row.force_at_alarm_n is None for row in results.contacts)
+
+
+def test_a_trigger_channel_cuts_too_and_a_wrong_way_to_cut_is_refused(folder):
+    text = MACHINE + 'trigger = { column = "hit" }\n'
+    (folder / "trigger.toml").write_text(text.replace('label = { column = "hit", scale = 1 }\n', ""))
+    found = cdtool.detect(
+        folder / "hits.csv", folder / "trigger.toml", detector="pt", limit=[70.0], operations="trigger"
+    )
+    assert [detection.verdict.outcome for detection in found.detections] == ["alarm"] * 3
+    with pytest.raises(UsageError, match="motion"):
+        cdtool.detect(folder / "hits.csv", folder / "machine.toml", detector="pt", limit=[70.0], operations="strokes")
+
+
+def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
+    path = tmp_path / "door.json"
+    machine = ("-m", folder / "machine.toml", "--operations", "motion")
+    assert run("learn-signature", folder / "free.csv", *machine, "-d", "gm", "-o", path).status == 0
+    first = json.loads(path.read_text())
+    done = run("signature", "update", path, folder / "quiet.csv", *machine, "--forget", 20)
+    assert done.status == 0 and "6 runs added" in done.out
+    second = json.loads(path.read_text())
+    assert second["first"] == first["first"] and len(second["runs"]) == 30
+    assert second["current"][0]["by_position"]["count"] == first["current"][0]["by_position"]["count"]
+    assert second["current"][0]["by_position"]["mean"] != first["current"][0]["by_position"]["mean"]
+
+
+def test_the_signature_rule_reaches_the_file(folder):
+    rule = Signature(sides="two", safety_factor=7.0, alignment="position")
+    learned = cdtool.learn_signature(
+        [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", activation={"debounce": 4}
+    )
+    fitted = learned.signature.current[0]
+    assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
+    assert learned.signature.activation == Activation(4)
+
+
+def test_what_could_not_be_judged_is_told_with_its_share(folder):
+    (folder / "benchmark.toml").write_text(BENCHMARK)
+    results = cdtool.benchmark(folder / "benchmark.toml").results
+    momentum = next(item for item in results.exposure if (item.group, item.detector) == ("holdout", "momentum"))
+    assert set(momentum.not_judged) == {"start-up", "no limit known here"}
+    assert 0.05 < sum(momentum.not_judged.values()) < 0.5
+    done = run(
+        "detect",
+        folder / "quiet.csv",
+        "-m",
+        folder / "machine.toml",
+        "-d",
+        "gm",
+        "--limit",
+        40,
+        "--operations",
+        "motion",
+    )
+    assert done.status == 0
+    told = " ".join(done.out.split())  # lines end where the terminal does
+    assert re.search(r"not judged in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told)
+
+
+def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
+    write_log(folder / "rest.csv", 6, {1: 60.0}, 4)
+    table = np.loadtxt(folder / "rest.csv", delimiter=",", skiprows=1)
+    resting = table[-1].copy()
+    tail = np.tile(resting, (4000, 1))
+    tail[:, 0] = table[-1, 0] + 1e-3 * np.arange(1, 4001)
+    tail[:, 2], tail[:, 4] = 0.0, 0.0
+    tail[2500:2800, 4] = 200.0  # the cell is hit long after the last stroke
+    rows = np.vstack((table, tail))
+    header = "t,drive,v,x,cell,hit"
+    np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
+    (folder / "rest.toml").write_text(BENCHMARK.replace("hits.csv", "rest.csv"))
+    results = cdtool.benchmark(folder / "rest.toml").results
+    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s lies in no operation (cut by motion)"]
+    assert len(results.contacts) == 2
+
+
+def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
+    """The speed is lost from before the contact on: the momentum observer sees nothing, and says so."""
+    table = np.loadtxt(folder / "hits.csv", delimiter=",", skiprows=1)
+    table[(table[:, 0] > 5.9) & (table[:, 0] < 8.0), 2] = np.nan
+    np.savetxt(folder / "lost.csv", table, delimiter=",", header="t,drive,v,x,cell,hit", comments="", fmt="%.7g")
+    (folder / "lost.toml").write_text(BENCHMARK.replace("hits.csv", "lost.csv"))
+    row = cdtool.benchmark(folder / "lost.toml").results.contacts[0]
+    assert (row.detector, row.outcome) == ("momentum", "not_assessable")
+    assert "missing samples" in row.reason
+
+
+@pytest.mark.parametrize("call", [cdtool.detect, cdtool.explain])
+def test_detect_and_explain_take_the_fields_of_the_options_as_keywords_and_no_other(call):
+    log, *given = inspect.signature(call).parameters
+    assert log == "log" and given == list(inspect.signature(DetectionOptions).parameters)
+    with pytest.raises(TypeError, match="'limits'"):
+        call("a.csv", "machine.toml", limits=[1.0])

@@ -1,0 +1,165 @@
+"""A detector and a threshold of another package, really installed, through every command."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cdtool.detectors import DETECTORS
+
+ROOT = Path(__file__).parents[2]
+GATE = ROOT / "sample_logs" / "gate"
+CONTRACTS = "torque_rate or robust_limit"
+MAIN = "from cdtool.cli.app import main; main()"
+
+Command = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Another interpreter that finds the packages in `site`."""
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{site}", "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=folder, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where pip has installed the example package."""
+    folder = tmp_path_factory.mktemp("plugin")
+    shutil.copytree(ROOT / "tests" / "plugin_example", folder / "source")
+    install = ("install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", "--no-build-isolation")
+    done = python("-m", "pip", *install, "--target", folder / "site", folder / "source", site=folder, folder=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "site"
+
+
+@pytest.fixture
+def command(site: Path, tmp_path: Path) -> Command:
+    """`cdtool ARGUMENTS` with the example package, in a fresh folder."""
+    return lambda *arguments: python("-c", MAIN, *arguments, site=site, folder=tmp_path)
+
+
+def machine_with(folder: Path, more: str) -> Path:
+    path = folder / "machine.toml"
+    path.write_text((GATE / "machine.toml").read_text(encoding="utf-8") + more, encoding="utf-8")
+    return path
+
+
+def test_list_tells_the_plugins_with_gains_units_and_defaults(command):
+    entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").stdout)}
+    assert list(entries) == [*DETECTORS.names(), "torque_rate"]
+    assert entries["torque_rate"]["short_name"] == "tr" and entries["torque_rate"]["needs"] == ["torque"]
+    (gain,) = entries["torque_rate"]["gains"]
+    assert (gain["name"], gain["default"], gain["unit"]) == ("cutoff", 2.0, "Hz")
+    shown = command("list", "detectors")
+    assert shown.returncode == 0 and "torque_rate (tr): Torque rate; needs torque" in shown.stdout
+    assert "robust_limit" in command("list", "thresholds").stdout
+
+
+def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(command, tmp_path):
+    machine = ("--machine", GATE / "machine.toml")
+    free = sorted(GATE.glob("free/*.csv"))
+    learned = command("learn-signature", *free, *machine, "-d", "tr", "-o", "tr.json", "--force")
+    assert learned.returncode == 0, learned.stderr
+    assert json.loads((tmp_path / "tr.json").read_text(encoding="utf-8"))["detector"]["name"] == "torque_rate"
+    log = GATE / "stiff" / "03.csv"
+    (found,) = json.loads(command("detect", log, *machine, "-s", "tr.json", "--json").stdout)
+    assert (found["detector"], found["unit"], found["verdict"]) == ("torque_rate", "N/s", "alarm")
+    assert 50.0 < found["contacts"][0]["latency_ms"] < 250.0
+    explained = command("explain", log, *machine, "-s", "tr.json")
+    assert explained.returncode == 0 and "The first that torque_rate reads: torque" in explained.stdout
+    other = machine_with(tmp_path, "\n[detectors.tr]\ncutoff = 3.0\n")
+    refused = command("detect", log, "-m", other, "-s", "tr.json")
+    assert refused.returncode == 2 and "learned with cutoff = 2.0" in refused.stderr
+    without = python("-c", MAIN, "detect", log, *machine, "-s", tmp_path / "tr.json", site=tmp_path)
+    assert without.returncode == 2 and "unknown detector 'torque_rate'" in without.stderr
+
+
+def test_its_gains_stand_in_the_machine_file_under_either_name(command, tmp_path):
+    log = GATE / "stiff" / "03.csv"
+    alarms = []
+    for name in ("tr", "torque_rate"):
+        machine = machine_with(tmp_path, f"\n[detectors.{name}]\ncutoff = 5.0\n")
+        assert command("info", log, "-m", machine).returncode == 0
+        (found,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").stdout)
+        alarms.append(found["alarms"])
+    machine = GATE / "machine.toml"
+    (plain,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").stdout)
+    assert alarms[0] == alarms[1] != plain["alarms"]
+    for more, words in (
+        ("[detectors.tr]\ncut = 5.0\n", "detectors.tr.cut: unknown gain (did you mean cutoff?"),
+        ("[detectors.tr]\ncutoff = -1\n", "detectors.tr: gain cutoff is -1"),
+        ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: is torque_rate again"),
+    ):
+        wrong = command("detect", log, "-m", machine_with(tmp_path, "\n" + more), "-d", "tr", "--limit", 4)
+        assert wrong.returncode == 2 and words in wrong.stderr and wrong.stderr.count("\n") == 1, wrong.stderr
+
+
+def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_path):
+    text = f'machine = "{GATE}/machine.toml"\ndetectors = ["torque_rate", "gm"]\nthreshold = "robust_limit"\n'
+    text += f'[learn]\nlogs = ["{GATE}/free/*.csv"]\n[impacts.stiff]\nlogs = ["{GATE}/stiff/*.csv"]\n'
+    text += '[limits]\n"tr.stiff.contacts" = { min = 2 }\n'
+    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
+    done = command("benchmark", "benchmark.toml", "-o", "results.json", "-o", "summary.md", "-o", "report.html")
+    assert done.returncode == 0 and "the limit is met" in done.stdout, done.stdout + done.stderr
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert results["detectors"] == ["torque_rate", "momentum"]
+    provenance = results["provenance"]
+    assert provenance["threshold"] == "robust_limit"
+    assert provenance["plugins"] == {"cdtool-plugin-example": "0.1.0"}
+    assert provenance["gains"]["torque_rate"] == {"cutoff": 2.0} and provenance["units"]["torque_rate"] == "N/s"
+    for report in ("summary.md", "report.html"):
+        assert "cdtool-plugin-example" in (tmp_path / report).read_text(encoding="utf-8"), report
+
+
+def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
+    machine = ("--machine", GATE / "machine.toml")
+    text = f'machine = "{GATE}/machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
+    text += f'[learn]\nlogs = ["{GATE}/free/03.csv", "{GATE}/free/04.csv"]\n'
+    text += f'[impacts.stiff]\nlogs = ["{GATE}/stiff/03.csv"]\n[limits]\n"gm.contacts" = {{ min = 1 }}\n'
+    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
+    done = command("benchmark", "benchmark.toml", "--detectors", "all", "--json")
+    assert done.returncode == 0, done.stderr
+    results = json.loads(done.stdout)
+    assert results["detectors"] == [*DETECTORS.names(), "torque_rate"]
+    (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").stdout)
+    assert one["detector"] == "torque_rate"
+    only = command("benchmark", "benchmark.toml", "--detectors", "tr")
+    assert only.returncode == 0 and "1 of 1 limits are on detectors that were not run" in only.stderr
+
+
+def test_the_contract_tests_run_over_the_plugins(site):
+    chosen = ("-q", "-p", "no:cacheprovider", "-k", CONTRACTS, "tests/contracts")
+    done = python("-m", "pytest", *chosen, site=site)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert int(done.stdout.rpartition(" passed")[0].split()[-1]) > 30
+
+
+def test_the_page_shows_the_package_in_full_and_its_commands_run(command, tmp_path):
+    page = (ROOT / "docs" / "own-detector.md").read_text(encoding="utf-8")
+    example = ROOT / "tests" / "plugin_example"
+    shown = set(re.findall(r"^```\w+\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+    files = [*example.rglob("*.py"), example / "pyproject.toml"]
+    assert len(files) == 4
+    for path in files:
+        assert path.read_text(encoding="utf-8") in shown, path
+    (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
+    blocks = re.findall(r"^```bash\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    lines = [shlex.split(line) for block in blocks for line in block.splitlines()]
+    assert lines[0] == ["pip", "install", "tests/plugin_example"]
+    assert lines[-1][:4] == ["python", "-m", "pytest", "tests/contracts"] and lines[-1][-1] == CONTRACTS
+    for words in lines[1:-1]:
+        assert words[0] == "cdtool"
+        logs = sorted(GATE.glob("free/*"))
+        done = command(*(name for word in words[1:] for name in (logs if word.endswith("free/*") else [word])))
+        assert done.returncode == 0, (words, done.stderr)
