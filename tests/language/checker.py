@@ -27,7 +27,6 @@ ROOT = Path(__file__).parents[2]
 TO_REWRITE = (
     "CHANGELOG.md",
     "CONTRIBUTING.md",
-    "README.md",
     "benchmarks",
     "cdtool/*.py",
     "cdtool/cli",
