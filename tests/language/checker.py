@@ -41,7 +41,6 @@ TO_REWRITE = (
     "cdtool/simulation",
     "cdtool/thresholds",
     "cdtool/workflows",
-    "docs",
     "sample_logs",
     "tests/*.py",
     "tests/cli",
