@@ -1,4 +1,4 @@
-"""Autoregressive models: Burg's recursion over several stretches, and how a forecast spreads."""
+"""Autoregressive models: Burg's recursion over several sections of a signal, and the spread of a forecast."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from cdtool.recording import FloatArray
 
-# The sum of so many powers of 2 of terms stands for the infinite one.
+# The infinite sum is approximated by 2 to this power of its terms.
 _DOUBLINGS = 24
 
 
 def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
-    """Coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k, and the standard deviation of nu, from stretches of e.
+    """Return coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k and the standard deviation of nu, from parts of e.
 
-    Burg's recursion with forward and backward errors summed over all stretches; those of at most `order` samples are
-    left out. The model is stable by construction. Standard deviation NaN where no stretch is long enough.
+    Burg's recursion with forward and backward errors summed over all sections; sections of at most `order` samples are
+    left out. The model is stable by construction. The standard deviation is NaN if no section is long enough.
     """
     forward = [part for part in parts if len(part) > order]
     backward = forward

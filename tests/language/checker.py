@@ -39,7 +39,6 @@ TO_REWRITE = (
     "cdtool/motion",
     "cdtool/report",
     "cdtool/simulation",
-    "cdtool/thresholds",
     "cdtool/workflows",
     "sample_logs",
     "tests/*.py",
