@@ -50,12 +50,12 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
 def check_limits(
     rules: Sequence[LimitRule], summaries: Sequence[Summary], at_worst: Sequence[Summary] = ()
 ) -> tuple[LimitResult, ...]:
-    """Hold every rule against the figures that it names; raises ConfigurationError where it names none.
+    """Check every rule against the metrics that it names; raises ConfigurationError if there are none.
 
-    `at_worst` are the same summaries with the figures that missing load-cell samples leave possible: a limit that is
+    `at_worst` are the same summaries with the worst values that missing load-cell samples allow: a limit that is
     met only without them is not assessable.
 
-    With `*` a group without contacts is left out where the figure needs contacts.
+    With `*` a group without contacts is left out if the metric needs contacts.
     """
     found: list[LimitResult] = []
     worst = {(item.detector, item.group): item for item in at_worst}

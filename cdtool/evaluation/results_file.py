@@ -34,7 +34,7 @@ def to_json(results: Results) -> str:
 
 
 def read_results(path: Path) -> Results:
-    """Read results.json; raises RecordingError where it is none, or of another version."""
+    """Read results.json; raises RecordingError for any other file or another version."""
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = parse_json(content)

@@ -62,8 +62,8 @@ class Whitening:
         """Return nu_k / sd(nu), in standard deviations, causal; NO_LIMIT where the signature has no limit.
 
         Samples based on a lost input or a lost position are missing (GAP). After a missing sample the model restarts
-        from the normal spread: the first innovation is the deviation divided by that spread, and as many further ones as
-        the order are divided by the remaining uncertainty, all VALID. At a start, as many samples as the order are
+        from the normal spread: the first innovation is the deviation divided by that spread, and as many further ones
+        as the order are divided by the remaining uncertainty, all VALID. At a start, as many samples as the order are
         START_UP. OTHER_RATE where the sample rate differs from that of the runs: learn from runs of the same rate.
         """
         at_rate = at_learned_rate(signal.time, self.period)

@@ -13,7 +13,7 @@ from cdtool.errors import ConfigurationError
 from cdtool.evaluation.truth.labels import LABEL_FILE
 from cdtool.plain_text import counted, shorten
 
-# Provenance keys that decide how figures come about, and where the benchmark file sets them.
+# Provenance keys of settings that define the results, and where the benchmark file sets them.
 _RULES = {
     "onset": "[onset]",
     "separation_s": "[onset] separation_s",
@@ -61,7 +61,7 @@ class Changed:
 
 
 def refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: Sequence[str]) -> None:
-    """Raise ConfigurationError where a rule differs by which the figures of these groups came about."""
+    """Raise ConfigurationError if a rule that defines the results of these groups differs."""
     for key, where in _RULES.items():
         before, after = old.get(key), new.get(key)
         if key in _BY_GROUP:

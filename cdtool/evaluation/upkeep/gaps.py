@@ -40,7 +40,7 @@ class NoLimit:
 
 @dataclass(frozen=True)
 class Changeover:
-    """Where travel begins to count instead of time: at most so long after the motion began [s], at least so far on."""
+    """The change from time to travel: at most this time after the start of motion [s], at least this travel."""
 
     time: float = np.inf
     travel: float = 0.0
