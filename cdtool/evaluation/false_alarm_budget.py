@@ -55,7 +55,7 @@ class Budget:
         if exposure * self.rate < 1.0 - 1e-9:
             raise UsageError(
                 f"{detector}: false-alarm budget {self} needs {counted(self.needed, f'impact-free {self.per}')} "
-                f"to be set, {digits(exposure, 4)} could be judged",
+                f"to be set, {digits(exposure, 4)} were assessable",
                 f"add {digits(self.needed - exposure, 4)} to the runs learned from, or choose a larger budget",
             )
 

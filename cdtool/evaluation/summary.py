@@ -106,7 +106,7 @@ class Summary:
         if self.contacts == self.not_assessable:
             return f"none of {self.contacts} contacts could be assessed"
         if figure == "force_failed":
-            return "no contact was held against a force profile, or not all of them could be assessed"
+            return "no contact was compared with a force profile, or not all of them could be assessed"
         if "force" in figure:
             return "no load-cell force at an alarm"
         interval = {"mean_ms_upper": self.mean, "median_ms_upper": self.median, "p95_ms_upper": self.p95}.get(figure)

@@ -125,7 +125,7 @@ def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
 
 
 def test_too_small_an_exposure_is_refused_and_told_what_is_missing():
-    with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 could be judged.*add 980"):
+    with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 were assessable.*add 980"):
         set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
@@ -133,7 +133,7 @@ def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
     runs = [detection(seed) for seed in range(12)]
     status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
     blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
-    with pytest.raises(UsageError, match="11 could be judged"):
+    with pytest.raises(UsageError, match="11 were assessable"):
         set_factor(Budget(1 / 12, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
 
 

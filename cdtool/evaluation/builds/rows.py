@@ -41,8 +41,9 @@ class Question:
     `old` and `new`: means over `old_of` and `new_of` contacts (medians of forces, and of latencies where `ranges` has
     the shortest and the longest of either build: fewer than ten contacts), or counts in that many contacts, operations
     or hours. `change` is new minus old, for counts a share or a rate without an interval. `p` of no change and
-    `corrected_p` (Holm) are NaN if there was nothing to test; `reason` states why. `detectable`: the least change of a mean that would have
-    been shown with 80 % power, or the smallest new count that would have been; infinite if the sample is too small.
+    `corrected_p` (Holm) are NaN if there was nothing to test; `reason` states why. `detectable`: the least change of a
+    mean that would have been shown with 80 % power, or the smallest new count that would have been; infinite if the
+    sample is too small.
     `left_open`: the largest change for the worse that these recordings do not rule out, as a share of the old mean, of
     the contacts, or per operation; NaN if there was nothing to test. `same`: every pair has the same value.
     `complete_change_p`: the exact probability of a change so complete that it needs no test; NaN where it is not.
