@@ -259,8 +259,8 @@ def friction_ekf(d: Diagram) -> None:
     """Friction-estimating extended Kalman filter.
 
     Predict with the drive force F, all from the old state: d stays, a = (F - d v) / m, v = v + T a. Update with the
-    measured acceleration, then with the measured speed. The activation logic holds the estimated friction d_hat against
-    the signature learned from impact-free runs, and raises the alarm (thesis figure 5.5, 5.5 to 5.8, corrected).
+    measured acceleration, then with the measured speed. The activation logic compares the estimated friction d_hat
+    with the signature learned from impact-free runs, and raises the alarm (thesis figure 5.5, 5.5 to 5.8, corrected).
     """
     d.frame(17, 20, 54, 56, "extended Kalman filter")
     predict, update, delay = d.block(26, 44, "predict"), d.block(45, 44, "update"), d.block(35.5, 27, "$z^{-1}$", 9)
@@ -279,8 +279,8 @@ def inertial_momentum(d: Diagram) -> None:
     """Inertial momentum observer.
 
     A complementary filter adds the load's acceleration times s / (s^2 + k1 s + k2) and the speed times
-    (k1 s + k2) / (s^2 + k1 s + k2). The momentum observer takes this speed v_hat and the torque; its residual is held
-    against the signature, which raises the alarm (thesis figure 6.2, 6.5, corrected).
+    (k1 s + k2) / (s^2 + k1 s + k2). The momentum observer takes this speed v_hat and the torque; its residual is
+    compared with the signature, which raises the alarm (thesis figure 6.2, 6.5, corrected).
     """
     d.frame(16.6, 30, 44, 64, "complementary filter")
     slow = d.block(26.8, 37, r"$\dfrac{k_1s+k_2}{s^2+k_1s+k_2}$", 17, 10)

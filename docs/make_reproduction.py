@@ -51,7 +51,7 @@ THESIS = {
     "6.2, trial 1": {"friction_ekf": (93, 2.6), "inertial_momentum": (96, 1.9), "momentum": (122, 10.5)},
     "6.2, trial 2": {"friction_ekf": None, "inertial_momentum": (412, 5.3), "momentum": (438, 7.2)},
 }
-# Where each table's figures come from: the simulated machine and the group of impacts.
+# The source of each table: the simulated machine and the group of impacts.
 SOURCES = {
     "5.1": ("gate", "stiff"),
     "5.2": ("gate", "soft"),
@@ -111,7 +111,7 @@ def thesis_rule(work: Path, names: Sequence[str]) -> str:
 
 
 def _alarmed(done: Benchmark) -> dict[str, str]:
-    """Of each detector that can be judged: how many of the hold-out runs have an alarm."""
+    """Return, for each assessable detector, how many of the hold-out runs have an alarm."""
     shares = {}
     for item in done.results.exposure:
         if item.group == "holdout" and item.not_assessable < item.operations:

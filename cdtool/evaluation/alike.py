@@ -1,4 +1,4 @@
-"""What is said of many logs or channels in the same words is said once, with how many it was said of."""
+"""Merge identical findings about many logs or channels into one, with a count."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from cdtool.evaluation.results import Skipped
 
-# Up to so many are each said; of more the first, and so many names of the others.
+# Up to this many are listed each; of more, only the first with this many names of the others.
 _EACH, _NAMED = 3, 3
 _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
 _LISTED = re.compile(r"(#[^,;]*)(?:, \1)+(?: and # more|, \.\.\.)?")
@@ -15,7 +15,7 @@ _AS_PLURAL = {"is": "are", "has": "have"}
 
 
 def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Names with texts in the order of their first ones; texts that differ in numbers only are one, with a count.
+    """Return names with texts in order of occurrence; texts that differ only in numbers are merged, with a count.
 
     >>> grouped([("a", "3 gaps"), ("b", "1 gap"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
     [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]

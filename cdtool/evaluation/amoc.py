@@ -1,7 +1,7 @@
-"""Latency against false alarms (activity monitor operating characteristic, AMOC): one curve a detector and group.
+"""Latency against false alarms (activity monitor operating characteristic, AMOC): one curve per detector and group.
 
 Conventions: latencies come from a group of impacts, false alarms from the impact-free hold-out, with the same limits.
-No false alarm is no rate of zero: its upper bound stands beside it.
+No false alarm does not mean a rate of zero: the upper bound is given as well.
 """
 
 from __future__ import annotations

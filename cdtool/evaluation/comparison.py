@@ -14,7 +14,7 @@ from cdtool.evaluation.summary import campaigns
 
 # A difference counts as shown below this, after correction.
 SIGNIFICANT = 0.05
-# Below this the confidence, 1 less it, loses the digits that tell it from 1.
+# Below this, the confidence (1 minus the level) cannot be distinguished from 1.
 _LEAST_LEVEL = 1e-9
 
 Key = tuple[str, int]

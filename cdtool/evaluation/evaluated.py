@@ -24,9 +24,9 @@ class Evaluated:
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     """Derive the statistics; `limits` are checked and become rows of the results, else those in them stay.
 
-    What follows from all of it becomes their conclusion.
+    The conclusion is derived from all of them.
 
-    Raises ConfigurationError where a limit names no figure of these results.
+    Raises ConfigurationError if a limit names a metric that these results do not have.
     """
     summaries = tuple(summarise(results))
     if limits:

@@ -23,7 +23,7 @@ _STEPS = 32
 
 @dataclass(frozen=True)
 class Budget:
-    """At most `rate` false alarms an operation or an hour."""
+    """At most `rate` false alarms per operation or per hour."""
 
     rate: float
     per: Literal["operation", "hour"]
@@ -47,22 +47,22 @@ class Budget:
 
     @property
     def needed(self) -> float:
-        """The least exposure on which it can be set: one false alarm has to be allowed in it."""
+        """The least exposure on which it can be set: one false alarm must be allowed in it."""
         return 1.0 / self.rate
 
     def check(self, exposure: float, detector: str) -> None:
-        """Raise UsageError, telling what is missing, where the exposure is too small to set it on."""
+        """Raise UsageError, with what is missing, if the exposure is too small to set the factor."""
         if exposure * self.rate < 1.0 - 1e-9:
             raise UsageError(
                 f"{detector}: false-alarm budget {self} needs {counted(self.needed, f'impact-free {self.per}')} "
-                f"to be set, {digits(exposure, 4)} could be judged",
+                f"to be set, {digits(exposure, 4)} were assessable",
                 f"add {digits(self.needed - exposure, 4)} to the runs learned from, or choose a larger budget",
             )
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The safety factor that keeps a budget, and how many alarms it gives on the operations it was set on."""
+    """The safety factor that meets a budget, and the number of alarms on the operations used to set it."""
 
     factor: float
     operations: int
@@ -71,12 +71,12 @@ class Calibrated:
 
 
 def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], activation: Activation) -> Calibrated:
-    """The smallest safety factor that is expected to keep the budget, from impact-free operations.
+    """Return the smallest safety factor that is expected to meet the budget, from impact-free operations.
 
-    Just above the c-th largest of n operations' critical factors the chance of an alarm is c / (n + 1) on average, so
-    that c - 1 alarms are allowed in them, c = floor(budget (n + 1)); by hours likewise, one less than the budget gives.
-    Each detection's threshold must not have been learned from its operation. An operation that could be judged nowhere
-    does not count. Raises UsageError, telling what is missing, where the exposure is smaller than `budget.needed`.
+    Just above the c-th largest of n operations' critical factors the probability of an alarm is c / (n + 1) on average,
+    so c - 1 alarms are allowed in them, c = floor(budget (n + 1)); by hours likewise, one fewer than the budget allows.
+    Each detection's threshold must not have been learned from its operation. An operation that was nowhere assessable
+    does not count. Raises UsageError, with what is missing, if the exposure is smaller than `budget.needed`.
     """
     judged = [item for item in detections if item.assessed_seconds > 0.0]
     hours = sum(item.assessed_seconds for item in judged) / 3600.0

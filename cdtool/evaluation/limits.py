@@ -1,6 +1,6 @@
 """[limits]: what a figure may be at most or at least, so that a pipeline can act on it.
 
-Conventions: a key is detector.group.figure, or detector.figure for every group; `*` stands for all. A limit is met,
+Conventions: a key is detector.group.metric, or detector.figure for every group; `*` stands for all. A limit is met,
 violated, or not assessable, which does not count as met: nothing passes because nothing was measured.
 """
 
@@ -50,12 +50,12 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
 def check_limits(
     rules: Sequence[LimitRule], summaries: Sequence[Summary], at_worst: Sequence[Summary] = ()
 ) -> tuple[LimitResult, ...]:
-    """Hold every rule against the figures that it names; raises ConfigurationError where it names none.
+    """Check every rule against the metrics that it names; raises ConfigurationError if they do not exist.
 
-    `at_worst` are the same summaries with the figures that missing load-cell samples leave possible: a limit that is
+    `at_worst` are the same summaries with the worst values that missing load-cell samples allow: a limit that is
     met only without them is not assessable.
 
-    With `*` a group without contacts is left out where the figure needs contacts.
+    With `*` a group without contacts is left out if the metric needs contacts.
     """
     found: list[LimitResult] = []
     worst = {(item.detector, item.group): item for item in at_worst}
@@ -120,7 +120,7 @@ def _split(table: Table, key: str) -> tuple[str, str, str]:
     if len(parts) == 2:
         return parts[0], ALL, parts[1]
     if len(parts) < 2:
-        raise table.fault(key, "names no figure", 'write "detector.group.figure", e.g. "*.stiff.p95_ms"')
+        raise table.fault(key, "does not name a metric", 'write "detector.group.metric", e.g. "*.stiff.p95_ms"')
     return parts[0], ".".join(parts[1:-1]), parts[-1]
 
 

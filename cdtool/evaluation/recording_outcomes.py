@@ -1,8 +1,8 @@
-"""What became of each recording with each detector, and its part in violated limits.
+"""The outcome of each recording with each detector, and its part in violated limits.
 
-Conventions: a recording has a part in a violated limit where a contact or a false alarm of it is what the limit counts
-(missed, false alarms, forces failed), or is itself beyond what the limit allows (latencies, forces). A limit can be
-violated without any such recording: the upper end of an interval lies beyond every single latency.
+Conventions: a recording contributes to a violated limit if the limit counts one of its contacts or false alarms
+(missed, false alarms, forces failed), or if one of them is beyond the limit (latencies, forces). A limit can be
+violated without any such recording: the upper end of an interval may be beyond every single latency.
 """
 
 from __future__ import annotations

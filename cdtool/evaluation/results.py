@@ -1,7 +1,7 @@
 """Results: every verdict of a benchmark with raw figures and provenance. Statistics are derived from it.
 
-Conventions: times are seconds on the recording's own clock; None where there is no figure. Each field's meaning stands
-beside it: the published schema is made from it.
+Conventions: times are seconds on the recording's own clock; None where there is no value. Each field is defined
+together with its meaning, from which the published schema is made.
 """
 
 from __future__ import annotations
@@ -107,14 +107,14 @@ class ExposureResult:
     detector: str = meant("full name of the detector")
     recordings: int = meant("logs")
     operations: int = meant("operations")
-    hours: float = meant("time in which the signal could be judged")
-    not_assessable: int = meant("operations that it could judge nowhere", default=0)
-    not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)
+    hours: float = meant("time in which the signal was assessable")
+    not_assessable: int = meant("operations that were nowhere assessable", default=0)
+    not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
 
 @dataclass(frozen=True)
 class ForceStepResult:
-    """One step of a force profile, held against one contact or one test point."""
+    """One step of a force profile, compared with one contact or one test point."""
 
     name: str = meant("the step's name in the limits file")
     from_s: float = meant("from this long after the onset")
@@ -122,7 +122,7 @@ class ForceStepResult:
     peak_n: float | None = meant("largest force in the step; of a point: what its tests come to")
     time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
     verdict: str = meant("pass, fail or not_assessable")
-    reason: str | None = meant("why it is no pass", default=None)
+    reason: str | None = meant("why it does not pass", default=None)
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class ForceResult:
     time_budget_ms: float | None = meant(
         "when the first limit was exceeded, after the onset; null if never", default=None
     )
-    reason: str | None = meant("why it is no pass", default=None)
+    reason: str | None = meant("why it does not pass", default=None)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class PointResult:
     verdict: str = meant("pass, fail or not_assessable")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     note: str = meant("how many tests were averaged")
-    reason: str | None = meant("why it is no pass", default=None)
+    reason: str | None = meant("why it does not pass", default=None)
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class CalibrationResult:
 
 @dataclass(frozen=True)
 class LimitResult:
-    """One limit of the benchmark file, held against one figure."""
+    """One limit of the benchmark file, checked against one metric."""
 
     limit: str = meant("key in [limits]")
     detector: str = meant("full name of the detector")
@@ -218,7 +218,7 @@ class ConclusionResult:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A recording that was left out, or what is odd about one that was used."""
+    """A recording that was left out, or a warning about one that was used."""
 
     recording: str = meant("path of the log below the benchmark file, or a detector")
     reason: str = meant("why")
@@ -231,17 +231,17 @@ class Results:
     provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the figures")
     detectors: tuple[str, ...] = meant("full names")
     groups: tuple[str, ...] = meant("groups of impacts, then the impact-free hold-out")
-    contacts: tuple[ContactResult, ...] = meant("one row a contact and detector")
+    contacts: tuple[ContactResult, ...] = meant("one row per contact and detector")
     false_alarms: tuple[FalseAlarmResult, ...] = meant("one row an alarm without a contact")
-    exposure: tuple[ExposureResult, ...] = meant("one row a group and detector")
+    exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
     recordings: tuple[RecordingResult, ...] = meant("one row a log that was scored", default=())
-    forces: tuple[ForceResult, ...] = meant("one row a contact with a force profile", default=())
+    forces: tuple[ForceResult, ...] = meant("one row per contact with a force profile", default=())
     points: tuple[PointResult, ...] = meant("one row a test point with a force profile", default=())
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
     skipped: tuple[Skipped, ...] = meant("what was left out", default=())
-    findings: tuple[Skipped, ...] = meant("what is odd about recordings that were used", default=())
+    findings: tuple[Skipped, ...] = meant("warnings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )

@@ -47,7 +47,7 @@ def to_json(results: Results) -> str:
 
 
 def read_results(path: Path) -> Results:
-    """Read results.json; raises RecordingError where it is none, or of another version."""
+    """Read results.json; raises RecordingError for any other file or another version."""
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = parse_json(content)
@@ -103,7 +103,7 @@ def build(kind: type[Row], values: Any, where: str) -> Row:
             raise ValueError(f"{where} has an unknown field '{name}'")
     missing = [name for name in _required(kind) if name not in values]  # type: ignore[arg-type]
     if missing:
-        raise ValueError(f"{where} lacks {', '.join(missing)}")
+        raise ValueError(f"{where}: {', '.join(missing)} missing")
     made = {name: _value(known[name], value, f"{where}.{name}") for name, value in values.items()}
     for name, value in made.items():
         words = WORDS.get((kind, name)) or WORDS.get(name)

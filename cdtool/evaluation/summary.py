@@ -1,7 +1,7 @@
 """Statistics of the outcomes of one detector in one group, each figure with its interval; undefined = NaN, never zero.
 
-Mean and standard deviation describe the detected contacts only and are to be read beside n, missed, not assessable and
-false alarms: a detector that misses its slow cases looks fast. Median and P95 take missed contacts as censored.
+Mean and standard deviation describe only the detected contacts and must be read together with n, missed, not assessable
+and false alarms: a detector that misses its slow cases looks fast. Median and P95 treat missed contacts as censored.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Summary:
     are too few contacts or recordings for an interval it is NaN, with its reason (see `small_sample`). `missed_share`
     is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
     `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
-    alarm infinite. `judged_operations` are those that could be judged somewhere: the false alarms are of these.
+    alarm infinite. `judged_operations` are those assessable at least in part: the false alarms are of these.
     `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
     `contacts`: they had begun when the recording did. `onset_holes` of the contacts may have begun where load-cell
     samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may be unseen.
@@ -67,7 +67,7 @@ class Summary:
 
     @property
     def watched(self) -> bool:
-        """Whether anything could be judged: without it no false alarm means nothing."""
+        """Whether anything was assessable: otherwise the absence of false alarms means nothing."""
         return self.hours > 0.0
 
     @property
@@ -106,7 +106,7 @@ class Summary:
         if self.contacts == self.not_assessable:
             return f"none of {self.contacts} contacts could be assessed"
         if figure == "force_failed":
-            return "no contact was held against a force profile, or not all of them could be assessed"
+            return "no contact was compared with a force profile, or not all of them could be assessed"
         if "force" in figure:
             return "no load-cell force at an alarm"
         interval = {"mean_ms_upper": self.mean, "median_ms_upper": self.median, "p95_ms_upper": self.p95}.get(figure)

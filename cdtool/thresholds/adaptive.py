@@ -15,9 +15,9 @@ from cdtool.recording import FloatArray, Recording, Series
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.settings import check_above, check_sides
-from cdtool.thresholds.stretches import stretches
+from cdtool.thresholds.stretches import sections
 
-# Never a measured torque: the controller's answer to a contact would raise the limit against it.
+# Never a measured torque: the controller's response to a contact would raise the limit.
 _INPUTS = ("reference_speed", "reference_torque")
 
 
@@ -25,8 +25,8 @@ _INPUTS = ("reference_speed", "reference_torque")
 class FittedAdaptive:
     """-+ (c + sum g_j w_j + k s), w_j the excitation of reference j: `gains` (1 + M, J), c first, `spread` s (J,).
 
-    M: the `inputs`, each with one column a joint of the machine. Where one side is watched it is the side that opposes
-    the reference speed of `leading`, the joint that leads; both before it first moves.
+    M: the `inputs`, each with one column per joint. If one side is monitored, it is the side that opposes the
+    reference speed of `leading`, the leading joint; both sides before it first moves.
     """
 
     rule: Adaptive
@@ -140,7 +140,7 @@ class Adaptive:
                 if not present.any():
                     parts.append(np.full((len(clock), 1), np.nan))
                     continue
-                part = stretches(series.time, present, np.zeros(len(column), dtype=bool), np.inf)
+                part = sections(series.time, present, np.zeros(len(column), dtype=bool), np.inf)
                 high = self.high_pass * filtered_slope(column[part.index], part.step, self.high_pass)
                 low = low_passed(np.abs(high), part.step, self.low_pass)
                 parts.append(previous_value(Series(series.time[part.index], low, "1"), clock))

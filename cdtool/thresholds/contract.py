@@ -1,4 +1,4 @@
-"""A threshold held against its contract: the mistake of a plug-in becomes one line, not a traceback or a wrong band."""
+"""Check a threshold against its contract: an error in a plug-in becomes one line, not a traceback or a wrong band."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _HINT = "a fault of the threshold: see docs/own-detector.md"
 
 
 def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
-    """What the rule learns of impact-free runs; raises SignatureError where it fails or makes what it does not name."""
+    """Return what the rule learns from impact-free runs.
+
+    Raises SignatureError if it fails or returns a class that its `fitted` does not name.
+    """
     try:
         fitted = rule.fit(pairs)
     except CdtoolError:
@@ -31,7 +34,7 @@ def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> F
 
 
 def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-    """`threshold.evaluate`; raises RecordingError where it fails or gives what is no band of the signal."""
+    """Call `threshold.evaluate`; raises RecordingError if it fails or does not return a band of the signal."""
     name = type(threshold).__name__
     try:
         statistic, band = threshold.evaluate(recording, signal)

@@ -14,7 +14,7 @@ from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_above, check_sides
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.stretches import filtered, stretch_bounds
+from cdtool.thresholds.stretches import filtered, section_bounds
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,10 @@ class Cusum:
     """Limits -+ `safety_factor` on the cumulative sum of the innovations beyond a drift (Page 1954).
 
     g+_k = max(0, g+_{k-1} + nu_k - `drift`), g-_k = max(0, g-_{k-1} - nu_k - `drift`); statistic = g+, or -g- where
-    that is larger; with one side watched, that side's sum alone. nu is the innovation of `innovation`, all in its
-    standard deviations; `drift` is half the shift to be found. The sum holds over a gap of up to 0.15 s or 20
-    samples and starts again behind a longer one. A steady contact force moves innovations by (1 - sum a_i) of itself.
-    Fails where the normal mean has moved (payload, temperature): the sum grows without end; and it clears slowly after
-    an alarm.
+    that is larger; with one monitored side, only the sum of that side. nu is the innovation of `innovation`, all in its
+    standard deviations; `drift` is half the shift to be found. The sum is kept over a gap of up to 0.15 s or
+    20 samples and restarts after a longer one. A steady contact force F moves the innovations by (1 - sum a_i) F. Fails
+    if the normal mean has moved (payload, temperature): the sum grows without limit; it clears slowly after an alarm.
     """
 
     safety_factor: float = 15.0
@@ -54,7 +53,7 @@ class Cusum:
 
         def test(values: FloatArray, step: FloatArray) -> FloatArray:
             result = np.zeros(len(values))
-            for first, last in stretch_bounds(step):
+            for first, last in section_bounds(step):
                 above = _sum(values[first:last] - self.drift) if side >= 0 else np.zeros(last - first)
                 below = _sum(-values[first:last] - self.drift) if side <= 0 else np.zeros(last - first)
                 result[first:last] = np.where(above >= below, above, -below)

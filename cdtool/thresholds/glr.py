@@ -15,7 +15,7 @@ from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.stretches import filtered, stretch_bounds
+from cdtool.thresholds.stretches import filtered, section_bounds
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Glr:
 
         def test(values: FloatArray, step: FloatArray) -> FloatArray:
             result = np.zeros(len(values))
-            for first, last in stretch_bounds(step):
+            for first, last in section_bounds(step):
                 result[first:last] = self._largest(values[first:last], side)
             return result
 

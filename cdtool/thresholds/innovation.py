@@ -1,4 +1,4 @@
-"""Limits on what an autoregressive model does not foretell (thesis 2.3.1, stochastic difference equations)."""
+"""Limits on the prediction error of an autoregressive model (thesis 2.3.1, stochastic difference equations)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from cdtool.thresholds.signature import Signature
 
 @dataclass(frozen=True)
 class Innovation:
-    """Limits -+ `safety_factor` on the innovation: the part of a sample that those before do not foretell (2.3.1).
+    """Limits -+ `safety_factor` on the innovation: the part of a sample that the previous ones do not predict (2.3.1).
 
     e = (i - mu(x)) / s(x), nu_k = e_k - sum a_i e_{k-i}, statistic = nu_k / sd(nu), in standard deviations. mu and s
     are the signature's, learned from at least 10 runs of one class; a of order `order` by Burg's recursion over all
-    runs. Samples are counted, not timed: the rate must be that of the runs. Behind a gap the model starts
-    from the normal spread. Blind to slow ramps: the model foretells them. Fails against soft impacts, where noise
-    differs from place to place, and with a debounce: an innovation is large for a few samples only.
+    runs. Samples are counted, not timed: the rate must be that of the runs. After a gap the model restarts
+    from the normal spread. Does not detect slow ramps, which the model predicts. Fails with soft impacts, if the noise
+    varies along the stroke, and with a debounce: an innovation is large for only a few samples.
     """
 
     safety_factor: float = 5.5

@@ -1,4 +1,4 @@
-"""Absolute limits, one a joint: the plainest threshold (thesis 2.3.1)."""
+"""Absolute limits, one per joint: the simplest threshold (thesis 2.3.1)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdtool.thresholds.base import with_limits
 class FittedLimit:
     """lower < i < upper, the same at every sample: `safety_factor` spreads from the extremes of normal runs.
 
-    Each has one value for all joints or one a joint; an infinite spread = no limit.
+    Each has one value for all joints or one per joint; an infinite spread means no limit.
     """
 
     least: tuple[float, ...]
@@ -40,12 +40,12 @@ class FittedLimit:
         return tuple(centre + self.safety_factor * spread for centre, spread in pairs)
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and its constant band; raises UsageError where the number of joints differs."""
+        """Return the signal and its constant band; raises UsageError if the number of joints differs."""
         joints = signal.values.shape[1]
         if len(self.least) not in (1, joints):
             raise UsageError(
                 f"{recording.name}: {len(self.least)} limits for {joints} joints",
-                "give one limit, or one a joint",
+                "give one limit, or one per joint",
             )
         shape = signal.values.shape
         return with_limits(signal, np.broadcast_to(self.lower, shape), np.broadcast_to(self.upper, shape))
@@ -73,9 +73,8 @@ class FittedLimit:
 class Limit:
     """Constant limits: the mean of the runs' extremes, `safety_factor` of their standard deviations further out.
 
-    `limits` set by hand, |i| < limit in the signal's unit, one for all joints or one a joint, stand instead of what the
-    runs would teach. Fails where friction or gravity vary along the path, where a sensor drifts, or where the speed
-    changes.
+    Fixed `limits`, |i| < limit in the signal's unit, one for all joints or one per joint, replace the learned limits.
+    Fails if friction or gravity vary along the path, if a sensor drifts, or if the speed changes.
     """
 
     safety_factor: float = 5.5
@@ -87,10 +86,10 @@ class Limit:
 
     def __post_init__(self) -> None:
         if self.limits:
-            self.given(self.limits)  # raises UsageError for limits that are none
+            self.given(self.limits)  # raises UsageError for values that are not limits
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
-        """Limits from impact-free runs; raises SignatureError with fewer than two runs or without valid samples."""
+        """Learn limits from impact-free runs; raises SignatureError with fewer than 2 runs or without valid samples."""
         if self.limits:
             return self.given(self.limits)
         if len(pairs) < 2:
@@ -112,9 +111,9 @@ class Limit:
 
     @staticmethod
     def given(limits: Sequence[float]) -> FittedLimit:
-        """Hand-set limits |i| < limit: one for all joints or one a joint (infinite: that joint is not watched).
+        """Return fixed limits |i| < limit: one for all joints or one per joint (infinite: the joint is not monitored).
 
-        Their spread is the limit itself, so that a safety factor of 1 stands for what was set.
+        Their spread is the limit itself, so that a safety factor of 1 keeps the limit unchanged.
         """
         values = tuple(limits)
         if not all(value > 0.0 for value in values):

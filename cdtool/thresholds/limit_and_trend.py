@@ -163,7 +163,7 @@ def _highest(signal: Signal, values: FloatArray, there: BoolArray) -> FloatArray
 
 
 def _level(runs: Sequence[FloatArray], before: Sequence[float], spread_before: Sequence[float]) -> tuple[Any, Any]:
-    """Mean and standard deviation of the runs' extremes, one a joint; those of the level before where few reach it."""
+    """Return mean and standard deviation of the runs' extremes per joint; of the level below if few runs reach it."""
     extremes = np.array(runs)
     mean, spread = list(before), list(spread_before)
     for j in range(extremes.shape[1]):

@@ -1,6 +1,6 @@
-"""What every channel normally looks like along a stroke: mean and spread over impact-free runs of one class of motion.
+"""Normal curves of every channel along a stroke: mean and spread over impact-free runs of one class of motion.
 
-No detector and no threshold reads it: it is what an explanation compares a run with.
+No detector and no threshold uses them: an explanation compares a run with them.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
 from cdtool.thresholds.signature_curve import Curve, resample
 
 CHANNELS = (*MEASURED, *REFERENCES)
-# Their normal course is that over time: along the travel they are the travel itself.
+# Their normal curve is over time: along the travel they are the travel itself.
 POSITIONS = ("position", "reference_position")
 # A level is the mean of a channel over this long before a sample [s].
 LEVEL_SECONDS = 0.05
 _FILLED = 0.8
 # Share of the runs [%] that stay within the largest distance: one faulty sample in one run does not widen it.
 _MOST = 80.0
-# Fewer runs tell no spread.
+# Fewer runs do not determine a spread.
 LEAST_RUNS = 3
 
 # Grid and window over time while accelerating [s]; along the travel [s at the nominal speed]; of a position [s].
 _TIME, _TRAVEL, _POSITION = (0.01, 0.03), (0.05, 0.1), (0.05, 0.1)
-# Numbers are stored to so many digits of the largest.
+# Numbers are stored to this many digits of the largest.
 _DIGITS = 6
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
@@ -52,11 +52,11 @@ class NormalChannel:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A run's channel against its normal course, on the channel's clock `time` (n,) [s]; the others are (n, J).
+    """A run's channel and its normal curve, on the channel's clock `time` (n,) [s]; the others are (n, J).
 
-    `value` and `level` are the run's own, `mean` and `spread` those of the impact-free runs at the same place; NaN
-    before the motion begins and where too few runs have been. `reach` and `level_reach`: how many spreads off the mean
-    the impact-free runs themselves went.
+    `value` and `level` are the run's own, `mean` and `spread` those of the impact-free runs at the same location; NaN
+    before the motion starts and where there are too few runs. `reach` and `level_reach`: the distance of the
+    impact-free runs themselves from the mean, in spreads.
     """
 
     unit: str
@@ -73,7 +73,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class NormalMotion:
-    """The normal course of every channel of impact-free runs, for one class of motion; `runs`: how many there were."""
+    """Normal curves of every channel of impact-free runs, for one class of motion; `runs`: their number."""
 
     motion: MotionClass
     joints: tuple[str, ...]
@@ -81,7 +81,7 @@ class NormalMotion:
     channels: Mapping[str, NormalChannel]
 
     def compare(self, recording: Recording, channel: str) -> Comparison:
-        """A recording's channel against its normal course; raises RecordingError without speed and position."""
+        """Compare a recording's channel with its normal curve; raises RecordingError without speed and position."""
         series, normal = recording[channel], self.channels[channel]
         where = self.progress(recording, series.time)
         value = _from_start(channel, series.values, where)
@@ -131,16 +131,16 @@ class NormalMotion:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`; raises ValueError for what is no course of these joints."""
+        """Return the inverse of `to_dict`; raises ValueError if the curves do not match these joints."""
         joints = tuple(map(str, values["joints"]))
         channels = {}
         for name, item in values["channels"].items():
             if name not in CHANNELS:
-                raise ValueError(f"a normal course of '{name}'")
+                raise ValueError(f"a normal curve of '{name}'")
             samples, level = (NormalCurves.from_dict(item[part]) for part in ("samples", "level"))
             for curve in (samples.by_time, samples.by_travel, level.by_time, level.by_travel):
                 if curve is not None and curve.mean.shape[1] != len(joints):
-                    raise ValueError(f"a normal course of {curve.mean.shape[1]} joints, not of {len(joints)}")
+                    raise ValueError(f"a normal curve of {curve.mean.shape[1]} joints, not of {len(joints)}")
             channels[name] = NormalChannel(str(item["unit"]), samples, level)
         motion = MotionClass(int(values["direction"]), float(values["nominal_speed"]), int(values["leading_joint"]))
         if motion.direction not in (-1, 1) or not 0 <= motion.joint < len(joints) or not motion.nominal_speed > 0.0:
@@ -149,9 +149,9 @@ class NormalMotion:
 
 
 def learn_normal_motion(recordings: Sequence[Recording], motion: MotionClass) -> NormalMotion | None:
-    """Learn every channel's normal course from impact-free recordings of one class of motion.
+    """Learn normal curves of every channel from impact-free recordings of one class of motion.
 
-    None where fewer than `LEAST_RUNS` of them have speed and position, or where the class does not move.
+    Return None if fewer than `LEAST_RUNS` of them have speed and position, or if the class does not move.
     """
     usable = [item for item in recordings if "speed" in item and "position" in item]
     usable = [item for item in usable if item.joints == usable[0].joints]

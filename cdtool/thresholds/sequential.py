@@ -50,7 +50,7 @@ class SequentialRule(Threshold, Protocol):
 
 @dataclass(frozen=True)
 class FittedSequential:
-    """A rule's statistic of the innovations, held against -k and +k; it serves one class of motion."""
+    """A rule's statistic of the innovations, compared with -k and +k, for one class of motion."""
 
     rule: SequentialRule
     whitening: Whitening

@@ -111,7 +111,7 @@ class Signature:
         if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_position)):
             reasons = pairs[0][1].why_not() if not pairs[0][1].valid.any() else "valid in too few runs at a time"
             raise NothingValidError(
-                f"the runs share no part of the stroke where the signal can be judged ({reasons})",
+                f"the runs share no part of the stroke where the signal is assessable ({reasons})",
                 "another detector, or other joints",
             )
         return fitted

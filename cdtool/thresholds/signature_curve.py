@@ -178,7 +178,7 @@ def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) ->
         passing = np.concatenate(([True], along[1:] > np.maximum.accumulate(along)[:-1]))
         along, values = along[passing], signal.values[use, j][passing]
         at = np.searchsorted(along, grid, side="left")
-        # Behind a stretch without valid samples the next sample is too far on to stand for the grid point.
+        # After an interval without valid samples the next sample is too far away to represent the grid point.
         usual = float(np.median(np.diff(along))) if len(along) > 1 else 0.0
         reached = np.flatnonzero(at < len(along))
         near = reached[along[at[reached]] - grid[reached] <= _FURTHEST_STEPS * max(curve.step, usual)]

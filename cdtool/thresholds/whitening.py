@@ -1,4 +1,4 @@
-"""The signal's deviation from its signature, whitened: what the samples before do not foretell.
+"""The signal's deviation from its signature, whitened: the part that previous samples do not predict.
 
 Its autoregressive model is fitted by Burg's recursion over several sections of the runs.
 """
@@ -21,12 +21,12 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
-from cdtool.thresholds.stretches import filtered, stretch_bounds, stretches
+from cdtool.thresholds.stretches import filtered, section_bounds, sections
 
-# What a statistic has gathered holds over so many missing samples, or so long [s]: a contact that has been building up
-# goes on behind a gap, and does not begin again.
+# A cumulative statistic is kept over this many missing samples, or this long [s]: the evidence of a growing contact
+# continues after a gap and does not restart.
 _HELD_SAMPLES, _HELD_SECONDS = 20, 0.15
-# The sum of so many powers of 2 of terms stands for the infinite one.
+# The infinite sum is approximated by 2 to this power of its terms.
 _DOUBLINGS = 24
 # Sample periods differ from the learned one by at most this share: a model counts in samples.
 PERIOD_TOLERANCE = 0.2
@@ -66,12 +66,12 @@ class Whitening:
         return cls(signature, coefficients, spread, period)
 
     def innovations(self, recording: Recording, signal: Signal) -> Signal:
-        """nu_k / sd(nu), in standard deviations, causal; NO_LIMIT where the signature knows none.
+        """Return nu_k / sd(nu), in standard deviations, causal; NO_LIMIT where the signature has no limit.
 
-        Samples that rest on a lost input or a lost position are missing (GAP). Behind a missing sample the model starts
-        from the normal spread: the first innovation is the deviation over that, the next as many as the order count
-        with what is known by then, all VALID. At a start the order's number of samples is START_UP. OTHER_RATE where
-        the log is sampled at another rate than the runs so far: learn from runs of the same rate.
+        Samples based on a lost input or a lost position are missing (GAP). After a missing sample the model restarts
+        from the normal spread: the first innovation is the deviation divided by that spread, and as many further ones
+        as the order are divided by the remaining uncertainty, all VALID. At a start, as many samples as the order are
+        START_UP. OTHER_RATE where the sample rate differs from that of the runs: learn from runs of the same rate.
         """
         at_rate = _at_learned_rate(signal.time, self.period)
         deviation = _deviation(self.signature, recording, signal)
@@ -144,9 +144,10 @@ def _deviation(signature: FittedSignature, recording: Recording, signal: Signal)
 
 
 def _lost(signature: FittedSignature, recording: Recording, signal: Signal) -> BoolArray | None:
-    """Where the deviation rests on held values (n, J): an input of the detector, or the position along the stroke.
+    """Return where the deviation is based on held values (n, J): a detector input, or the position along the stroke.
 
-    A model that foretells each sample to a small share of the normal spread tells the held value from a true one.
+    A model that predicts each sample to a small fraction of the normal spread distinguishes a held value from a true
+    one.
     """
     lost = signal.lost
     if signature.alignment != "time":
@@ -158,11 +159,11 @@ def _lost(signature: FittedSignature, recording: Recording, signal: Signal) -> B
 
 
 def _unbroken(deviation: Signal, j: int, period: float) -> list[FloatArray]:
-    """The stretches of one column without a missing sample."""
+    """Return the sections of one column without a missing sample."""
     usable = (deviation.status[:, j] == Status.VALID) & np.isfinite(deviation.values[:, j])
-    part = stretches(deviation.time, usable, ~usable, 1.5 * period)
+    part = sections(deviation.time, usable, ~usable, 1.5 * period)
     values = deviation.values[part.index, j]
-    return [values[first:last] for first, last in stretch_bounds(part.step)]
+    return [values[first:last] for first, last in section_bounds(part.step)]
 
 
 @kernel(f"void({READ_ONLY}, int64[::1], {READ_ONLY}, float64, float64[:, ::1], float64[:, ::1], float64[::1])")
@@ -177,9 +178,9 @@ def _whiten(  # noqa: C901  a kernel is one loop
 ) -> None:
     """`slots`: periods since the sample before, 0 at a start. `work` (2 p, p) is overwritten.
 
-    The last p values of e are the state of a Kalman filter; where all of them were samples it is known exactly. Behind
-    a lost sample it is not: the detector has missed it too, and does not go on as the model says. It starts from the
-    normal spread, `stationary` (p, p), and each sample corrects it: after p in succession all of it is known again.
+    The last p values of e are the state of a Kalman filter; where all of them were samples it is known exactly. After
+    a lost sample it is not: the detector has missed it too, and deviates from the model. The state restarts from the
+    normal spread, `stationary` (p, p), and each sample corrects it: after p consecutive samples it is exact again.
     Covariances are in units of the variance of nu; that of the innovation is P[0, 0].
     """
     order = len(coefficients)
@@ -233,10 +234,10 @@ def _whiten(  # noqa: C901  a kernel is one loop
 
 
 def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
-    """Coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k, and the standard deviation of nu, from stretches of e.
+    """Return coefficients (order,) of e_k = sum a_i e_{k-i} + nu_k and the standard deviation of nu, from parts of e.
 
-    Burg's recursion with forward and backward errors summed over all stretches; those of at most `order` samples are
-    left out. The model is stable by construction. Standard deviation NaN where no stretch is long enough.
+    Burg's recursion with forward and backward errors summed over all sections; sections of at most `order` samples are
+    left out. The model is stable by construction. The standard deviation is NaN if no section is long enough.
     """
     forward = [part for part in parts if len(part) > order]
     backward = forward

@@ -1,4 +1,4 @@
-"""UR10e: limits learned from five seconds without contact, held against three recordings of the real arm.
+"""UR10e: limits learned from five seconds without contact, applied to three recordings of the real arm.
 
     python docs/examples/ur10e_collisions.py FOLDER_OF_UR10E
     python docs/examples/ur10e_collisions.py FOLDER_OF_UR10E --machine ur10e_machine.toml --factor 4 --block 0.25
@@ -79,7 +79,7 @@ target currents). The steps are 10 or 12 ms, 94 to 96 Hz."""
 
 @dataclass(frozen=True)
 class Judged:
-    """A recording through one detector, and its alarms held against the contacts."""
+    """One recording with one detector, its alarms matched to the contacts."""
 
     recording: Recording
     detection: Detection
@@ -118,7 +118,7 @@ def load(folder: Path, name: str, machine: MachineFile) -> Recording:
 
 
 def learn_limit(recording: Recording, machine: MachineFile, detector: Any, factor: float, block: float) -> list[float]:
-    """A limit a joint, rounded up to 0.1: the larger of both sides of `Limit`, the blocks [s] taken for its runs.
+    """Return one limit per joint, rounded up to 0.1: the larger of both sides of `Limit`, with blocks [s] as runs.
 
     A push may come from either side, and five seconds do not visit both sides of a joint alike.
     """
@@ -153,7 +153,7 @@ def closest(judged: Judged) -> str:
     share = np.where(signal.valid & ~near[:, np.newaxis], np.abs(signal.values) / band.upper, 0.0)
     row, joint = np.unravel_index(int(np.argmax(share)), share.shape)
     if share[row, joint] == 0.0:
-        return "nothing judged without contact"
+        return "nothing assessable without contact"
     after = signal.time[row] - judged.recording.start
     return f"{share[row, joint]:.2f} of its limit ({signal.joints[joint]} at {after:.2f} s)"
 
@@ -170,7 +170,7 @@ def described(alarm: Alarm, judged: Judged) -> str:
 
 
 def report(judged: Judged) -> None:
-    """Print what became of a recording."""
+    """Print the outcome of a recording."""
     statistic, matching = judged.detection.statistic, judged.matching
     alarms = ", ".join(described(alarm, judged) for alarm in judged.detection.verdict.alarms) or "none"
     false = ", ".join(described(alarm, judged) for alarm in matching.false_alarms) or "none"

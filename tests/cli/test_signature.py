@@ -155,7 +155,7 @@ def test_some_of_the_runs_learned_from_are_no_verdict_on_all(gate_folder, signat
     done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
     assert done.status == 3 and "given: only 4 of the 11 runs that it was learned from" in done.err
     done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
-    assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing could be judged" in done.out
+    assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing was assessable" in done.out
 
 
 def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):

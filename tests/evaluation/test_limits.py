@@ -111,7 +111,7 @@ def test_false_alarms_are_counted_in_groups_without_contacts():
         ('"gmm.stiff.mean_ms" = { max = 1 }', "unknown detector 'gmm'.*gm"),
         ('"gm.stif.mean_ms" = { max = 1 }', "unknown group 'stif'.*stiff"),
         ('"gm.stiff.mean" = { max = 1 }', "unknown figure 'mean'.*mean_ms"),
-        ('"gm" = { max = 1 }', "names no figure"),
+        ('"gm" = { max = 1 }', "does not name a metric"),
         ('"gm.stiff.mean_ms" = { }', "has no bound"),
         ('"gm.stiff.mean_ms" = 5', "a table"),
         ('"gm.stiff.mean_ms" = { max = 1, min = 2 }', "min 2 above max 1"),

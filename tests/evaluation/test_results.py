@@ -82,7 +82,7 @@ def test_another_version_is_named_with_the_way_out(tmp_path):
         ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is true, no whole number$"),
         ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, no whole number$"),
         ('"clipped": false', '"cliped": false', r"unknown field 'cliped'"),
-        ('"onset_s": 5.0,', "", r"results\.contacts\[0\] lacks onset_s$"),
+        ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: onset_s missing$"),
         ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is null, no number$"),
         ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is no list"),
         (
@@ -122,7 +122,7 @@ def test_a_wrong_field_is_named(tmp_path, old, new, words):
         (b"\xff\xfe\x00", r"results\.json: not a results file: no UTF-8 text$"),
         (
             '{"schema_version": 2}',
-            r"results lacks provenance, detectors, groups, contacts, false_alarms, exposure$",
+            r"results: provenance, detectors, groups, contacts, false_alarms, exposure missing$",
         ),
     ],
 )

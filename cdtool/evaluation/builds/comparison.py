@@ -1,10 +1,10 @@
 """Is a new build better or worse than the old one? Two results files, detector by detector and group by group.
 
-Conventions: a change is new less old. Contacts that both files hold are compared one by one. All questions are
-corrected together (Holm): that anything is wrongly called worse or better has the chance `significance` at most. "No
-change shown" is said only where a relevant change would have been shown; elsewhere the answer is "inconclusive". A
-change that is complete, such as every contact missed that was detected before, needs no test. Builds are compared only
-if the rules by which their numbers were computed are equal; settings under test may differ, and are listed.
+Conventions: a change is new minus old. Contacts in both files are compared pair by pair. All tests are corrected
+together (Holm): the family-wise error rate of "worse" and "better" is at most `significance`. The answer is "no change
+shown" only if a relevant change would have been shown, otherwise "inconclusive". A complete change, such as every
+contact missed that was detected before, needs no test. Builds are compared only if the rules that
+define their results are equal; settings under test may differ, and are listed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from cdtool.evaluation.truth.labels import LABEL_FILE
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted, shorten
 
-# Provenance keys that decide how figures come about, and where the benchmark file sets them.
+# Provenance keys of settings that define the results, and where the benchmark file sets them.
 _RULES = {
     "onset": "[onset]",
     "separation_s": "[onset] separation_s",
@@ -74,11 +74,11 @@ _Leaf = tuple[str, Any, Any]
 
 @dataclass(frozen=True)
 class BuildComparison:
-    """All questions asked of two builds, the verdict over them, and what else differs.
+    """All tests of two builds, the verdict over them, and other differences.
 
-    `relevant_change`: the smallest one that matters. `inconclusive`: rows in which some question could not have shown
-    it, whatever else they show. `asked` questions were corrected together. `only_old`, `only_new`: detectors, groups,
-    or a detector in a group that one file alone holds. `changed`: settings under test that differ. `notes`: recordings
+    `relevant_change`: the smallest change that matters. `inconclusive`: rows in which some test could not have shown
+    it, whatever else they show. `asked` tests were corrected together. `only_old`, `only_new`: detectors, groups, or
+    a detector in a group present in only one file. `changed`: settings under test that differ. `notes`: recordings
     without a partner.
     """
 
@@ -105,14 +105,14 @@ class BuildComparison:
 def compare_builds(
     old: Results, new: Results, significance: float = SIGNIFICANT, relevant_change: float = RELEVANT_CHANGE
 ) -> BuildComparison:
-    """Compare every detector and group that both results hold.
+    """Compare every detector and group present in both results.
 
     `relevant_change`: the smallest change for the worse that matters, as a share of the old mean latency and force, of
     the contacts missed or not assessable, and of a false alarm per operation.
     Latency and force: `paired_difference` by recording or campaign, else `unpaired_difference`; misses and contacts not
     assessable: McNemar, else Fisher; false alarms: `poisson_difference_p` on counts and hours.
-    Raises ConfigurationError, naming the key, where something differs that decides how figures come about; UsageError
-    where nothing is common.
+    Raises ConfigurationError, naming the key, if a setting differs that defines the results; UsageError if nothing is
+    common to both.
     """
     check_significance(significance)
     if not 0.0 < relevant_change <= 1.0:
@@ -179,7 +179,7 @@ class Changed:
 
 
 def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: Sequence[str]) -> None:
-    """Raise ConfigurationError where a rule differs by which the figures of these groups came about."""
+    """Raise ConfigurationError if a rule that defines the results of these groups differs."""
     for key, where in _RULES.items():
         before, after = old.get(key), new.get(key)
         if key in _BY_GROUP:

@@ -80,7 +80,7 @@ def _same_bytes(old: Sequence[RecordingResult], new: Sequence[RecordingResult]) 
 def _same_onsets(
     before: Mapping[int, tuple[float, float]] | None, after: Mapping[int, tuple[float, float]] | None
 ) -> bool:
-    """Whether both have the same contacts; a recording without any is none that could be told by its onsets."""
+    """Return whether both have the same contacts; a recording without contacts cannot be recognised by its onsets."""
     if not before or not after or before.keys() != after.keys():
         return False
     return all(_agree(before[number], after[number]) for number in before)

@@ -1,10 +1,10 @@
-"""What is asked of one detector in one group of two builds: latency, force, misses, not assessable, false alarms.
+"""Tests of one detector in one group of two builds: latency, force, misses, not assessable, false alarms.
 
-Conventions: a change is new less old, and more is worse in every figure. A question that no outcome could have decided,
+Conventions: a change is new minus old, and more is worse in every quantity. A test that no outcome could have decided,
 such as misses where nothing was missed, has no p (NaN) and does not count as asked. All p are two-sided. A
-detectable change is infinite where no change could have been shown.
+detectable change is infinite if no change could have been shown.
 
-What a question leaves open is the largest change for the worse that the recordings do not rule out, as a share: of the
+A test leaves open the largest change for the worse that the recordings do not rule out, as a share: of the
 old mean; of the contacts; or false alarms per operation.
 """
 
@@ -54,12 +54,12 @@ class Watched:
 
 @dataclass(frozen=True)
 class Asked:
-    """One figure of both builds and the p of no change.
+    """One quantity of both builds and the p of no change.
 
     `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, and of fewer than
-    ten latencies, as in a benchmark), or counts in so many contacts, operations or hours.
-    `detectable(alpha)` is the least change that would have been shown at that p: with 80 % power where a mean is
-    asked; else the count of the new build from which on the test shows it. Infinite: none could have been.
+    ten latencies, as in a benchmark), or counts in that many contacts, operations or hours.
+    `detectable(alpha)` is the least change that would have been shown at that p: for a mean with 80 % power, else the
+    smallest count of the new build for which the test shows it. Infinite: the sample is too small for any change.
     """
 
     figure: Figure
@@ -72,7 +72,7 @@ class Asked:
     detectable: Callable[[float], float]
     reason: str = ""
     same: bool = False
-    """Whether every pair has the same figure: a fact about these recordings that needs no test."""
+    """Whether every pair has the same value: a fact about these recordings that needs no test."""
     left_open: Callable[[float], float] = lambda _: math.nan
     """The change that is not ruled out, at that p where it is a mean, else with 95 %; NaN: there is nothing to ask."""
     complete_p: float = math.nan
@@ -160,7 +160,7 @@ def ask_not_assessable(old: Sequence[ContactResult], new: Sequence[ContactResult
 
 
 def ask_blind_operations(old: tuple[int, int], new: tuple[int, int], paired: bool) -> Asked:
-    """Operations that could be judged nowhere, of all, where a group has no contacts: (count, of) each; Fisher."""
+    """Compare operations that were nowhere assessable, in a group without contacts: (count, of) each; Fisher."""
     asked = _ask_counts("not_assessable", old, new)
     return replace(asked, same=paired and old == new and old[0] < old[1])
 

@@ -36,16 +36,16 @@ RELEVANT_CHANGE = 0.1
 
 @dataclass(frozen=True)
 class Question:
-    """One figure of one detector in one group in both builds, and whether a change is shown.
+    """One quantity of one detector in one group in both builds, and whether a change is shown.
 
     `old` and `new`: means over `old_of` and `new_of` contacts (medians of forces, and of latencies where `ranges` has
-    the shortest and the longest of either build: fewer than ten contacts), or counts in so many contacts, operations or
-    hours;
-    `change` is new less old, of counts a share or a rate without an interval. `p` of no change and `corrected_p` (Holm)
-    are NaN where there was nothing to ask; `reason` says why. `detectable`: the least change of a mean that would have
-    been shown with 80 % power, or the new count from which on it would have been; infinite where none could.
+    the shortest and the longest of either build: fewer than ten contacts), or counts in that many contacts, operations
+    or hours. `change` is new minus old, for counts a share or a rate without an interval. `p` of no change and
+    `corrected_p` (Holm) are NaN if there was nothing to test; `reason` states why. `detectable`: the least change of a
+    mean that would have been shown with 80 % power, or the smallest new count that would have been; infinite if the
+    sample is too small.
     `left_open`: the largest change for the worse that these recordings do not rule out, as a share of the old mean, of
-    the contacts, or per operation; NaN where there was nothing to ask. `same`: every pair has the same figure.
+    the contacts, or per operation; NaN if there was nothing to test. `same`: every pair has the same value.
     `complete_change_p`: the exact probability of a change so complete that it needs no test; NaN where it is not.
     """
 
@@ -140,7 +140,7 @@ class Build:
         return Watched(self._false_alarms.get((detector, group), 0), watched.hours, judged)
 
     def blind_operations(self, detector: str, group: str) -> tuple[int, int]:
-        """How many could be judged nowhere, of how many."""
+        """Return how many were nowhere assessable, and of how many."""
         watched = self._watched(detector, group)
         return watched.not_assessable, watched.operations
 
@@ -183,8 +183,8 @@ def answer(
 ) -> tuple[list[BuildRow], int]:
     """The rows with their questions, corrected together over all rows (Holm), and how many were asked.
 
-    A question that shows nothing is inconclusive where it leaves more than `relevant_change` open, unless every figure
-    of its row is the same, contact by contact.
+    A test that shows nothing is inconclusive if it leaves more than `relevant_change` open, unless every value of its
+    row is the same, contact by contact.
     """
     p = [item.p for _, items in asked for item in items]
     count = sum(not math.isnan(value) for value in p)

@@ -13,14 +13,14 @@ from cdtool.plain_text import counted, shorten
 
 # The reason of any verdict on one file given twice, or on a copy of it.
 SAME_RESULTS = "both files hold the same results"
-# As many are named in the line of the verdict; all stand in `only_old`.
+# This many are named in the line of the verdict; all are listed in `only_old`.
 _NAMED = 3
 
 
 def row_words(row: BuildRow, asked: int) -> str:
-    """What is shown of a detector in a group; else that nothing is, and which change would have been.
+    """Return the changes shown for a detector in a group; otherwise which change would have been shown.
 
-    `asked`: questions that were corrected together.
+    `asked`: the number of tests that were corrected together.
     """
     words = [_SHOWN[item.figure](item) for item in row.questions if item.outcome in ("worse", "better")]
     if row.inconclusive:
@@ -55,7 +55,7 @@ def overall_words(
 
 
 def gone_words(only_old: Sequence[str]) -> str:
-    """What is gone from the new results, to stand after the verdict: nothing is shown of it."""
+    """Return what is missing from the new results, to append to the verdict."""
     more = f" and {len(only_old) - _NAMED} more" if len(only_old) > _NAMED else ""
     return f"; only in old: {', '.join(shorten(name, 40) for name in only_old[:_NAMED])}{more}" if only_old else ""
 
@@ -181,6 +181,6 @@ def _interval(change: Interval, unit: str) -> str:
 
 
 def figure(value: float) -> str:
-    """Tenths, hundredths below 1, none from 100 on."""
+    """Format with tenths, hundredths below 1, no decimals at 100 and above."""
     digits = 0 if abs(value) >= 100.0 else 1 if abs(value) >= 1.0 else 2
     return f"{value:.{digits}f}"

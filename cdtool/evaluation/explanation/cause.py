@@ -1,17 +1,16 @@
 """The likely cause of an alarm: a contact, a change of friction, or a sensor that is wrong.
 
-Facts only: which kind, of which channel and joint, from when, by how much. Neither load cell nor labels are looked at.
-What is asked for, in this order:
+Facts only: kind, channel, joint, time and size. Neither load cell nor labels are used. The conditions, in this order:
 
-contact             the axis that leads the motion loses speed for good while its torque pushes on; or the torque of
-                    a joint that is held rises for good against a displacement
-changed command     the reference speed leaves its normal course before the alarm
-friction change     the torque of the leading joint departs for good, and the speed has come back
-speed glitch        the speed leaves its own course and returns within a few samples, and the position shows no motion
-torque spike        the torque does so, and the speed does not answer
-accelerometer knock the acceleration does so, or rings, and neither speed nor torque departs
-lost samples        nothing of all that, and samples are missing right before the alarm
-not clear           nothing of all that
+contact             the leading axis loses speed permanently while its torque keeps pushing; or the torque of a joint
+                    at rest rises permanently and opposes a displacement
+changed command     the reference speed leaves its normal band before the alarm
+friction change     the torque of the leading joint departs permanently, and the speed has recovered
+speed glitch        the speed jumps away and returns within a few samples, and the position shows no motion
+torque spike        the same for the torque, and the speed does not respond
+accelerometer knock the same for the acceleration, or it rings, and neither speed nor torque departs
+lost samples        none of the above, and samples are missing right before the alarm
+not clear           none of the above
 """
 
 from __future__ import annotations
@@ -185,7 +184,7 @@ def _friction(
 
 
 def _transients(recording: Recording, track: Track, window: tuple[float, float]) -> list[Transient]:
-    """What came and went in a channel: against its own running median, else against its normal course."""
+    """Return transients of a channel: relative to its own running median, otherwise to its normal curve."""
     series, column = recording[track.channel], recording.joints.index(track.joint)
     spread = float(np.nanmedian(track.spread)) if np.isfinite(track.spread).any() else 0.0
     found = transients(series, track.channel, track.joint, column, *window, _LEAST_NOISE * spread)

@@ -25,8 +25,8 @@ _BEYOND, _LEAST_OUT = 1.5, 5.0
 # It began to leave it where it last was within this share of that.
 _BACK_TO = 0.4
 _SUCCESSION = 3
-# A departure that takes longer than this [s] to be certain may be a slow wandering first: where its course bends is
-# tried at so many samples, with this much of it before [s].
+# A departure that takes longer than this [s] to be certain may start with a slow drift: the bend of its curve is
+# searched at this many samples, with this much of it before [s].
 _SLOW, _BENDS, _BEFORE_BEND = 0.03, 60, 0.1
 # A run's own constant distance from the mean counts up to this many spreads; more is a departure.
 _OFFSET = 2.5
@@ -233,7 +233,7 @@ def _first(outside: BoolArray) -> int | None:
 def _began(time: FloatArray, shares: FloatArray) -> int:
     """Where a departure upward that is certain at the last sample began: followed back to `_BACK_TO` of its limit.
 
-    A channel that had wandered that far before it departed began where its course bends.
+    If a channel had drifted that far before, its departure began at the bend of its curve.
     """
     last = len(shares) - 1
     within = np.flatnonzero(~(shares > _BACK_TO))

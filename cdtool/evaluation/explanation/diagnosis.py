@@ -1,4 +1,4 @@
-"""Which channels left their normal course, in which order, and what the alarm likely comes from."""
+"""The channels that left their normal band, in their order, and the likely cause of the alarm."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from cdtool.evaluation.explanation.transient import Transient
 from cdtool.recording import REFERENCES, Recording
 from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
 
-# Departures are looked for from so long before the signal left its band for good [s]: a soft contact takes as long.
+# Departures are searched from this long before the signal left its band permanently [s]: a soft contact takes as long.
 _BEFORE = 0.9
-# Which class of motion a run is of is asked up to so long before it left the band [s].
+# The class of motion of a run is determined up to this long before it left the band [s].
 _LATEST = 0.1
-# After accelerating so much of the run says how far it is off anyway [s]; departures are looked for at least so long.
+# This much of the run after accelerating shows its usual offset [s]; departures are searched for at least this long.
 _SETTLING, _LEAST_BEFORE = 0.3, 0.3
-# What follows an alarm tells a contact from friction: so long it is looked at [s].
+# The time after an alarm that distinguishes a contact from friction [s].
 _AFTER = 0.5
 
 # Without impact-free runs a run has to have been steady: its speed within this share of its median.
@@ -36,7 +36,7 @@ _ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The channels in the order in which they left their course, and the likely cause (a contact's is known).
+    """The channels in the order in which they left their normal band, and the likely cause (known for a contact).
 
     `absent`: why there were no impact-free runs to compare with; None where there were, `runs` of them.
     """

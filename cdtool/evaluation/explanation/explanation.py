@@ -23,7 +23,7 @@ from cdtool.recording import GROUND_TRUTH, Contact
 
 Role = Literal["detection", "further alarm", "in progress", "false alarm", "alarm"]
 
-# When the margin is told [s]: to the alarm; from the onset of a missed contact.
+# Times at which the margin is reported [s]: to the alarm; from the onset of a missed contact.
 _TO_ALARM = (-0.1, -0.05, -0.02, -0.01, -0.005, 0.0)
 _FROM_ONSET = (-0.1, 0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 # A load cell feels a contact up to this late [s]; by how much an alarm is late is not known without a contact.
@@ -71,8 +71,8 @@ class MissExplanation:
     """Why a contact was missed, or could not be assessed (`reason`): how near each joint came, the nearest first.
 
     `watched` [s]: how long after the onset an alarm would have counted. `not_judged`: share of the samples there that
-    could not be judged, by reason. `joint` is the nearest one, of which `moments` and `moved` tell. `runs` and `absent`
-    are those of an alarm.
+    were not assessable, by reason. `joint` is the nearest one; `moments` and `moved` describe it. `runs` and `absent`
+    are as for an alarm.
     """
 
     operation: str
@@ -84,7 +84,7 @@ class MissExplanation:
     reason: str
     watched: float
     debounce: int
-    not_judged: Mapping[str, float]
+    not_judged: Mapping[str, float]  # language: a field of --json and results.json
     approaches: tuple[Approach, ...]
     moments: tuple[Moment, ...]
     moved: tuple[Movement, ...]
@@ -258,7 +258,7 @@ def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[
 
 
 def _distance(approach: Approach) -> tuple[float, int]:
-    """The order of approaches: a long held share first, where there is none the longest run outside."""
+    """Return the order of approaches: a large held share first, otherwise the longest run outside."""
     return (-np.nan_to_num(approach.held, nan=-np.inf), -approach.longest)
 
 

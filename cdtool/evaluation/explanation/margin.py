@@ -25,7 +25,7 @@ from cdtool.recording import FloatArray
 class Moment:
     """The statistic at a time [s] against its nearest limit, both in the signal's unit.
 
-    `margin` and `share` are NaN where the sample could not be judged, and `reason` tells why.
+    `margin` and `share` are NaN if the sample was not assessable, and `reason` states why.
     """
 
     time: float
@@ -40,9 +40,9 @@ class Moment:
 class Approach:
     """How near a joint came to an alarm: its `nearest` sample, and the `longest` run of samples outside the band.
 
-    `outside_from` [s] is where that run began, NaN without one. `held` is the largest share of the limit that was kept
-    for the whole debounce: with `held` times the safety factor it would have alarmed; NaN where it was never judged for
-    so long. `latched_from` [s]: outside since then, with its crossing before the contact; NaN otherwise.
+    `outside_from` [s] is where that run began, NaN without one. `held` is the largest share of the limit that was held
+    for the whole debounce: with `held` times the safety factor there would be an alarm; NaN if never assessable for
+    that long. `latched_from` [s]: outside since then, with its crossing before the contact; NaN otherwise.
     """
 
     joint: str
@@ -55,7 +55,7 @@ class Approach:
 
 @dataclass(frozen=True)
 class JointMargin:
-    """One joint's `margin` [signal's unit] and `share` of the limit, both (n,), NaN where it could not be judged."""
+    """One joint's `margin` [signal's unit] and `share` of the limit, both (n,), NaN where not assessable."""
 
     detection: Detection
     joint: int
@@ -101,7 +101,7 @@ class JointMargin:
         return np.column_stack((present[first], present[after - 1], after - first)).astype(np.int64)
 
     def approach(self, start: float, end: float, debounce: int) -> Approach | None:
-        """How near it came to an alarm from `start` to `end` [s]; None where it has no limit or was never judged."""
+        """Return how near it came to an alarm from `start` to `end` [s]; None without limit or assessable sample."""
         first, after = np.searchsorted(self.time, start), np.searchsorted(self.time, end, side="right")
         margin = self.margin[first:after]
         if not np.isfinite(margin).any():
@@ -133,7 +133,7 @@ def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
 
 
 def _held(share: FloatArray, debounce: int) -> float:
-    """The largest share that `debounce` consecutive samples all had; one that was not judged (NaN) breaks them."""
+    """Return the largest share that `debounce` consecutive samples all had; a sample that is NaN interrupts them."""
     if len(share) < debounce:
         return math.nan
     least = np.lib.stride_tricks.sliding_window_view(share, debounce).min(axis=1)

@@ -16,7 +16,7 @@ from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
 
-# What is asked of the machine. The reference torque is none: it is a controller's output and answers a contact.
+# Commands to the machine. The reference torque is not one: it is a controller output and responds to a contact.
 COMMANDS = ("reference_position", "reference_speed")
 
 # How far ahead of its line a channel is tried before the event [s]: the further, the less it keeps to it.
@@ -33,7 +33,7 @@ _SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Movement:
-    """When and where to a channel of a joint left its course: `time` [s]; NaN where it did not, with the reason.
+    """When and in which direction a channel of a joint moved away: `time` [s]; NaN if it did not, with the reason.
 
     Compared with impact-free runs: its `value` where it was farthest off, with their `mean` and `spread` there, in
     `unit`; NaN where the run's own past had to do. `brief`: it came back within a few samples.

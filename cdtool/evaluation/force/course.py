@@ -1,4 +1,4 @@
-"""The force of a contact over the time since it began: what a force limit is held against.
+"""The force-time curve of a contact, with which a force limit is compared.
 
 Conventions: time counts from the contact's onset [s]. The force is positive in the direction in which the contact
 presses, whatever the load cell's sign. Samples are missing where two are further apart than `missing_samples` allows.

@@ -28,10 +28,10 @@ class ForceStep:
 
 @dataclass(frozen=True)
 class ForceProfile:
-    """A named staircase of limits with its source; its steps begin at 0 s and their times increase.
+    """Named force limits in steps, with their source; the steps begin at 0 s and their times increase.
 
-    `checked`: someone has held the values against the standard's text. `average_of`: so many tests at one point are
-    averaged; 1: each test is judged by itself.
+    `checked`: someone has checked the values against the text of the standard. `average_of`: the number of tests at one
+    point that are averaged; 1: each test is assessed on its own.
     """
 
     name: str

@@ -38,7 +38,7 @@ class TracedForce:
 
 
 def force_profiles(results: Results) -> dict[str, ForceProfile]:
-    """The profiles that the results were held against, by name."""
+    """Return the profiles with which the results were compared, by name."""
     found = {}
     for values in results.provenance.get("force_profiles", {}).values():
         steps = tuple(ForceStep(**step) for step in values["steps"])

@@ -52,7 +52,7 @@ class _OfSteps:
 
     @property
     def reason(self) -> str:
-        """Why it is no pass: of the first step with that outcome."""
+        """Why it does not pass: the reason of the first step with that outcome."""
         return _first_reason(self.steps, self.outcome)
 
 
@@ -101,17 +101,17 @@ class PointVerdict(_OfSteps):
 
 
 def judge(course: ForceCourse, profile: ForceProfile) -> ForceVerdict:
-    """Hold a course against every step of a profile.
+    """Compare a force curve with every step of a profile.
 
-    A step is not assessable where the record ends before or inside it, where samples in it are missing, or where the
-    load cell was at its stop below the limit. The last step is judged on as much as the record holds of it.
+    A step is not assessable if the record ends before or inside it, if samples in it are missing, or if the load cell
+    saturated below the limit. The last step is assessed over the recorded part of it.
     """
     steps = tuple(_judge_step(course, step, profile.ends(i)) for i, step in enumerate(profile.steps))
     return ForceVerdict(profile.name, steps, course.end)
 
 
 def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVerdict:
-    """Hold the mean of the tests' peaks against every step; where the profile averages none, the highest peak.
+    """Compare the mean of the tests' peaks with every step; if the profile does not average, the highest peak.
 
     Not assessable: a step with fewer tests than the profile averages, or one that does not fail and that a test could
     not assess. With more tests all are averaged. Raises UsageError for verdicts of another profile.

@@ -40,7 +40,7 @@ def clusters_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Clusters:
     if array.shape != (len(names),):
         raise UsageError(f"values {array.shape} and clusters ({len(names)},) do not fit", "one label for every value")
     if not np.all(np.isfinite(array)):
-        raise UsageError("a value is missing or infinite", "leave missed contacts out, and tell how many they are")
+        raise UsageError("a value is missing or infinite", "leave missed contacts out, and state how many there are")
     groups: dict[Hashable, list[float]] = {}
     for name, value in zip(names, array.tolist(), strict=True):
         groups.setdefault(name, []).append(value)

@@ -66,7 +66,7 @@ def latency_quantile(latency: npt.ArrayLike, censored: npt.ArrayLike, share: flo
     detection, or to the last time watched). So the median of an even number of detections is the usual one.
     Interval of Brookmeyer and Crowley (1982): the times, by the same definition, at which the lower and the upper limit
     of the log-log band (see `survival`) pass 1 - share. Infinite: not reached in the time watched, too many were missed
-    or there are too few contacts (all detected, the median has an upper limit from 7 contacts on, the P95 from 98).
+    or there are too few contacts (all detected, the median has an upper limit with 7 contacts or more, the P95 98).
     Where all were detected at one time, or none was, the curve has no band: exact binomial bounds take its place.
     Empty input: NaN. Raises UsageError for arrays that do not fit or a share outside 0 to 1.
     """

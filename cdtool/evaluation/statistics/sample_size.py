@@ -24,7 +24,7 @@ def impacts_for_difference(
     """Impacts for which a paired t-test sees a mean `difference` between two detectors.
 
     Least n with P(|T| > t) >= power, T noncentral t with n - 1 degrees of freedom and noncentrality
-    difference / std * sqrt(n), t its central quantile at (1 + level) / 2. Both figures in one unit. Skewed differences
+    difference / std * sqrt(n), t its central quantile at (1 + level) / 2. Both in one unit. Skewed differences
     need some more. Raises UsageError for a difference or std that is not above 0, or where ten million are too few.
     """
     effect = _effect(difference, std_of_differences, power, level)

@@ -1,4 +1,4 @@
-"""Which intervals few contacts allow: none of a mean below ten recordings, an exact one of the median from six on.
+"""Intervals that few contacts allow: none for a mean below ten recordings, an exact one for the median of six or more.
 
 Conventions: the 95 % bootstrap interval of a mean holds the true mean in about 80 of 100 tests with four contacts, and
 in 47 where 15 % of the contacts are slow: none of the four is slow in half of the tests (docs/statistics.md). An
@@ -29,7 +29,7 @@ def too_few(clusters: int) -> str:
 
 
 def median_rank(n: int, level: float = 0.95) -> int:
-    """Rank r with P(X_(r) <= median <= X_(n + 1 - r)) >= level for any distribution; 0 where there is none.
+    """Rank r with P(X_(r) <= median <= X_(n + 1 - r)) >= level for any distribution; 0 if no rank does.
 
     The largest r with P(B <= r - 1) <= (1 - level) / 2, B binomial with n contacts and share 1/2. At 95 %: r = 1 for 6
     to 8 contacts (96.9, 98.4, 99.2 %), r = 2 for 9 (96.1 %), none for 5 (their whole range holds 93.8 %).
@@ -51,9 +51,9 @@ def median_of(
 ) -> Interval:
     """Median latency as `latency_quantile` defines it, with an interval that holds for so many contacts.
 
-    `latency` (n,), `censored` (n,) True where the contact was missed, `labels` (n,) its recording or campaign. From 10
-    contacts on the interval is that of Kaplan and Meier. Below, it is that between the order statistics of rank
-    `median_rank` and n + 1 less it: exact for any distribution. A missed contact counts from the time that it was
+    `latency` (n,), `censored` (n,) True where the contact was missed, `labels` (n,) its recording or campaign. With 10
+    or more contacts the interval is that of Kaplan and Meier. Below, it is that between the order statistics of rank
+    r = `median_rank` and n + 1 - r: exact for any distribution. A missed contact counts from the time that it was
     watched in the lower bound, and is later than all in the upper one. None with fewer than 6 contacts, nor where fewer
     than 10 recordings hold several contacts each: those of one recording are alike. Raises UsageError as
     `latency_quantile` does.

@@ -1,4 +1,4 @@
-"""Which operations' traces are kept: all missed and all false alarms, the slowest, a sample, and one a group."""
+"""Which operations' traces are kept: all missed and all false alarms, the slowest, a sample, and one per group."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ MOST_KEPT = MOST_STRIKING + MOST_SLOW + MOST_SAMPLED
 
 @dataclass
 class TraceChoice:
-    """Takes operations in order and keeps at most `MOST_KEPT` traces; `work` is how many logs there are.
+    """Selection of at most `MOST_KEPT` traces from operations in order; `work` is the number of logs.
 
-    The trace is made only of an operation that is kept at that moment, so that thousands need no memory.
+    A trace is computed only for an operation that is kept at that moment, so that thousands need no memory.
     """
 
     work: int

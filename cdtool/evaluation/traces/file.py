@@ -56,7 +56,7 @@ def _digest(text: str) -> str:
 
 
 def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
-    """The traces of a file; raises RecordingError where it is none, or belongs to other `results` (the file's text)."""
+    """Return the traces of a file; raises RecordingError for another file, or one of other `results` (text)."""
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = unpack_json(content)

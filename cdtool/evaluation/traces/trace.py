@@ -106,7 +106,7 @@ class Panel:
 class Trace:
     """One operation with every detector's panel: `contact` is the number in `contacts` that is shown, -1 for none.
 
-    `view` is the stretch around it [s]; `force` (m,) [N] is the load cell on `force_time`, empty without one. `chosen`
+    `view` is the interval around it [s]; `force` (m,) [N] is the load cell on `force_time`, empty without one. `chosen`
     says why the trace was kept; `joints` is how many the machine has.
     """
 

@@ -24,7 +24,7 @@ LABEL_FILE = "; label file "
 class Labels:
     """The contacts of each recording that a label file names.
 
-    `lines`: where each contact stands, as "FILE line N", in the order of `contacts`; where there is none, its one row.
+    `lines`: the origin of each contact, as "FILE line N", in the order of `contacts`; without contacts, its only row.
     """
 
     source: str

@@ -147,7 +147,7 @@ class _Search:
         return starts[held], ends[held]
 
     def _end_of_burst(self, begin: int, first: int, over: FloatArray) -> int | None:
-        """The sample after a burst of noise about `first`, which goes to both sides alike; None where there is none."""
+        """Return the sample after a burst of noise around `first`, which goes to both sides; None without a burst."""
         since = max(begin, int(np.searchsorted(self.time, self.time[first] - _BURST)))
         until = int(np.searchsorted(self.time, self.time[first] + _BURST, side="right"))
         part = over[since - begin : until - begin]
@@ -176,7 +176,7 @@ class _Search:
         return _Rise(onset, onset + int(above[0]) if len(above) else high, sign, line)
 
     def _followed_back(self, begin: int, high: int, sign: float, line: RestLine) -> int:
-        """The sample after the last one, before `high`, at or below the lower level; `begin` where there is none."""
+        """Return the sample after the last one, before `high`, at or below the lower level; otherwise `begin`."""
         span = 256
         while True:
             first = max(begin, high - span)

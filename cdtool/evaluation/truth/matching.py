@@ -31,10 +31,10 @@ Outcome = Literal["detected", "missed", "not_assessable", "in_progress"]
 
 @dataclass(frozen=True)
 class Match:
-    """One contact and what became of it; `latency` [s] is NaN unless detected, `clipped` if it came out below zero.
+    """One contact and its outcome; `latency` [s] is NaN unless detected, `clipped` if it was negative.
 
     `watched`: how long after the onset an alarm would have counted [s], the censoring time of a missed contact.
-    `reason` tells why a contact could not be assessed, or has no latency.
+    `reason` states why a contact is not assessable, or has no latency.
     """
 
     contact: Contact

@@ -1,9 +1,9 @@
-"""What a load cell reads at rest: a running, robust estimate from the samples before, with its drift.
+"""The rest level of a load cell: a running, robust estimate from earlier samples, with its drift.
 
 Conventions: readings are pooled into intervals of 50 ms by their median. The rest level at a time is that of the last
-20 intervals without a contact that ended at least 0.3 s earlier: their median, or, where they drift beyond doubt, the
-line of Theil and Sen (Sen 1968) through them, extended to that time. The gap of 0.3 s keeps a soft contact from being
-taken for a drift of the cell: what rises to its level within some 0.6 s is a contact, what rises more slowly is drift.
+20 intervals without a contact that ended at least 0.3 s earlier: their median, or, if they clearly drift, the
+Theil-Sen line (Sen 1968) through them, extended to that time. The gap of 0.3 s prevents a soft contact from being
+mistaken as drift of the cell: a rise to the level within about 0.6 s is a contact, a slower rise is drift.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from cdtool.recording import BoolArray, FloatArray
 INTERVAL = 0.05
 _GAP = 0.3
 _WINDOW = 20
-# A line needs so many intervals and a slope of so many standard errors, more of them where n intervals are few:
-# 3 (1 + 10 / n). Else the level is taken as constant.
+# A line needs this many intervals and a slope of this many standard errors, more of them with few intervals n:
+# 3 (1 + 10 / n). Otherwise the level is constant.
 _LINE, _BEYOND_DOUBT, _FEW = 6, 3.0, 10.0
-# A line is extended for so long at most [s]: further on its last value stands.
+# A line is extended for at most this long [s]; after that its last value is used.
 _EXTENDED = 1.0
-# Until two intervals are old enough the level is that of the log's first samples [s], at least so many of them.
+# Until two intervals are old enough the level is that of the log's first samples [s], at least this many.
 _FIRST, _FEWEST = 0.1, 3
 # A standard deviation from the median absolute deviation of Gaussian noise; that of a median, in units of a mean's.
 _MAD, _OF_MEDIAN = 1.4826, 1.2533

@@ -18,7 +18,7 @@ from cdtool.evaluation.truth.named_rows import NamedRow, by_recording, read_name
 
 @dataclass
 class Triggered:
-    """What one detector said of one recording: alarms [s], and stretches [s] that it could not judge."""
+    """One detector's result for one recording: alarms [s], and intervals [s] that it could not assess."""
 
     alarms: list[float] = field(default_factory=list)
     blind: list[tuple[float, float]] = field(default_factory=list)

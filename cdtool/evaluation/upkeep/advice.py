@@ -17,7 +17,7 @@ def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
     keep a signature.
     """
     if coverage is None and drift is None:
-        return "nothing could be judged"
+        return "nothing was assessable"
     steps = []
     if drift is not None:
         steps += _inspect(drift)

@@ -34,10 +34,10 @@ class AuditedRun:
 
 @dataclass(frozen=True)
 class Shown:
-    """A change that is shown: its course over the runs, its place (None: all along the stroke), and what is left.
+    """A change that is shown: its trend over the runs, its location (None: the whole stroke), and the runs left.
 
-    `outward`: it goes towards a limit. `runs_left`: in how many more runs a typical run alarms, should it go on;
-    infinite where it does not come nearer.
+    `outward`: it goes towards a limit. `runs_left`: after how many more runs a typical run would raise an alarm if the
+    change continues; infinite if it does not approach the limit.
     """
 
     course: Course
@@ -48,7 +48,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class JointDrift:
-    """One joint over the season: its runs, its deviation (runs, places), and what is shown of the whole and of a place.
+    """One joint over the season: runs, deviation (runs, places), and changes of the whole stroke and of a location.
 
     `course` is that of the runs' `overall`; `overall` and `local` are None where no change is shown. `deviation` is in
     spreads, at the `places` along `axis`, in its `unit`.
@@ -83,10 +83,10 @@ class JointDrift:
 
 @dataclass(frozen=True)
 class DriftAudit:
-    """Runs of one class of motion in order of time, held against one signature, which does not change meanwhile.
+    """Runs of one class of motion in order of time, compared with one signature, which does not change meanwhile.
 
     `places` (m,) along `axis`, in its `unit`: m or rad of travel, or s since the motion began. `not_assessable`: runs
-    that could be judged nowhere, and why; they are in no row.
+    that were nowhere assessable, and why; they are in no row.
     """
 
     motion: MotionClass

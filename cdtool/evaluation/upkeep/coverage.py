@@ -39,7 +39,7 @@ class Coverage:
 
     `chance`: predicted, that the next impact-free operation alarms; `target` the one that is wanted. `runs_needed`:
     with how many runs in all it would be kept, None where no number would do; `factor_needed`: the safety factor that
-    keeps it with these runs. The last three are NaN (None) where fewer than 3 runs could be judged. `gaps`: parts of
+    keeps it with these runs. The last three are NaN (None) if fewer than 3 runs were assessable. `gaps`: parts of
     the stroke without a limit.
     """
 
@@ -74,9 +74,7 @@ class Coverage:
     def verdict(self) -> str:
         """The answer in a line."""
         if math.isnan(self.chance):
-            return (
-                f"{counted(len(self.runs), 'run')} could be judged: too few to predict from; {LEAST_VALUES} are needed"
-            )
+            return f"{counted(len(self.runs), 'assessable run')}: too few to predict from; {LEAST_VALUES} are needed"
         allowed = f"at most {_chance(self.target)} is allowed"
         expected = f"the chance of a false alarm in the next operation is {_chance(self.chance)}; {allowed}"
         if self.enough:
@@ -98,10 +96,10 @@ def check_coverage(
     signature of n - 1 runs is less sure than one of all n: its critical factors are up to 3 % larger at 14 runs. That
     is not corrected, so that the chance comes out too large rather than too small. "Needs more runs" assumes that the
     critical factors stay as they are and only become better known. Measured on simulated runs by
-    `benchmarks/signature_coverage.py`; runs that all come from one day tell nothing of other days.
+    `benchmarks/signature_coverage.py`; runs of one day do not represent other days.
 
     `rule.sides` has to be given. Raises SignatureError where the runs are too few or differ, UsageError for a target
-    that is no chance.
+    that is not a probability.
     """
     if not 0.0 < target < 1.0:
         raise UsageError(f"target is {target:g}", "a chance between 0 and 1, such as 0.001")
@@ -178,7 +176,7 @@ class NoLimit:
 
 @dataclass(frozen=True)
 class _Changeover:
-    """Where travel begins to count instead of time: at most so long after the motion began [s], at least so far on."""
+    """The change from time to travel: at most this time after the start of motion [s], at least this travel."""
 
     time: float = np.inf
     travel: float = 0.0

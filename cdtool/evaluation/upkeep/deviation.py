@@ -49,7 +49,7 @@ def axis_of(signature: FittedSignature) -> Axis:
 
 
 def deviations_of(signature: FittedSignature, detections: Sequence[Detection]) -> Deviations:
-    """Deviations of runs that the signature was held against: z = (i - mean) / s, with its mean and spread s.
+    """Return deviations of runs from the signature: z = (i - mean) / s, with its mean and spread s.
 
     Travel counts along the whole stroke here, while accelerating too.
     """
@@ -70,7 +70,7 @@ def critical_of(
 ) -> float:
     """The critical factor of one joint, of the samples `keep` (n,) alone, on one side of the band (+1 above, -1 below).
 
-    See `critical_factor`; -inf where it can be judged nowhere.
+    See `critical_factor`; -inf if it is nowhere assessable.
     """
     statistic = detection.statistic
     judged = np.zeros(statistic.values.shape, dtype=bool)
@@ -96,7 +96,7 @@ def near(signature: FittedSignature, detection: Detection, place: float, window:
 
 
 def _sample(signature: FittedSignature, detection: Detection, axis: Axis) -> FloatArray:
-    """A run's values (g, J) on the grid of that axis, where it can be judged."""
+    """Return a run's values (g, J) on the grid of that axis, where it is assessable."""
     by_time, by_position = signature.samples(detection.operation.recording.without_ground_truth(), detection.statistic)
     return by_time if axis == "time" else by_position
 

@@ -1,4 +1,4 @@
-"""A season of runs held against one signature: does the machine drift away from it, all along or at one place?"""
+"""Compare a season of runs with one signature: does the machine drift from it, over the whole stroke or locally?"""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from cdtool.thresholds.fitted_signature import FittedSignature
 
 __all__ = ["DriftAudit", "audit_drift"]
 
-# What a place has beyond the whole stroke is its own where it changes by this share of what the whole stroke does:
-# below, it may be the shape of the friction along the track, which grows with the friction.
+# A location has a change of its own if it exceeds this share of the change of the whole stroke: a smaller one may be
+# the shape of the friction along the track, which grows with the friction.
 _OWN_SHARE = 0.25
 
 
 def audit_drift(
     signature: FittedSignature, pairs: Sequence[tuple[Operation, Signal]], activation: Activation
 ) -> DriftAudit:
-    """Hold runs in order of time against a signature, and ask what changes from run to run.
+    """Compare runs in order of time with a signature, and test for changes from run to run.
 
-    Drift: Mann and Kendall's test, with Theil and Sen's slope; step: Pettitt's test (see `course_of`). The whole stroke
-    and its places are asked apart, each at 1 % for all joints (and places) together: of steady seasons at most 2 % show
-    something. A place is told only where it changes by more than a quarter of what the whole stroke does. With one
-    watched side a place that moves away from the limit is not told. Runs are taken as independent: a temperature that
-    wanders within a day looks like a drift. Raises SignatureError where no run can be judged.
+    Drift: Mann-Kendall test with the Theil-Sen slope; step: Pettitt's test (see `course_of`). The whole stroke and its
+    locations are tested separately, each at 1 % for all joints (and locations) together: at most 2 % of steady seasons
+    show a change. A location is reported only if it changes by more than a quarter of the change of the whole stroke.
+    With one monitored side, a location that moves away from the limit is not reported. Runs are assumed independent: a
+    temperature that varies within a day looks like a drift. Raises SignatureError if no run is assessable.
     """
     detections: list[Detection] = []
     refused: list[tuple[str, str]] = []
@@ -47,7 +47,7 @@ def audit_drift(
             detections.append(detection)
     if not detections:
         reason = f"; first reason: {refused[0][1]}" if refused else ""
-        raise SignatureError(f"no run to hold against the signature{reason}", "runs of the class that was learned")
+        raise SignatureError(f"no run to compare with the signature{reason}", "runs of the class that was learned")
     found = deviations_of(signature, detections)
     unit = "s" if found.axis == "time" else detections[0].operation.recording["position"].unit
     audited = [_Joint(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]

@@ -73,7 +73,7 @@ def _joint(
 
 
 def _moved(current: FittedSignature, first: FittedSignature, curve: Curve, old: Curve) -> FloatArray:
-    """How far the further of both limits moved (g, J), in spreads of the first signature; 0 where there is none."""
+    """Return the larger movement of the two limits (g, J), in spreads of the first signature; 0 without a limit."""
     spread = old.band(first.pooled)[1]
     moved = np.zeros(spread.shape)
     for new_limit, old_limit in zip(current.limits(curve), first.limits(old), strict=True):

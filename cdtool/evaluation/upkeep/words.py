@@ -16,7 +16,7 @@ _MANY = 100_000
 
 
 def verdicts(item: JointDrift) -> tuple[str, ...]:
-    """What is shown of a joint, the place first; or that nothing is, with what could have stayed hidden."""
+    """Return the changes shown for a joint, locations first; or that none is, with the drift not excluded."""
     lines = [_alarms(item)] if any(run.alarm for run in item.runs) else []
     if item.course.trend is None:
         many = counted(item.course.n, "run")
@@ -28,7 +28,7 @@ def verdicts(item: JointDrift) -> tuple[str, ...]:
 
 
 def place_of(place: float, axis: str, unit: str) -> str:
-    """A place along the stroke: at 2.31 m, or 0.52 s after the motion began."""
+    """Format a location: at 2.31 m, or 0.52 s after the motion began."""
     return f"at {place:.2f} {unit}" if axis == "travel" else f"{place:.2f} s after the motion began"
 
 

@@ -82,7 +82,7 @@ def test_the_verdict_says_how_many_runs_or_which_factor():
     assert "operation is 40 %" in hopeless.verdict
     assert coverage(chance=1e-9).verdict.endswith("1 in 1000 is allowed")
     assert "less than 1 in a million" in coverage(chance=1e-9).verdict
-    assert "14 runs could be judged: too few" in coverage(chance=math.nan).verdict
+    assert "14 assessable runs: too few" in coverage(chance=math.nan).verdict
 
 
 def test_a_part_without_a_limit_is_told_with_its_place_and_the_share_of_runs():

@@ -192,7 +192,7 @@ def test_few_runs_show_nothing_and_a_run_that_cannot_be_judged_is_named():
     ((name, reason),) = found.not_assessable
     assert name == "run4" and "not applicable" in reason
     assert "8 runs: too few to show a drift; at least 10 are needed" in verdicts(found.joints[0])
-    with pytest.raises(SignatureError, match=r"no run to hold against the signature.*not applicable"):
+    with pytest.raises(SignatureError, match=r"no run to compare with the signature.*not applicable"):
         audit_drift(FITTED, [late[4]], ACTIVATION)
 
 
