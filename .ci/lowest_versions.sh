@@ -10,10 +10,13 @@ if [ -z "$python" ] || ! "$python" --version > /dev/null 2>&1; then
 fi
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
+# Built from a copy: a build writes into its source, and the tests run beside it.
+mkdir "$folder/source"
+git ls-files -z | tar --null --files-from=- -cf - | tar -xf - -C "$folder/source"
 "$python" -m venv "$folder/venv"
 mapfile -t pins < <("$python" .ci/lowest_versions.py)
 echo "+ pip install ${pins[*]} ."
-"$folder/venv/bin/pip" install --quiet "${pins[@]}" .
+"$folder/venv/bin/pip" install --quiet "${pins[@]}" "$folder/source"
 cdtool="$folder/venv/bin/cdtool"
 gate=$PWD/sample_logs/gate
 cd "$folder" # the installed package is run, not this folder's
