@@ -1,15 +1,23 @@
-"""Make docs/detectors/index.md from the registered detectors and their pages: python docs/make_detector_index.py"""
+"""Write the lists of detectors from the registry and the detectors' pages: python docs/make_detector_index.py
+
+docs/detectors/index.md is written as a whole; in README.md and docs/choosing.md the table between the two comments is.
+A page gives its row in its first lines: the heading is the title, the first paragraph says what the detector looks at,
+the second one says "Good at: ... Weak at: ... Use it: ...".
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.detectors import DETECTORS
 
-FOLDER = Path(__file__).with_name("detectors")
-FILE = FOLDER / "index.md"
-
-_HEAD = """# The detectors
+DOCS = Path(__file__).resolve().parent
+_BEGIN, _END = "<!-- made by docs/make_detector_index.py -->\n", "<!-- end -->\n"
+_MODEL = "the machine file must give the inertia"
+_INDEX = """# The detectors
 
 Each page gives the equation, the signal and its unit, the gains with their defaults, and when the detector fails.
 [How to choose](../choosing.md) compares them. `cdtool list detectors` also lists those of installed plug-ins.
@@ -17,21 +25,80 @@ Each page gives the equation, the signal and its unit, the gains with their defa
 | detector | short name | channels | what it looks at |
 |---|---|---|---|
 """
+_README = "| detector | short | needs | good at | weak at |\n|---|---|---|---|---|\n"
+_CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
 
 
-def index_text() -> str:
-    """Return the file's content: a row per detector with its page's title and first paragraph."""
-    return _HEAD + "".join(map(_row, DETECTORS.names()))
+@dataclass(frozen=True)
+class Row:
+    """What the tables say of a detector; `needs_model`: the machine file must give the inertia."""
+
+    page: str
+    title: str
+    short_name: str
+    needs: tuple[str, ...]
+    needs_model: bool
+    looks_at: str
+    good_at: str
+    weak_at: str
+    use_it: str
 
 
-def _row(name: str) -> str:
+def files() -> Mapping[Path, str]:
+    """Return the files with their contents as they should be."""
+    rows = [_row(name) for name in DETECTORS.names()]
+    readme, choosing = DOCS.parent / "README.md", DOCS / "choosing.md"
+    return {
+        DOCS / "detectors" / "index.md": _INDEX + "".join(map(_index_line, rows)),
+        readme: _with_table(readme, _README, rows, _readme_line),
+        choosing: _with_table(choosing, _CHOOSING, rows, _choosing_line),
+    }
+
+
+def _row(name: str) -> Row:
     detector = DETECTORS.load(name)
     page = f"{name.replace('_', '-')}.md"
-    heading, paragraph = (FOLDER / page).read_text(encoding="utf-8").split("\n\n")[:2]
+    text = (DOCS / "detectors" / page).read_text(encoding="utf-8")
+    heading, paragraph, use = (" ".join(part.split()) for part in text.split("\n\n")[:3])
     title = heading.removeprefix("# ").partition(" (")[0]
-    cells = (f"[{title}]({page})", f"`{detector.short_name}`", ", ".join(detector.needs), " ".join(paragraph.split()))
+    said = re.fullmatch(r"Good at: (.+)\. Weak at: (.+)\. Use it: (.+)\.", use)
+    if said is None:
+        raise ValueError(f"{page}: its third paragraph is not 'Good at: ... Weak at: ... Use it: ...'")
+    return Row(
+        page, title, detector.short_name, detector.needs, _MODEL in " ".join(text.split()), paragraph, *said.groups()
+    )
+
+
+def _index_line(row: Row) -> str:
+    return _line(f"[{row.title}]({row.page})", f"`{row.short_name}`", ", ".join(row.needs), row.looks_at)
+
+
+def _readme_line(row: Row) -> str:
+    title = f"[{row.title}](docs/detectors/{row.page})"
+    return _line(title, f"`{row.short_name}`", _words(row.needs), row.good_at, row.weak_at)
+
+
+def _choosing_line(row: Row) -> str:
+    needs = _words((*row.needs, *(["model"] if row.needs_model else [])))
+    return _line(f"[{row.title}](detectors/{row.page})", f"`{row.short_name}`", needs, row.use_it)
+
+
+def _words(names: tuple[str, ...]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)
+
+
+def _line(*cells: str) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
+def _with_table(file: Path, head: str, rows: list[Row], line: Callable[[Row], str]) -> str:
+    before, begin, rest = file.read_text(encoding="utf-8").partition(_BEGIN)
+    _, end, after = rest.partition(_END)
+    if not (begin and end):
+        raise ValueError(f"{file.name}: the comments around the table of detectors are missing")
+    return f"{before}{begin}\n{head}{''.join(map(line, rows))}\n{end}{after}"
+
+
 if __name__ == "__main__":
-    FILE.write_text(index_text(), encoding="utf-8")
+    for path, content in files().items():
+        path.write_text(content, encoding="utf-8")
