@@ -1,21 +1,24 @@
-"""Write the lists of detectors from the registry and the detectors' pages: python docs/make_detector_index.py
+"""Write the docs' lists of detectors and formats from the registry and the detectors' pages: python docs/make_lists.py
 
-docs/detectors/index.md is written as a whole; in README.md and docs/choosing.md the table between the two comments is.
-A page gives its row in its first lines: the heading is the title, the first paragraph says what the detector looks at,
-the second one says "Good at: ... Weak at: ... Use it: ...".
+docs/detectors/index.md is written as a whole; in README.md, docs/choosing.md and docs/containers.md the table between
+the two comments is. A detector's page gives its rows in its first lines: the heading is the title, the first paragraph
+says what the detector looks at, the second one says "Good at: ... Weak at: ... Use it: ...". A format's row is made of
+its class: its suffixes and the first words of its docstring, and of the extra of its name in pyproject.toml.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.detectors import DETECTORS
+from cdtool.formats import FORMATS
 
 DOCS = Path(__file__).resolve().parent
-_BEGIN, _END = "<!-- made by docs/make_detector_index.py -->\n", "<!-- end -->\n"
+_BEGIN, _END = "<!-- made by docs/make_lists.py -->\n", "<!-- end -->\n"
 _MODEL = "the machine file must give the inertia"
 _INDEX = """# The detectors
 
@@ -26,6 +29,7 @@ Each page gives the equation, the signal and its unit, the gains with their defa
 |---|---|---|---|
 """
 _README = "| detector | short | needs | good at | weak at |\n|---|---|---|---|---|\n"
+_CONTAINERS = "| format | what it reads | suffixes | `pip install` |\n|---|---|---|---|\n"
 _CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
 
 
@@ -47,11 +51,12 @@ class Row:
 def files() -> Mapping[Path, str]:
     """Return the files with their contents as they should be."""
     rows = [_row(name) for name in DETECTORS.names()]
-    readme, choosing = DOCS.parent / "README.md", DOCS / "choosing.md"
+    readme, choosing, containers = DOCS.parent / "README.md", DOCS / "choosing.md", DOCS / "containers.md"
     return {
         DOCS / "detectors" / "index.md": _INDEX + "".join(map(_index_line, rows)),
-        readme: _with_table(readme, _README, rows, _readme_line),
-        choosing: _with_table(choosing, _CHOOSING, rows, _choosing_line),
+        readme: _with_table(readme, _README, map(_readme_line, rows)),
+        choosing: _with_table(choosing, _CHOOSING, map(_choosing_line, rows)),
+        containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
     }
 
 
@@ -83,6 +88,14 @@ def _choosing_line(row: Row) -> str:
     return _line(f"[{row.title}](detectors/{row.page})", f"`{row.short_name}`", needs, row.use_it)
 
 
+def _format_line(name: str) -> str:
+    found = FORMATS.load(name)
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    install = f"`'cdtool[{name}]'`" if name in project["optional-dependencies"] else "-"
+    summary = found.__doc__.strip().partition("\n")[0].partition(": ")[0].rstrip(".")
+    return _line(f"`{name}`", summary, f"`{' '.join(found.suffixes)}`", install)
+
+
 def _words(names: tuple[str, ...]) -> str:
     return ", ".join(name.replace("_", " ") for name in names)
 
@@ -91,12 +104,12 @@ def _line(*cells: str) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def _with_table(file: Path, head: str, rows: list[Row], line: Callable[[Row], str]) -> str:
+def _with_table(file: Path, head: str, lines: Iterable[str]) -> str:
     before, begin, rest = file.read_text(encoding="utf-8").partition(_BEGIN)
     _, end, after = rest.partition(_END)
     if not (begin and end):
-        raise ValueError(f"{file.name}: the comments around the table of detectors are missing")
-    return f"{before}{begin}\n{head}{''.join(map(line, rows))}\n{end}{after}"
+        raise ValueError(f"{file.name}: the comments around its table are missing")
+    return f"{before}{begin}\n{head}{''.join(lines)}\n{end}{after}"
 
 
 if __name__ == "__main__":
