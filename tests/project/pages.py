@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -29,3 +32,12 @@ def machine_files(page: Path = DOCS / "machine-file.md") -> Iterator[tuple[str, 
     for text in toml_blocks(page):
         if "[machine]" in text:
             yield tomllib.loads(text)["machine"]["type"], text
+
+
+def docs_script(name: str) -> ModuleType:
+    """A script of docs/ as a module; docs is no package."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    assert spec and spec.loader
+    sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
