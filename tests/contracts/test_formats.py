@@ -1,4 +1,4 @@
-"""What holds for every registered format, machine and plug-in."""
+"""What holds for every registered format, those of installed plug-ins included, and for unknown names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REGISTRIES = (FORMATS, MACHINES, DETECTORS)
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-@pytest.mark.parametrize("name", FORMATS.names())
+@pytest.mark.parametrize("name", FORMATS.names(plugins=True))
 def test_a_format_knows_its_suffixes_and_refuses_what_is_of_another(name, tmp_path):
     found = FORMATS.load(name)()
     assert found.name == name and all(suffix.startswith(".") for suffix in found.suffixes)
@@ -31,7 +31,7 @@ def test_a_format_knows_its_suffixes_and_refuses_what_is_of_another(name, tmp_pa
             found.columns(path)
 
 
-@pytest.mark.parametrize("name", FORMATS.names())
+@pytest.mark.parametrize("name", FORMATS.names(plugins=True))
 def test_a_format_whose_library_is_absent_says_how_to_install_it(name, tmp_path, monkeypatch):
     def absent(module: str) -> None:
         raise ImportError(module)

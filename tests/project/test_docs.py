@@ -28,7 +28,7 @@ from cdtool.units import UNITS
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.command import Outcome, cdtool
 from tests.data_folder import DATA, needs_data
-from tests.project.pages import DOCS, FENCE, PAGES, ROOT, machine_files, name_of, toml_blocks
+from tests.project.pages import DOCS, FENCE, PAGES, ROOT, check_detector_page, machine_files, name_of, toml_blocks
 
 # Pages that would be incomplete without commands or examples, and how many they show at least.
 COMMANDS = {
@@ -318,14 +318,7 @@ def test_every_detector_has_a_page_whose_table_names_each_gain_with_default_and_
     assert len(detectors) >= len(DETECTORS.table)
     for detector in detectors:
         text = (DOCS / "detectors" / f"{detector['name'].replace('_', '-')}.md").read_text(encoding="utf-8")
-        assert f"`{detector['name']}`" in text and f"`{detector['short_name']}`" in text
-        for channel in detector["needs"]:
-            assert re.search(rf"Needs:[^.]*`{channel}`", text), (detector["name"], channel)
-        for part in ("## Equation", "## Signal", "## Gains", "## Start-up and not applicable", "## When it fails"):
-            assert part in text, (detector["name"], part)
-        rows = [[cell.strip() for cell in line.split("|")[1:4]] for line in text.splitlines() if line.startswith("| `")]
-        stated = {row[0].strip("`"): (float(row[1]), row[2]) for row in rows}
-        assert stated == {gain["name"]: (gain["default"], gain["unit"]) for gain in detector["gains"]}, detector["name"]
+        check_detector_page(detector, text)
 
 
 def named_in(page: str) -> set[str]:
