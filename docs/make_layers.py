@@ -7,7 +7,6 @@ Imports for the type checker and inside functions count; names in the tables of 
 
 from __future__ import annotations
 
-import ast
 import re
 import tomllib
 from collections.abc import Iterator
@@ -18,6 +17,10 @@ DOCS = Path(__file__).resolve().parent
 PACKAGE = DOCS.parent / "cdtool"
 FILE = DOCS / "images" / "layers.svg"
 FOUNDATION = "foundation"
+# By the text: to parse every file takes seconds.
+_IMPORT = re.compile(
+    r"^[ \t]*(?:(?:from|import) cdtool\.(?P<module>\w+)|from cdtool import (?P<names>[^()\n]+|\([^)]+\)))", re.MULTILINE
+)
 _CELL, _LEFT, _TOP, _MARGIN = 24, 136, 118, 48
 _INK, _SHADES, _DIAGONAL, _GRID = "#222222", ("#e3eaf2", "#f6f8fa"), "#b8c4d0", "#ffffff"
 
@@ -35,13 +38,18 @@ class Layers:
         return tuple(room for layer in self.layers for room in layer)
 
 
-def read_layers() -> Layers:
-    """Return the contract's layers with the imports of the code; raises ValueError for a module without a layer."""
+def read_contract() -> list[tuple[str, ...]]:
+    """Return the modules of each layer of the import contract, from the top down."""
     config = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))
     contract = next(item for item in config["tool"]["importlinter"]["contracts"] if item["containers"] == ["cdtool"])
-    named = [tuple(re.split(r"\s*[|:]\s*", layer)) for layer in contract["layers"]]
-    layers = (*named[:-1], (FOUNDATION,))
-    room_of = {name: name for layer in named[:-1] for name in layer} | dict.fromkeys(named[-1], FOUNDATION)
+    return [tuple(re.split(r"\s*[|:]\s*", layer)) for layer in contract["layers"]]
+
+
+def read_layers() -> Layers:
+    """Return the contract's layers with the imports of the code; raises ValueError for a module without a layer."""
+    *above, lowest = read_contract()
+    room_of = {name: name for layer in above for name in layer} | dict.fromkeys(lowest, FOUNDATION)
+    layers = (*above, (FOUNDATION,))
     imports: dict[str, set[str]] = {room: set() for layer in layers for room in layer}
     for file in sorted(PACKAGE.rglob("*.py")):
         name = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
@@ -55,13 +63,8 @@ def read_layers() -> Layers:
 
 def _imported(file: Path) -> Iterator[str]:
     """The first name below `cdtool` of everything that a file imports."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module == "cdtool":
-            yield from (item.name for item in node.names)
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cdtool."):
-            yield str(node.module).split(".")[1]
-        elif isinstance(node, ast.Import):
-            yield from (item.name.split(".")[1] for item in node.names if item.name.startswith("cdtool."))
+    for found in _IMPORT.finditer(file.read_text(encoding="utf-8")):
+        yield from [found["module"]] if found["module"] else re.findall(r"\w+", found["names"])
 
 
 def svg(layers: Layers) -> str:

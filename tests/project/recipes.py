@@ -50,6 +50,12 @@ def read_recipes() -> list[Recipe]:
     return [read_recipe(page) for page in sorted(FOLDER.glob("*.md")) if page.name != "index.md"]
 
 
+def registry_of(recipe: Recipe) -> Registry:
+    """The registry that the recipe extends: the only one of its package."""
+    (registry,) = (item for item in vars(import_module(recipe.package)).values() if isinstance(item, Registry))
+    return registry
+
+
 def write_files(recipe: Recipe, folder: Path) -> None:
     """Write the files of a recipe below a folder."""
     for path, text in recipe.files.items():
@@ -59,10 +65,9 @@ def write_files(recipe: Recipe, folder: Path) -> None:
 
 def install(recipe: Recipe, folder: Path, patch: pytest.MonkeyPatch) -> None:
     """Make the recipe's module one of its package, written below `folder`, and add its line to the table."""
-    package = import_module(recipe.package)
+    package, registry = import_module(recipe.package), registry_of(recipe)
     below = str(folder / recipe.package.replace(".", "/"))
     patch.setattr(package, "__path__", [*package.__path__, below])
-    (registry,) = {id(item): item for item in vars(package).values() if isinstance(item, Registry)}.values()
     short, target = recipe.entry if isinstance(recipe.entry, tuple) else ("", recipe.entry)
     patch.setitem(registry.table, recipe.name, target)
     if short:

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.cli.list_known import _KINDS
 from tests.command import cdtool
 from tests.project.pages import DOCS, ROOT, check_detector_page, docs_script, name_of
-from tests.project.recipes import Recipe, install, read_recipes, write_files
+from tests.project.recipes import Recipe, install, read_recipes, registry_of, write_files
 
 RECIPES = read_recipes()
 
@@ -36,10 +37,8 @@ def installed(folder, monkeypatch) -> None:
         monkeypatch.delitem(sys.modules, module, raising=False)
 
 
-def test_there_is_a_recipe_for_each_kind_of_class_that_has_a_name():
-    rooms = {recipe.package for recipe in RECIPES}
-    tables = [path for path in (ROOT / "cdtool").rglob("__init__.py") if "= Registry(" in path.read_text("utf-8")]
-    assert rooms == {".".join(path.parent.relative_to(ROOT).parts) for path in tables}
+def test_there_is_a_recipe_for_each_kind_of_class_that_cdtool_lists():
+    assert sorted(f"{registry_of(recipe).kind}s" for recipe in RECIPES) == sorted(_KINDS)
 
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.page.stem)
