@@ -21,7 +21,7 @@ _PATH = re.compile(r"`((?:cdtool|tests|docs|benchmarks|sample_logs|\.ci)/[\w./-]
 
 
 def resolve(dotted: str) -> Any:
-    """The module, class or function of a dotted name; raises AttributeError where there is none."""
+    """The module, class or function of a dotted name; raises AttributeError for an unknown name."""
     parts = dotted.split(".")
     for length in range(len(parts), 0, -1):
         try:
