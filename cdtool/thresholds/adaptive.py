@@ -14,8 +14,8 @@ from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.recording import FloatArray, Recording, Series
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
+from cdtool.thresholds.sections import sections
 from cdtool.thresholds.settings import check_above, check_sides
-from cdtool.thresholds.stretches import sections
 
 # Never a measured torque: the controller's response to a contact would raise the limit.
 _INPUTS = ("reference_speed", "reference_torque")

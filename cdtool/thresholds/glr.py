@@ -12,10 +12,10 @@ from cdtool.detection import Signal
 from cdtool.errors import UsageError
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.innovation import check_order
+from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.stretches import filtered, section_bounds
 
 
 @dataclass(frozen=True)

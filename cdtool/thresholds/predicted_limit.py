@@ -13,9 +13,9 @@ from cdtool.detection import Signal
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
-from cdtool.thresholds.stretches import filtered
 
 # What is left of the first samples' weight when the prediction is trusted.
 _SETTLED = 0.01

@@ -9,9 +9,9 @@ from typing import ClassVar
 from cdtool.detection import Signal
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.first_order import filtered_slope
+from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_above, check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
-from cdtool.thresholds.stretches import filtered
 
 # Time constants until a first-order filter has settled to 5 %.
 SETTLE = 3.0

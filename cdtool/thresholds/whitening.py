@@ -19,9 +19,9 @@ from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.sections import filtered, section_bounds, sections
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
-from cdtool.thresholds.stretches import filtered, section_bounds, sections
 
 # A cumulative statistic is kept over this many missing samples, or this long [s]: the evidence of a growing contact
 # continues after a gap and does not restart.
