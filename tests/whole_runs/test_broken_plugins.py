@@ -161,8 +161,8 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
     ("old", "new", "words"),
     [
         ("torque = recording", "1 / 0; torque = recording", "fails: ZeroDivisionError"),
-        ("return Signal(", "return (", "gives tuple, no Signal"),
-        ("torque.time, values", "torque.time, values.tolist()", "no array"),
+        ("return Signal(", "return (", "returns tuple, not a Signal"),
+        ("torque.time, values", "torque.time, values.tolist()", "are not arrays"),
         ("torque.values.copy()", "torque.values[:, 0].copy()", "samples by joints"),
         ("torque.values.copy()", "np.hstack((torque.values, torque.values))", "samples by joints"),
         ("torque.time, values", "torque.time[1:], values", "samples by joints"),
