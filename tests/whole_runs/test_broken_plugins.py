@@ -168,7 +168,7 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
         ("torque.time, values", "torque.time[1:], values", "samples by joints"),
         ("dtype=np.uint8", "dtype=int", "float64 and uint8 are needed"),
         ("torque.time, values", "torque.time[::-1], values", "times that do not strictly increase"),
-        ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "not finite and yet valid"),
+        ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "valid but not finite"),
     ],
 )
 def test_a_signal_that_breaks_the_contract_is_one_line(install, old, new, words):
