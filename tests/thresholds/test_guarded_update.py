@@ -102,7 +102,7 @@ def test_a_limit_that_would_leave_the_reserve_is_refused_with_its_place():
         except SignatureError as fault:
             refused = str(fault)
     assert "at 0.3" in refused or "at 0.4" in refused
-    assert f"spreads from the one first learned, {RESERVE:g} are allowed (inspect the machine there" in refused
+    assert f"spreads from the one first learned; at most {RESERVE:g} allowed (inspect the machine there" in refused
 
 
 def test_while_accelerating_the_place_is_a_time():

@@ -254,10 +254,10 @@ def test_the_threshold_that_the_others_are_made_from_is_fine(install, tmp_path):
     ("old", "new", "words"),
     [
         ("return Fitted(", "return 1 / 0, (", "threshold odd fails: ZeroDivisionError"),
-        ("return Fitted(", "return FittedLimit(", "threshold odd makes FittedLimit, its `fitted` names Fitted"),
+        ("return Fitted(", "return FittedLimit(", "threshold odd returns FittedLimit, its `fitted` names Fitted"),
         ("return statistic, band", "return 1 / 0", "threshold Fitted fails: ZeroDivisionError"),
         ("return statistic, band", "return statistic, Band(band.lower[1:], band.upper)", "another shape"),
-        ("return statistic, band", "return statistic, Band(band.lower, band.upper + np.nan)", "gives NaN where it"),
+        ("return statistic, band", "return statistic, Band(band.lower, band.upper + np.nan)", "returns NaN where its"),
     ],
 )
 def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old, new, words):
