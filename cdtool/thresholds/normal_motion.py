@@ -100,7 +100,7 @@ class NormalMotion:
         return _progress(recording, clock, self.motion)
 
     def with_run(self, recording: Recording, cap: float, forget: float | None = None) -> NormalMotion:
-        """Return the curves with one more impact-free run, by Welford's update or forgetting, clipped as in a signature."""
+        """Return the curves with one more impact-free run, updated and clipped like a signature."""
         channels = dict(self.channels)
         for name, normal in self.channels.items():
             if name not in recording or recording[name].unit != normal.unit:
@@ -345,7 +345,7 @@ class NormalCurves:
         return replace(self, by_time=one(self.by_time, where.elapsed), by_travel=by_travel)
 
     def distances(self, values: FloatArray, where: Progress) -> tuple[FloatArray, FloatArray]:
-        """Return the largest distance of a run from the mean for 3 samples (J,) [spreads]: while accelerating, and after."""
+        """Return how far a run is from the mean for 3 samples (J,) [spreads]: while accelerating, and after it."""
         mean, spread = self._looked_up(where)
         with np.errstate(invalid="ignore", divide="ignore"):
             off = np.abs(values - mean) / spread
