@@ -49,7 +49,7 @@ def compare(
     >>> results = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml").evaluated.results
     >>> comparison = cdtool.compare(results, results)
     >>> comparison.verdict, len(comparison.rows)
-    ('inconclusive', 3)
+    ('no change shown', 3)
     """
     return compare_builds(_results(old), _results(new), significance, relevant_change)
 

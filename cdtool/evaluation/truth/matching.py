@@ -172,7 +172,7 @@ def unknown_onset(contact: Contact) -> str:
 
 
 def one_an_event(times: Sequence[float], rearm: float) -> list[int]:
-    """Return which alarms count if several joints raise one: those later than `rearm` [s] after the last that counts."""
+    """Return which alarms count if several joints raise one: those later than `rearm` [s] after the last one."""
     counted: list[int] = []
     for i in sorted(range(len(times)), key=lambda i: times[i]):
         if not counted or times[i] - times[counted[-1]] > rearm:
