@@ -59,7 +59,7 @@ class TreeLink:
 class KinematicTree:
     """Joints with parents before children, links, `order` of the columns by name, gravity in the base's axes [m/s2].
 
-    Raises ConfigurationError where `order` does not name every joint once, or a child comes before its parent.
+    Raises ConfigurationError if `order` does not name every joint once, or a child comes before its parent.
     """
 
     joints: tuple[TreeJoint, ...]
@@ -100,7 +100,7 @@ class KinematicTree:
         return kinetic, potential
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
-        """M(q) x for one vector x a sample, (n, J); M is not formed. Raises UsageError where shapes do not fit."""
+        """Return M(q) x (n, J) for a vector x per sample; M is not formed. Raises UsageError where shapes do not fit."""
         return self.momentum_terms(position, vector)[0]
 
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
@@ -127,7 +127,7 @@ class KinematicTree:
         """J_c (n, 6, J): linear, then angular velocity of a point of a link for each joint's speed, base axes (2.2).
 
         `point` is fixed to the link and given in its frame [m]. A contact force and torque F_c load the joints with
-        tau_c = J_c^T F_c (2.5). Raises ConfigurationError for a link that is not there, UsageError where shapes do not
+        tau_c = J_c^T F_c (2.5). Raises ConfigurationError for an unknown link, UsageError if shapes do not
         fit.
         """
         position = self._table("position", position)
@@ -149,7 +149,7 @@ class KinematicTree:
 
     @cached_property
     def _bodies(self) -> FloatArray:
-        """The kernels' constants, one row a joint."""
+        """Return the kernels' constants, one row per joint."""
         moved = [joint.mass for joint in self.joints]
         for index in range(len(moved) - 1, -1, -1):
             if self.joints[index].parent >= 0:

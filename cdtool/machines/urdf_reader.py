@@ -1,7 +1,7 @@
 """URDF -> KinematicTree. pinocchio reads it (extra cdtool[urdf]): kinematics and inertias, never meshes.
 
 Conventions: each joint's frame is turned so that its axis is z; link frames keep the URDF's axes. Locked joints become
-fixed ones. What is wrong in a file is a ConfigurationError on one line that names file, joint or link.
+fixed ones. An error in a file is a ConfigurationError on one line that names file, joint or link.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ def read_urdf(
     """The tree of the moving joints of a URDF, columns in the order of `joints`.
 
     Every revolute, continuous or prismatic joint is either in `joints` or frozen at a value of `locked` [rad or m]; one
-    that mimics another counts as a joint of its own. `drive_inertia` [kg m2 or kg], on the load side, one a joint of
+    that mimics another counts as a joint of its own. `drive_inertia` [kg m2 or kg], on the load side, one for each of
     `joints`, () for none. `gravity` [m/s2] is in the axes of the root link. Raises ConfigurationError.
     """
     _check_urdf(path, joints, locked)
     if drive_inertia and len(drive_inertia) != len(joints):
-        raise ConfigurationError(f"{len(drive_inertia)} values of drive_inertia, {len(joints)} joints", "one a joint")
+        raise ConfigurationError(f"{len(drive_inertia)} values of drive_inertia, {len(joints)} joints", "one per joint")
     drives = dict(zip(joints, drive_inertia or (0.0,) * len(joints), strict=True))
     pinocchio = _pinocchio(path)
     model = _reduced(pinocchio, _build(pinocchio, path), locked)

@@ -38,7 +38,7 @@ class UrdfRobot(CoupledMachine):
 
     @classmethod
     def from_table(cls, table: Table) -> UrdfRobot:
-        """Build from the [machine] table and the URDF that it names; raises ConfigurationError naming key or joint."""
+        """Return the machine of the [machine] table and its URDF; raises ConfigurationError naming key or joint."""
         table.texts("joints")  # a robot's joints have to be named
         keys = cls.drive_keys(table)
         count = len(keys["joints"])

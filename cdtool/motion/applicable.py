@@ -1,7 +1,7 @@
-"""Which classes of motion judge a log, sample by sample, from its speed so far and nothing later.
+"""Which classes of motion assess a log, sample by sample, from its speed so far and nothing later.
 
-A class that fits judges. One whose speed departs goes on judging for a while, since a contact slows the axis and must
-not excuse itself. Motion that fits no class is not judged until a class fits again.
+A class that fits is assessed. One whose speed departs is assessed for a while longer, because a contact slows the axis
+and must not excuse itself. Motion that fits no class is not assessed until a class fits again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cdtool.motion.speed_course import fitting_samples
 from cdtool.motion.strokes import Stroke
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
-# A departure that begins while a class fits is judged by that class for so long [s]: the matching window.
+# How long a departure that begins while a class fits is assessed by that class [s]: the matching window.
 HOLD = 1.0
 # A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
 _COMPLETED = 0.05

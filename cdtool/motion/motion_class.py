@@ -25,8 +25,8 @@ _ONE_WAY = 0.2
 class MotionClass:
     """Direction of travel (+1, -1; 0 = no motion), nominal speed [load unit/s] and the joint that leads the motion.
 
-    `course`: speed along the stroke, learned from impact-free runs; None where nothing was learned. `unit`: that of the
-    speed, for messages; empty where it is not known.
+    `course`: speed along the stroke, learned from impact-free runs; None if nothing was learned. `unit`: that of the
+    speed, for messages; empty if it is unknown.
     """
 
     direction: int
