@@ -100,7 +100,7 @@ class KinematicTree:
         return kinetic, potential
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
-        """Return M(q) x (n, J) for a vector x per sample; M is not formed. Raises UsageError where shapes do not fit."""
+        """Return M(q) x (n, J) for a vector x per sample, without M; raises UsageError if shapes do not fit."""
         return self.momentum_terms(position, vector)[0]
 
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:

@@ -142,7 +142,7 @@ def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
     require_trial(trial)
     arm = wanted.parameters or ArmParameters()
     if arm.encoder_counts < 1:
-        raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more a revolution.")
+        raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more per revolution.")
 
     def simulate(group: str, number: int) -> ArmRun:
         rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
