@@ -46,7 +46,7 @@ def test_a_format_whose_library_is_absent_says_how_to_install_it(name, tmp_path,
 
 
 @pytest.mark.parametrize("name", FORMATS.names())
-def test_a_format_tells_whether_it_holds_topics(name):
+def test_a_format_declares_whether_it_has_topics(name):
     assert has_topics(FORMATS.load(name)()) == (name in ("mcap", "rosbag"))
 
 

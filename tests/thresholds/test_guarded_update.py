@@ -132,7 +132,7 @@ def test_a_limit_that_would_be_lost_amid_the_stroke_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [{"cap": 0.0}, {"reserve": -1.0}, {"cap": float("nan")}])
-def test_a_cap_or_reserve_that_is_no_number_above_0_is_refused(wrong):
+def test_a_cap_or_reserve_that_is_not_above_0_is_refused(wrong):
     with pytest.raises(UsageError, match="a number of spreads above 0"):
         guarded(FIRST, FIRST, CLEAN, signal(np.full(N, 100.0)), **wrong)
 
