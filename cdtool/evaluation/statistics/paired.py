@@ -27,7 +27,7 @@ MOST_ENUMERATED = 13
 
 @dataclass(frozen=True)
 class Difference:
-    """A mean difference in the unit of its values, and the chance of one as large if there is none.
+    """A mean difference in the unit of its values, and the chance of one as large without a true difference.
 
     Attributes
     ----------

@@ -57,7 +57,7 @@ def median_rank(n: int, level: float = 0.95) -> int:
     Returns
     -------
     int
-        The largest r with P(X_(r) <= median <= X_(n + 1 - r)) >= level; 0 if there is none.
+        The largest r with P(X_(r) <= median <= X_(n + 1 - r)) >= level; 0 without one.
 
     Notes
     -----

@@ -80,7 +80,7 @@ def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) 
     Returns
     -------
     dict of str to str or None
-        For each name its recording; None if there is none.
+        For each name its recording, or None.
 
     Raises
     ------

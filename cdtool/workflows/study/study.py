@@ -64,7 +64,7 @@ def study_sensors(
 
     Notes
     -----
-    Thesis figure 4.10, computed by simulating the impact (4.21 to 4.24 in the corrected form, docs/errata.md).
+    Thesis figure 4.10, computed by simulating the impact: 4.20, or 4.21 and 4.23 corrected (docs/errata.md).
 
     Examples
     --------
