@@ -65,7 +65,7 @@ class ImpactCase:
 
 
 @dataclass(frozen=True)
-class Sight:
+class SensorResponse:
     """When a sensor responds to the impact [s], the contact force at that time [N], and what would help most.
 
     `peak_so_far` is the largest force up to that time [N]: on a load that has bounced off there may be no force then.
@@ -94,7 +94,7 @@ class Ranking:
 
     case: ImpactCase
     factor: float
-    sights: tuple[Sight, ...]
+    responses: tuple[SensorResponse, ...]
     time: FloatArray
     contact_force: FloatArray
     swing_duration: float
@@ -123,8 +123,8 @@ def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.
     motion = case.simulate()
     shown = deviations(case, motion)
     stronger = {cause: deviations(other, other.simulate()) for cause, other in _stronger_machines(case).items()}
-    sights = [_sight(sensor, factor, motion, shown, stronger) for sensor in sensors]
-    order = sorted(sights, key=lambda item: np.inf if item.time is None else item.time)
+    responses = [_response(sensor, factor, motion, shown, stronger) for sensor in sensors]
+    order = sorted(responses, key=lambda item: np.inf if item.time is None else item.time)
     rigid = rigidity(case.transmission, case.obstacle.stiffness)
     return Ranking(case, factor, tuple(order), motion.time, motion.force, _swing_duration(motion), rigid)
 
@@ -169,13 +169,13 @@ def _stronger_machines(case: ImpactCase) -> dict[tuple[str, str], ImpactCase]:
     return found
 
 
-def _sight(
+def _response(
     sensor: Sensor,
     factor: float,
     motion: Motion,
     shown: Mapping[str, tuple[FloatArray, FloatArray]],
     stronger: Mapping[tuple[str, str], Mapping[str, tuple[FloatArray, FloatArray]]],
-) -> Sight:
+) -> SensorResponse:
     time = sensor.time_to_see(*shown[sensor.quantity], factor)
     better = {
         ("noise", "half the noise"): sensor.half_the_noise(),
@@ -195,6 +195,6 @@ def _sight(
         peak = max(force, float(np.max(motion.force[motion.time <= time])))
     threshold = sensor.threshold(factor)
     if saving <= _WORTH * (window if time is None else time):
-        return Sight(sensor, threshold, time, force, peak, ITSELF, "", None)
+        return SensorResponse(sensor, threshold, time, force, peak, ITSELF, "", None)
     # Without a response the time saved by a remedy is unknown.
-    return Sight(sensor, threshold, time, force, peak, *cause, None if time is None else saving)
+    return SensorResponse(sensor, threshold, time, force, peak, *cause, None if time is None else saving)
