@@ -28,7 +28,7 @@ class PlanarArm(CoupledMachine):
 
     with M11 = J1 + m1 lG1^2 + m2 l1^2 + Ja1/n1^2, M22 = J2 + m2 lG2^2 + Ja2/n2^2, h = m2 l1 lG2, g1 = (m2 l1 + m1 lG1)
     g, g2 = m2 lG2 g and T_i = tau_mi / n_i. An inertial sensor on link i at `imu_position` measures the specific force
-    across the link: it becomes the link's angular acceleration, gravity and the elbow's acceleration taken off.
+    across the link: it becomes the link's angular acceleration after subtracting gravity and the elbow's acceleration.
     """
 
     link_mass: tuple[float, ...]
