@@ -83,10 +83,10 @@ def test_referring_to_the_load_side_gives_the_load_side_back(machine):
         np.testing.assert_allclose(referred[name].values, series.values, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("lacking", [(), ("speed",), ("position",), ("reference_position",)])
-def test_referring_to_the_load_side_is_causal(machine, lacking):
+@pytest.mark.parametrize("missing", [(), ("speed",), ("position",), ("reference_position",)])
+def test_referring_to_the_load_side_is_causal(machine, missing):
     raw = logged(machine)
-    raw = replace(raw, channels={name: series for name, series in raw.channels.items() if name not in lacking})
+    raw = replace(raw, channels={name: series for name, series in raw.channels.items() if name not in missing})
     whole = machine.referred_to_load(raw)
     for end in (0.0105, 0.61, 1.2345):
         part = machine.referred_to_load(raw.between(-np.inf, end))

@@ -20,18 +20,18 @@ from cdtool.plain_text import counted, first_of
 
 @dataclass(frozen=True)
 class NamedRow:
-    """One row: the recording that it is about, its cells by column, and file and line for messages."""
+    """One row: its recording, its cells by column, and file and line for messages."""
 
     where: str
     recording: str
     cells: Mapping[str, str]
 
     def text(self, name: str) -> str:
-        """A cell without the blanks around it; empty where the column is absent."""
+        """Return a cell without the blanks around it; empty if the column is missing."""
         return self.cells.get(name, "").strip()
 
     def seconds(self, name: str) -> float | None:
-        """A finite number, None where the cell is empty; raises ConfigurationError."""
+        """Return a finite number, None if the cell is empty; raises ConfigurationError."""
         text = self.text(name)
         if not text:
             return None
@@ -44,12 +44,12 @@ class NamedRow:
         return value
 
     def fault(self, problem: str, hint: str) -> ConfigurationError:
-        """An error about this row."""
+        """Return an error about this row."""
         return ConfigurationError(f"{self.where}: {problem}", hint)
 
 
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
-    """The rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
+    """Return the rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
     content = read_bytes(path, ConfigurationError)
     try:
         text = content.decode("utf-8-sig")
@@ -66,9 +66,31 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
 
 
 def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:
-    """Which of the recordings each name of a file means, None for none of them.
+    """Return which recording each name of a file means.
 
-    Raises ConfigurationError where a file's name alone fits several.
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    names : iterable of str
+        Names in the file: paths relative to the benchmark file, or only file names.
+    recordings : collection of str
+        Paths of the recordings, relative to the benchmark file.
+
+    Returns
+    -------
+    dict of str to str or None
+        For each name its recording, or None.
+
+    Raises
+    ------
+    ConfigurationError
+        A file name fits several recordings.
+
+    Examples
+    --------
+    >>> by_recording(Path("triggers.csv"), ["01.csv", "stiff/02.csv", "09.csv"], {"soft/01.csv", "stiff/02.csv"})
+    {'01.csv': 'soft/01.csv', 'stiff/02.csv': 'stiff/02.csv', '09.csv': None}
     """
     found: dict[str, str | None] = {}
     for name in names:

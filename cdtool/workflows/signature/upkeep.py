@@ -95,8 +95,20 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
 class SeasonOptions:
     """Impact-free logs of a machine, and how they are read.
 
-    `operations`: how logs are cut; as for learning where None. A run in which the load cell shows a contact by the
-    `onset` rule is left out.
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        Impact-free logs in order of time; those that the signature was learned from are recognised by content.
+    machine : str, Path or MachineFile
+        The machine file.
+    operations : str, optional
+        How the logs are cut into operations; only the way used for learning is possible, and it is the default.
+    onset : OnsetRule, optional
+        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    jobs : int, optional
+        Number of logs read at a time.
+    progress : callable, optional
+        Called after each log with the number done and the total.
     """
 
     logs: Sequence[str | Path]
@@ -120,17 +132,29 @@ class SeasonOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions(SeasonOptions):
-    """`target`: the chance of a false alarm in an operation that the runs have to show."""
+    """How a signature is checked.
+
+    Parameters
+    ----------
+    target : float, optional
+        The chance of a false alarm per operation that the runs have to show.
+    """
 
     target: float = TARGET
 
 
 @dataclass(frozen=True, kw_only=True)
 class UpdateOptions(SeasonOptions):
-    """`forget`: effective number of runs; None: all count alike.
+    """How runs are added to a signature.
 
-    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
-    was first learned.
+    Parameters
+    ----------
+    forget : float, optional
+        Effective number of runs, above 1: older runs are forgotten. By default all runs count equally.
+    cap : float, optional
+        The deviation of a run counts up to this many spreads.
+    reserve : float, optional
+        No run may move a limit further than this many spreads from where it was first learned.
     """
 
     forget: float | None = None
@@ -139,12 +163,40 @@ class UpdateOptions(SeasonOptions):
 
 
 def check_by(path: str | Path, options: CheckOptions) -> Checked:
-    """Hold a signature against impact-free logs: those that it was learned from, and those of a season since.
+    """Check a signature against impact-free logs: do its runs suffice, and has the machine drifted since?
 
-    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is what
-    they have to show. In the second, taken in the order given, drift is looked for. Which log is which is known by its
-    bytes. The options are those of `CheckOptions` and `SeasonOptions`. Raises SignatureError where the file does not
-    belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
+    Parameters
+    ----------
+    path : str or Path
+        The signature file.
+    options : CheckOptions
+        The logs, the machine and the target.
+
+    Returns
+    -------
+    Checked
+        For each class of motion the coverage (each run learned from is assessed by a signature of the others), the
+        drift in the other logs, and advice.
+
+    Raises
+    ------
+    SignatureError
+        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+    UsageError
+        The target is not a chance.
+    CdtoolError
+        No log can be read.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from cdtool.signature_store import write_signature
+    >>> from pathlib import Path
+    >>> free, machine = sorted(Path("sample_logs/gate/free").iterdir()), "sample_logs/gate/machine.toml"
+    >>> write_signature("gate.gm.json", cdtool.learn_signature(free, machine, "momentum").signature)
+    >>> coverage = cdtool.check_signature("gate.gm.json", free, machine).classes[0].coverage
+    >>> len(coverage.runs), coverage.alarms, coverage.enough
+    (10, 0, True)
     """
     target = options.target
     if not LEAST_TARGET <= target < 1.0:
@@ -208,11 +260,42 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
 
 
 def update_by(path: str | Path, options: UpdateOptions) -> Updated:
-    """Add impact-free runs to a signature file, by Welford or by forgetting.
+    """Add impact-free runs to a signature file.
 
-    Refused are a run that brings a limit too far, one with an alarm, one in which the load cell shows a contact, one
-    that is in the signature already, one that ends early, and one that cannot be assessed. The options are those of
-    `UpdateOptions` and `SeasonOptions`. Raises SignatureError where the file does not belong.
+    Parameters
+    ----------
+    path : str or Path
+        The signature file; it is replaced.
+    options : UpdateOptions
+        The logs, the machine and how the runs count.
+
+    Returns
+    -------
+    Updated
+        The new content, the runs added, and those refused with the reason: a run that moves a limit too far, has an
+        alarm or a contact, is already in the signature, ends early or is not assessable.
+
+    Raises
+    ------
+    SignatureError
+        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+    UsageError
+        A setting is outside its range.
+
+    Notes
+    -----
+    Mean and variance are updated by Welford's recursion, or with `forget` by exponential forgetting.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from cdtool.signature_store import write_signature
+    >>> from pathlib import Path
+    >>> free, machine = sorted(Path("sample_logs/gate/free").iterdir()), "sample_logs/gate/machine.toml"
+    >>> write_signature("season.json", cdtool.learn_signature(free, machine, "momentum").signature)
+    >>> updated = cdtool.update_signature("season.json", ["sample_logs/gate/holdout/03.csv", free[0]], machine)
+    >>> len(updated.added), [skipped.reason for skipped in updated.refused]
+    (1, ['this run is in the signature already'])
     """
     forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
