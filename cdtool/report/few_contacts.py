@@ -11,7 +11,7 @@ from typing import Final, Literal
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
-from cdtool.report.figure_text import NOTHING, number, with_interval
+from cdtool.report.number_text import NOTHING, number, with_interval
 
 LatencyColumn = Literal["mean", "std", "median", "range", "P95"]
 

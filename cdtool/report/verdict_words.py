@@ -5,7 +5,7 @@ from __future__ import annotations
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import LimitResult
 from cdtool.plain_text import counted
-from cdtool.report.figure_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING
+from cdtool.report.number_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
 

@@ -20,8 +20,8 @@ from cdtool.evaluation.results import (
     Skipped,
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
+from cdtool.report.cases import to_junit
 from cdtool.report.html.page import to_html
-from cdtool.report.junit import to_junit
 from cdtool.report.markdown.markdown import to_markdown
 from tests.command import cdtool
 from tests.evaluation.judged_results import GATE, results

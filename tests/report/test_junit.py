@@ -11,7 +11,7 @@ import pytest
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule, not_met
 from cdtool.evaluation.results import LimitResult, Results, Skipped
-from cdtool.report.junit import to_junit
+from cdtool.report.cases import to_junit
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.named_results import named

@@ -12,8 +12,8 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ForceResult, ForceStepResult
 from cdtool.evaluation.traces.file import encode_traces, read_traces
+from cdtool.report.cases import to_junit
 from cdtool.report.contacts_csv import contacts_csv
-from cdtool.report.junit import to_junit
 from cdtool.report.markdown.markdown import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug

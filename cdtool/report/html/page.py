@@ -19,11 +19,12 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
-from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.html.plots import plot_data
-from cdtool.report.html.recordings import not_judged_table, reasons_table, recordings_table, traces_of
-from cdtool.report.html.table import Table, seen
-from cdtool.report.html.tables import (
+from cdtool.report.html.traces import plot_height, trace_data
+from cdtool.report.number_text import NOTHING, number
+from cdtool.report.table import Table, seen
+from cdtool.report.tables.recordings import not_judged_table, reasons_table, recordings_table, traces_of
+from cdtool.report.tables.results import (
     calibration_table,
     comparisons_table,
     force_counts,
@@ -33,7 +34,6 @@ from cdtool.report.html.tables import (
     provenance_tables,
     summary_table,
 )
-from cdtool.report.html.traces import plot_height, trace_data
 from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, tone, verdict_words
 
 if TYPE_CHECKING:

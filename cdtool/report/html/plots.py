@@ -16,12 +16,12 @@ from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.report.few_contacts import draws_no_interval
-from cdtool.report.figure_text import number, spoken, with_interval
-from cdtool.report.html.recordings import Log, log_of, logs_of
-from cdtool.report.html.table import short, shown
-from cdtool.report.html.tables import part_of
 from cdtool.report.html.traces import HEIGHTS
+from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
+from cdtool.report.table import short, shown
+from cdtool.report.tables.recordings import Log, log_of, logs_of
+from cdtool.report.tables.results import part_of
 
 # Heights [px] of a detector's lane in the latency plot and of the other plots.
 LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300

@@ -15,7 +15,8 @@ from cdtool.evaluation.summary import Summary
 from cdtool.plain_text import counted
 from cdtool.report.comparison_words import TOO_FEW, without_finding
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_words
-from cdtool.report.figure_text import (
+from cdtool.report.markdown.text import Section, Table, escape
+from cdtool.report.number_text import (
     NOT_ASSESSABLE,
     NOTHING,
     missed,
@@ -24,7 +25,6 @@ from cdtool.report.figure_text import (
     spoken,
     with_interval,
 )
-from cdtool.report.markdown.text import Section, Table, escape
 from cdtool.report.verdict_words import allowed, value_of
 
 _COUNTS = ("n", "missed", "not assessable")

@@ -13,7 +13,6 @@ from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.results import ContactResult, LimitResult, Results, Skipped
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
-from cdtool.report.figure_text import NOTHING, number, percent
 from cdtool.report.markdown.figures import (
     comparison_section,
     force_sections,
@@ -26,6 +25,7 @@ from cdtool.report.markdown.figures import (
     time_budget,
 )
 from cdtool.report.markdown.text import Section, Table, escape, fitted
+from cdtool.report.number_text import NOTHING, number, percent
 from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, verdict_words
 from cdtool.report.writers.base import Image
 

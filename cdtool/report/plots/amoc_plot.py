@@ -17,7 +17,7 @@ from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
-from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from cdtool.errors import UsageError
 from cdtool.files import write_bytes
 from cdtool.plain_text import plain, shorten
-from cdtool.report.figure_text import number
+from cdtool.report.number_text import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

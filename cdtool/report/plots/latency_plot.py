@@ -15,7 +15,7 @@ from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped
-from cdtool.report.figure_text import NOTHING, with_interval
+from cdtool.report.number_text import NOTHING, with_interval
 from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.impact.sensor_ranking import Ranking, Sight
-from cdtool.report.figure_text import number
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 from cdtool.report.plots.style import FORCE
 

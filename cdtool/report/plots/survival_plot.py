@@ -12,7 +12,7 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
-from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable, key_height

@@ -20,6 +20,6 @@ class Junit(Writer):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.junit import to_junit
+        from cdtool.report.cases import to_junit
 
         write_text(target, to_junit(report.evaluated))

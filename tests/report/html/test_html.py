@@ -21,13 +21,13 @@ from cdtool.evaluation.results import ContactResult, RecordingResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.traces.file import NO_LIMIT
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import number, percent, with_interval
 from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import css_colour
-from cdtool.report.html.recordings import log_of
-from cdtool.report.html.tables import interval_cell
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
+from cdtool.report.number_text import number, percent, with_interval
 from cdtool.report.plots.style import BAND, LIMIT, UNJUDGED, look_of
+from cdtool.report.tables.recordings import log_of
+from cdtool.report.tables.results import interval_cell
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case, trace_of
 

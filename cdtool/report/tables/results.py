@@ -16,7 +16,7 @@ from cdtool.evaluation.summary import Summary
 from cdtool.plain_text import counted
 from cdtool.report.comparison_words import without_finding
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_figure, latency_words
-from cdtool.report.figure_text import (
+from cdtool.report.number_text import (
     NOT_ASSESSABLE,
     NOT_REACHED,
     NOTHING,
@@ -26,7 +26,7 @@ from cdtool.report.figure_text import (
     spoken,
     with_interval,
 )
-from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, nothing, shown
+from cdtool.report.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, nothing, shown
 from cdtool.report.verdict_words import allowed, value_of
 
 _TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.number_text import NOTHING, number
 
 # A browser lays out more rows than this only slowly.
 _MOST_ROWS_AT_ONCE = 150

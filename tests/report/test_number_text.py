@@ -7,7 +7,7 @@ import math
 import pytest
 
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.report.figure_text import missed, number, percent, rate, with_interval
+from cdtool.report.number_text import missed, number, percent, rate, with_interval
 
 NAN, INF = math.nan, math.inf
 

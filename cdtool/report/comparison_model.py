@@ -15,8 +15,8 @@ from cdtool.files import write_text
 from cdtool.foreign_files import Kind, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.report.few_contacts import EXPLAINED
-from cdtool.report.figure_text import NOTHING, number
 from cdtool.report.markdown.text import Table, escape
+from cdtool.report.number_text import NOTHING, number
 from cdtool.report.verdict_words import NO_CERTIFICATE
 from cdtool.strict_json import strict_json
 

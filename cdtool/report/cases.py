@@ -19,7 +19,7 @@ from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_out
 from cdtool.evaluation.results import ContactResult, LimitResult, Skipped
 from cdtool.evaluation.summary import later_ms
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import number, spoken
+from cdtool.report.number_text import number, spoken
 from cdtool.report.verdict_words import allowed, value_of
 
 _COUNTED = {"failures": "failure", "errors": "error", "skipped": "skipped"}

@@ -10,9 +10,9 @@ from cdtool.evaluation.results import ContactResult, RecordingResult, Results, S
 from cdtool.evaluation.summary import later_ms
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
-from cdtool.report.figure_text import NOTHING, number, percent
-from cdtool.report.html.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, shown
-from cdtool.report.html.tables import outcome_cell
+from cdtool.report.number_text import NOTHING, number, percent
+from cdtool.report.table import Cell, Column, Row, Table, count_cell, figure_cell, key_of, shown
+from cdtool.report.tables.results import outcome_cell
 
 # A log's group and name.
 Log = tuple[str, str]
