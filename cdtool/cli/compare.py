@@ -57,14 +57,15 @@ def compare(
     Example: cdtool compare old.json new.json -o compare.md
     """
     from cdtool.foreign_files import refuse_inputs
-    from cdtool.report.comparison_model import check_outputs, to_json, write_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.writers.comparison_json import to_json
     from cdtool.workflows.comparing import compare as run
 
     targets = output or []
     refuse_inputs(targets, (old, new))
-    check_outputs(targets, force=force)
+    check_outputs(targets, force=force, subject="comparison")
     found = run(old, new, significance=level, relevant_change=relevant_change)
-    write_outputs(found, targets)
+    write_outputs(found, targets, force=True, inputs=(old, new), subject="comparison")
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:

@@ -1,76 +1,81 @@
-"""The comparison of two builds as Markdown for a pull request, and as JSON."""
+"""What every report of a comparison of two builds shows, computed once as plain values: verdict, tables, notes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from cdtool.errors import UsageError
 from cdtool.evaluation.builds.comparison import BuildComparison
 from cdtool.evaluation.builds.questions import Figure
 from cdtool.evaluation.builds.rows import BuildRow
-from cdtool.files import write_text
-from cdtool.foreign_files import Kind, refuse_other_kind
-from cdtool.plain_text import plain
 from cdtool.report.few_contacts import EXPLAINED
-from cdtool.report.markdown.text import Table, escape
+from cdtool.report.model import NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number
-from cdtool.report.verdict_words import NO_CERTIFICATE
-from cdtool.strict_json import strict_json
+from cdtool.report.table import Cell, Column, Fields, Table, name_cell, tabulate
 
-_HEADS = (
-    *("group", "detector", "contacts", "latency ms", "missed", "not assessable", "false alarms", "force at alarm N"),
-    "found",
-)
-_RANGE = "range ms"
 _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
-    "Two figures are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
+    "Two values are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
     "fewer than ten contacts a median) and the force at the alarm a median, of the contacts that both detected; "
-    "changes are means of their pairs. *No change shown* is not *no change*: the change in brackets would have been "
-    "shown with 80 % power. A change has an interval from ten recordings or campaigns on."
+    "changes are means of their pairs. “No change shown” does not mean that there is no change: the change in brackets "
+    "would have been shown with 80 % power. A change has an interval from ten or more recordings or campaigns."
 )
 
 
-def to_markdown(comparison: BuildComparison) -> str:
-    """A table with a row a detector and group, the verdict above it, what differs below."""
-    parts = [
-        f"**cdtool compare: {escape(comparison.words)}**",
-        _rows_table(comparison.rows),
-        f"{_HOW_TO_READ} *Inconclusive*: these recordings could not have shown a change for the worse of "
-        f"{100.0 * comparison.relevant_change:g} %. {NO_CERTIFICATE}",
-    ]
-    if any(row.few for row in comparison.rows):
-        parts.append(EXPLAINED)
-    if comparison.changed:
-        rows = [tuple(escape(text) for text in (item.key, item.old, item.new)) for item in comparison.changed]
-        parts += ["Under test, and different:", _table(("setting", "old", "new"), rows)]
-    for which, names in (("old", comparison.only_old), ("new", comparison.only_new)):
-        if names:
-            parts.append(f"Only in {which}, not compared: {escape(', '.join(names))}.")
-    parts += [f"{escape(note)}." for note in comparison.notes]
-    return "\n\n".join(parts) + "\n"
+@dataclass(frozen=True)
+class ComparisonModel:
+    """The plain values of a comparison. Texts from files are unchanged: renderers escape them."""
+
+    verdict: str
+    results: Table
+    changed: Table
+    how_to_read: Sequence[str]
+    notes: Sequence[str]
 
 
-def to_json(comparison: BuildComparison) -> str:
-    """Strict JSON: null where there is no figure, or none that is finite."""
-    return strict_json(asdict(comparison)) + "\n"
+def comparison_model(comparison: BuildComparison) -> ComparisonModel:
+    """Return everything that the report of a comparison shows."""
+    inconclusive = (
+        "“Inconclusive”: these recordings could not have shown a change for the worse of "
+        f"{100.0 * comparison.relevant_change:g} %."
+    )
+    few = any(row.few for row in comparison.rows)
+    changed: Fields[tuple[str, str, str]] = (
+        (Column("setting"), lambda item: Cell(item[0])),
+        (Column("old"), lambda item: Cell(item[1])),
+        (Column("new"), lambda item: Cell(item[2])),
+    )
+    only = (("old", comparison.only_old), ("new", comparison.only_new))
+    return ComparisonModel(
+        verdict=comparison.words,
+        results=_results_table(comparison.rows, few),
+        changed=tabulate(
+            "changed",
+            "Under test, and different",
+            changed,
+            [(item.key, item.old, item.new) for item in comparison.changed],
+        ),
+        how_to_read=(f"{_HOW_TO_READ} {inconclusive} {NO_CERTIFICATE}", *([EXPLAINED] if few else [])),
+        notes=(
+            *(f"Only in {which}, not compared: {', '.join(names)}." for which, names in only if names),
+            *(f"{note}." for note in comparison.notes),
+        ),
+    )
 
 
 def both(row: BuildRow, figure: Figure, digits: int = 3) -> str:
-    """A figure of both builds as "old / new", a mean with so many digits; a dash where it is nowhere known."""
-    found = row.question(figure)
-    if found is None or (math.isnan(found.old) and math.isnan(found.new)):
+    """Return a value of both builds as "old / new", a mean with `digits` digits; a dash if neither is known."""
+    answer = row.question(figure)
+    if answer is None or (math.isnan(answer.old) and math.isnan(answer.new)):
         return NOTHING
     if figure in _MEANS:
-        return f"{number(found.old, digits)} / {number(found.new, digits)}"
-    return f"{found.old:.0f} / {found.new:.0f}"
+        return f"{number(answer.old, digits)} / {number(answer.new, digits)}"
+    return f"{answer.old:.0f} / {answer.new:.0f}"
 
 
 def ranges_of(row: BuildRow) -> str:
-    """The shortest and longest latency of both builds as "25.0 to 28.0 / 30.0 to 34.0"; empty from ten contacts on."""
+    """Return the ranges of latency of both builds as "25.0 to 28.0 / 30.0 to 34.0"; empty with ten or more contacts."""
     latency = row.question("latency_ms")
     if latency is None or latency.ranges is None:
         return ""
@@ -78,58 +83,25 @@ def ranges_of(row: BuildRow) -> str:
 
 
 def contacts_of(row: BuildRow) -> str:
-    """How many pairs; "old / new" where the contacts are others; a dash where there are none."""
+    """Return the number of pairs; "old / new" if the contacts are not the same; a dash without any contact."""
     if not row.old_contacts and not row.new_contacts:
         return NOTHING
     return str(row.pairs) if row.paired else f"{row.old_contacts} / {row.new_contacts}"
 
 
-_KINDS = {
-    ".md": Kind(b"**cdtool compare: ", "comparison of cdtool"),
-    ".json": Kind(b'{\n "verdict": "', "comparison of cdtool"),
-}
-_WRITERS: dict[str, Callable[[BuildComparison], str]] = {".md": to_markdown, ".json": to_json}
-
-
-def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
-    """Raise UsageError where a target's name does not say what to write, its folder is missing, or it is not ours."""
-    for target in targets:
-        if target.suffix.lower() not in _WRITERS:
-            raise UsageError(f"--output is '{plain(target)}'", f"a name that ends in {' or '.join(_WRITERS)}")
-        if not target.parent.is_dir():
-            raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
-        refuse_other_kind(target, _KINDS[target.suffix.lower()], force=force)
-
-
-def write_outputs(comparison: BuildComparison, targets: Sequence[Path]) -> None:
-    """Write every target by its suffix, whatever is there; raises CdtoolError where one cannot be written."""
-    check_outputs(targets, force=True)
-    for target in targets:
-        write_text(target, _WRITERS[target.suffix.lower()](comparison))
-
-
-def _cells(row: BuildRow) -> tuple[str, ...]:
-    return (
-        escape(row.group),
-        escape(row.detector),
-        contacts_of(row),
-        both(row, "latency_ms", 4),
-        both(row, "missed"),
-        both(row, "not_assessable"),
-        both(row, "false_alarms"),
-        both(row, "force_at_alarm_n", 4),
-        escape(row.words),
+def _results_table(rows: Sequence[BuildRow], few: bool) -> Table:
+    """Return a row per detector and group; `few`: with ranges of latency, as a row has too few contacts for a mean."""
+    ranges: Fields[BuildRow] = ((Column("range ms"), lambda row: Cell(ranges_of(row) or NOTHING)),)
+    fields: Fields[BuildRow] = (
+        (Column("group"), lambda row: name_cell(row.group)),
+        (Column("detector"), lambda row: name_cell(row.detector)),
+        (Column("contacts"), lambda row: Cell(contacts_of(row))),
+        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms", 4))),
+        *(ranges if few else ()),
+        (Column("missed"), lambda row: Cell(both(row, "missed"))),
+        (Column("not assessable"), lambda row: Cell(both(row, "not_assessable"))),
+        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n", 4))),
+        (Column("result"), lambda row: Cell(row.words)),
     )
-
-
-def _rows_table(rows: Sequence[BuildRow]) -> str:
-    """One row per detector and group; the ranges of latency where any row has too few contacts for a mean."""
-    few, at = any(row.few for row in rows), _HEADS.index("latency ms") + 1
-    heads = [*_HEADS[:at], *([_RANGE] if few else []), *_HEADS[at:]]
-    cells = [[*_cells(row)[:at], *([ranges_of(row) or NOTHING] if few else []), *_cells(row)[at:]] for row in rows]
-    return _table(heads, cells)
-
-
-def _table(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    table = Table(headings, rows)
-    return "\n".join([table.head, *table.lines])
+    return tabulate("results", "", fields, rows)

@@ -1,145 +1,159 @@
-"""A table of the HTML report: drawn by the template, or, where it is long, handed to the script to page through."""
+"""A table of a report as plain values, which every renderer shows: headings, cells with their sort keys, and marks."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
-from cdtool.plain_text import plain
-from cdtool.report.number_text import NOTHING, number
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.report.number_text import NOTHING, number, spoken, value_and_interval
 
-# A browser lays out more rows than this only slowly.
-_MOST_ROWS_AT_ONCE = 150
-# A name of a sensible log or detector is shorter.
-_LONGEST_WORD = 28
-# What is sorted after every figure.
+Item = TypeVar("Item")
+# A recording's group and name.
+Log = tuple[str, str]
+
+# Sorts after every number.
 _LAST = 1e300
+_TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
+_JOINTS = " ,;:"
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column; `numeric` ones are aligned to the right and begin with their largest figure when sorted.
+    """A column; `numeric` columns are right-aligned and begin with their largest number when sorted.
 
-    `choice`: readers may pick one of its values.
+    `choice`: readers may select one of its values. `below`: where width is scarce, it is shown in small print below the
+    column to its left.
     """
 
     heading: str
     numeric: bool = False
     choice: bool = False
+    below: bool = False
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in a cell: `text`, below it lines in small print; `key` sorts it, by default its text.
+    """The text of a cell, and `details` for small print, each with the punctuation that joins it to the text before it.
 
-    `tone` is good, bad or unknown, and shown by colour beside the word.
+    `key` sorts the cell, by default its text does. `tone` is good, bad or unknown.
     """
 
     text: str
-    rest: tuple[str, ...] = ()
+    details: tuple[str, ...] = ()
     key: float | None = None
     tone: str = ""
 
     @property
-    def lines(self) -> str:
-        """All of its text, plain, line by line."""
-        return "\n".join(seen(line) for line in (self.text, *self.rest))
+    def line(self) -> str:
+        """All of it in one line."""
+        return "".join((self.text, *self.details))
 
-    def classes(self, column: Column) -> str:
-        """What the style sheet has to know of it; long texts may be broken anywhere."""
-        number, long = "number" if column.numeric else "", "long" if len(self.text) > _LONGEST_WORD else ""
-        return " ".join(name for name in (number, self.tone, long) if name)
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The text, and the details without their punctuation."""
+        return (self.text, *(detail.lstrip(_JOINTS) for detail in self.details))
 
 
 Row = Sequence[Cell]
+Fields = Sequence[tuple[Column, Callable[[Item], Cell]]]
 
 
 @dataclass(frozen=True)
 class Table:
-    """`name` is its id in the page. `marks`: by a name that readers may pick, whether each row has it.
+    """A table under its title; `source` names its rows in results.json.
 
-    `opens`: for each row the numbers of the traces that it shows when clicked.
+    `marks`: by a property that readers may select, whether each row has it. `logs`: the recording of each row.
     """
 
     name: str
-    caption: str
+    title: str
     columns: Sequence[Column]
     rows: Sequence[Row]
-    marks: Mapping[str, Sequence[bool]] | None = None
-    opens: Sequence[Sequence[int]] | None = None
+    source: str = ""
+    marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
+    logs: Sequence[Log] = ()
 
-    @property
-    def paged(self) -> bool:
-        """Whether the script pages through it; without script all rows are there."""
-        return self.opens is not None or len(self.rows) > _MOST_ROWS_AT_ONCE
+    def cells(self, heading: str) -> list[Cell]:
+        """Return the cells below a heading."""
+        place = [column.heading for column in self.columns].index(heading)
+        return [row[place] for row in self.rows]
 
-    def values(self) -> dict[str, Any]:
-        """JSON values, column by column."""
-        return {
-            "name": self.name,
-            "caption": self.caption,
-            "columns": [_column_values(column, [row[i] for row in self.rows]) for i, column in enumerate(self.columns)],
-            "rows": len(self.rows),
-            "marks": {
-                name: [i for i, marked in enumerate(rows) if marked] for name, rows in (self.marks or {}).items()
-            },
-            "opens": {str(i): list(traces) for i, traces in enumerate(self.opens or ()) if traces},
-        }
+    def narrow(self) -> Table:
+        """Return the table with each `below` column in small print below the one to its left."""
+        columns: list[Column] = []
+        rows: list[list[Cell]] = [[] for _ in self.rows]
+        for place, column in enumerate(self.columns):
+            if column.below:
+                columns[-1] = replace(columns[-1], heading=f"{columns[-1].heading}, {column.heading}")
+                for made, row in zip(rows, self.rows, strict=True):
+                    made[-1] = _joined(made[-1], column.heading, row[place])
+            else:
+                columns.append(column)
+                for made, row in zip(rows, self.rows, strict=True):
+                    made.append(row[place])
+        return replace(self, columns=columns, rows=rows)
+
+
+def tabulate(
+    name: str, title: str, fields: Fields[Item], items: Sequence[Item], source: str = "", logs: Sequence[Log] = ()
+) -> Table:
+    """Return the table with a row per item and a column per field."""
+    rows = [[make(item) for _, make in fields] for item in items]
+    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs)
+
+
+def count_cell(count: int, tone: str = "") -> Cell:
+    """Return the cell of a count, with a tone unless it is zero."""
+    return Cell(str(count), key=count, tone=tone if count else "")
+
+
+def number_cell(value: float | None) -> Cell:
+    """Return the cell of a number without an interval."""
+    return Cell(number(value), key=key_of(value))
+
+
+def interval_cell(interval: Interval) -> Cell:
+    """Return the cell of a value with its interval; one without an upper end takes two lines of small print."""
+    value, *details = value_and_interval(interval)
+    return Cell(value, tuple(details), key_of(interval.value))
+
+
+def name_cell(name: object) -> Cell:
+    """Return the cell of a name from a file."""
+    return Cell(shown(name))
+
+
+def outcome_cell(outcome: str) -> Cell:
+    """Return the cell of an outcome or verdict in words, with its tone."""
+    return Cell(spoken(outcome), tone=tone_of(outcome))
+
+
+def empty_cell() -> Cell:
+    """Return the cell of a value that does not exist."""
+    return Cell(NOTHING, key=key_of(None))
 
 
 def key_of(value: float | None) -> float:
-    """What a figure is sorted by: one that is not reached after all others, none at all last."""
+    """Return what sorts a number: infinite ones follow all others, missing ones are last."""
     if value is None or math.isnan(value):
         return _LAST
     return max(min(value, 0.5 * _LAST), -0.5 * _LAST)
 
 
-def count_cell(count: int) -> Cell:
-    """A count."""
-    return Cell(str(count), key=count)
-
-
-def figure_cell(value: float | None) -> Cell:
-    """A figure without an interval."""
-    return Cell(number(value), key=key_of(value))
-
-
-def nothing() -> Cell:
-    """Where there is no figure."""
-    return Cell(NOTHING, key=key_of(None))
-
-
-def seen(text: str) -> str:
-    """The text, plain; at once where every character of it can be seen."""
-    return text if text.isprintable() else plain(text)
+def tone_of(outcome: str) -> str:
+    """Return whether an outcome or verdict is good, bad or unknown."""
+    return _TONES.get(outcome, "")
 
 
 def shown(name: object) -> str:
-    """A name from a file as text that can be seen."""
-    return seen(str(name)) or "(no name)"
+    """Return a name from a file as a text that is never empty."""
+    return str(name) or "(no name)"
 
 
-def _column_values(column: Column, cells: Sequence[Cell]) -> dict[str, Any]:
-    """Texts that come again and again are stored once."""
-    texts: dict[str, int] = {}
-    at = [texts.setdefault(cell.lines, len(texts)) for cell in cells]
-    tones = [cell.tone for cell in cells]
-    return {
-        "heading": column.heading,
-        "numeric": column.numeric,
-        "choice": column.choice,
-        "texts": list(texts),
-        "at": at,
-        "keys": [short(cell.key) for cell in cells] if any(cell.key is not None for cell in cells) else None,
-        "tones": tones if any(tones) else None,
-    }
-
-
-def short(value: float | None) -> float | int | None:
-    """A number with few digits, for compact JSON; null for what is no finite number."""
-    if value is None or not math.isfinite(value):
-        return None
-    rounded = float(f"{value:.6g}")
-    return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
+def _joined(above: Cell, heading: str, cell: Cell) -> Cell:
+    if cell.text == NOTHING:
+        return above
+    return replace(above, details=(*above.details, f"; {heading}: {cell.text}", *cell.details))

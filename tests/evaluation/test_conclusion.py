@@ -20,9 +20,10 @@ from cdtool.evaluation.results import (
     Skipped,
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
-from cdtool.report.cases import to_junit
 from cdtool.report.html.page import to_html
-from cdtool.report.markdown.markdown import to_markdown
+from cdtool.report.markdown.report import to_markdown
+from cdtool.report.writers.base import Report
+from cdtool.report.writers.junit import to_junit
 from tests.command import cdtool
 from tests.evaluation.judged_results import GATE, results
 from tests.made_up.builds import BLIND, MISSED, build
@@ -35,9 +36,10 @@ def averaged(verdict: str, name: str = "A") -> PointResult:
 
 
 def reports(evaluated: Evaluated) -> tuple[str, str, ElementTree.Element, dict]:
-    junit = ElementTree.fromstring(to_junit(evaluated).encode())
+    report = Report(evaluated)
+    junit = ElementTree.fromstring(to_junit(report).encode())
     stored = json.loads(to_json(evaluated.results))["conclusion"]
-    return to_html(evaluated, ()), to_markdown(evaluated), junit, stored
+    return to_html(report), to_markdown(report), junit, stored
 
 
 CASES = {

@@ -10,8 +10,8 @@ from dataclasses import fields, replace
 import pytest
 
 from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
-from cdtool.report.contacts_csv import contacts_csv
-from cdtool.report.forces_csv import forces_csv
+from cdtool.report.writers.contacts import contacts_csv
+from cdtool.report.writers.forces import forces_csv
 from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 

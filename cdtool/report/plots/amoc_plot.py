@@ -17,6 +17,7 @@ from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
+from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.labels import Labelled, write_labels
@@ -249,7 +250,7 @@ def _set_latencies(axes: Axes, low: float, high: float, logarithmic: bool) -> No
         set_ticks(axes.yaxis, low, high)
     # Room above the highest point for an arrow.
     axes.set_ylim(low, high * (high / low) ** 0.08 if logarithmic else 1.08 * high)
-    axes.set_ylabel("median latency [ms]")
+    axes.set_ylabel(AXES["median"])
     axes.grid(color="0.9", linewidth=0.6)
 
 

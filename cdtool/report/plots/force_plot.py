@@ -20,6 +20,7 @@ from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
+from cdtool.report.model import AXES
 from cdtool.report.plots.figures import drawing, label, new_figure, save, slug
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
@@ -90,12 +91,10 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
         _draw_limits(axes, profile, nodes)
         axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
         _draw_curves(axes, curves)
-        axes.set_ylabel("force [N]")
+        axes.set_ylabel(AXES["force"])
         axes.set_title(label(panel.group, 60), loc="left", fontweight="bold")
         _tell(axes, curves)
-    rows[-1].set_xlabel(
-        "time from contact onset [ms]" + ("; compressed right of the first grey line" if len(nodes) > 2 else "")
-    )
+    rows[-1].set_xlabel(AXES["time"] + ("; compressed right of the first grey line" if len(nodes) > 2 else ""))
     figure.suptitle(f"{label(profile.title, 70)}", fontsize=10, x=0.01, ha="left")
     footer = "evidence, not a certificate" + (f"; {profile.warning}" if profile.warning else "")
     figure.legend(

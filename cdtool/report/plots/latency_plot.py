@@ -15,6 +15,7 @@ from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped
+from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, with_interval
 from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
@@ -234,7 +235,7 @@ def _count(item: Summary) -> str:
 def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axis) -> str:
     below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
     missed = any(len(item.missed) for item in marks)
-    lines = [f"latency from contact onset to alarm [ms]{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
+    lines = [f"{AXES['latency']}{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
     lines.append(f"mark: one contact{', open where it was missed: watched up to there' if missed else ''}")
     if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
         lines[-1] += f" ({_MOST_MARKS} at most are drawn)"

@@ -12,6 +12,7 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
+from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
@@ -162,7 +163,7 @@ def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
         words.append("band: 95 % at each time")
     if any(not _enough(item) for items in few for item in items):
         words.append(f"no band below {FEWEST} contacts")
-    return "\n".join(["time from contact onset [ms]", "; ".join(words)]).rstrip()
+    return "\n".join([AXES["time"], "; ".join(words)]).rstrip()
 
 
 def write_survival(report: Report, folder: Path) -> list[Image]:

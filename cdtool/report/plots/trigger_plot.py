@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
 from cdtool.plain_text import counted
+from cdtool.report.model import AXES
 from cdtool.report.plots.figures import Margins, drawing, label, save, slug, stacked_panels, text_width, unit_label
 from cdtool.report.plots.panels import (
     Legend,
@@ -62,7 +63,7 @@ def _figure(trace: Trace) -> Figure:
         if contact:
             draw_onset(axes, contact.start, legend)
     panels[-1].set_xlim(trace.view)
-    panels[-1].set_xlabel("time from contact onset [ms]" if contact else "time [s]")
+    panels[-1].set_xlabel(AXES["time"] if contact else "time [s]")
     if contact:
         step = next((step for step in _STEPS if (trace.view[1] - trace.view[0]) / step <= 12), _STEPS[-1])
         count_from(panels[-1], contact.start, step)

@@ -97,11 +97,11 @@ function forcePlan(data, panel, readTrace, openTrace) {
     home: [0, home],
     log: false,
     margin,
-    label: "time since contact onset [ms]",
+    label: data.axes.time,
     draw(chart) {
       drawStaircase(chart);
       chart.drawLevels(y, 0, highest, 5, margin.top);
-      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, "force [N]");
+      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, data.axes.force);
       drawCurves(chart);
       nameSteps(chart);
     },

@@ -88,7 +88,7 @@ function latencyPlan(data, panel, openRecording) {
     home: whole,
     log,
     margin,
-    label: `latency from contact onset to alarm [ms]${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
+    label: `${data.axes.latency}${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
     draw: (chart) => panel.rows.forEach((row, place) => drawLane(chart, row, place)),
     probe(chart, x, y) {
       const place = Math.floor(y / lane);
@@ -143,7 +143,7 @@ function survivalPlan(data, panel, hidden) {
     home: [0, Math.min(until * 1.02, last * 1.15)],
     log: false,
     margin,
-    label: "time since contact onset [ms]",
+    label: data.axes.time,
     draw(chart) {
       chart.drawLevels(y, 0, 1, 4, margin.top, (share) => `${Math.round(100 * share)} %`);
       const rows = visible(panel, hidden);
@@ -158,7 +158,7 @@ function survivalPlan(data, panel, hidden) {
       const time = chart.valueAtPixel(x);
       const words = visible(panel, hidden).map((row) => {
         const i = stepAt(row, time);
-        if (time > row.until) return `${data.detectors[row.detector].name}: not watched any more`;
+        if (time > row.until) return `${data.detectors[row.detector].name}: no longer monitored`;
         const [share, ...band] = [row.share, row.low, row.high]
           .filter((values) => values)
           .map((values) => figure(100 * values[i], 2));
@@ -250,7 +250,7 @@ function amocPlan(data, panel, hidden, unit) {
           tickWords(tick, 0),
         );
       }
-      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, "median latency [ms]");
+      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, data.axes.median);
       draw(chart.front, "path", { class: "axis", d: `M${left} ${chart.bottom}H${margin.left}V${margin.top}` });
       const fewest = panel.rows.reduce((a, b) => (exposure(b) < exposure(a) ? b : a));
       const middle = margin.left - zone / 2;

@@ -1,6 +1,6 @@
 // Tables that are sorted by a click on a heading, and long ones that are paged, filtered and searched.
 
-// A table's figures that are not there; they stay last in either order.
+// Missing numbers of a table; they stay last in either order.
 const NO_KEY = 1e299;
 const PAGE_SIZES = [15, 50, 200, 1000];
 const LONGEST_WORD = 28;

@@ -1,16 +1,8 @@
-// One recording: the load cell on top, below it a row a detector with signal, band, limits and alarm.
+// One recording: the load cell on top, below it a row per detector with signal, band, limits and alarm.
 
 const HEAD = 26,
   GAP = 10;
 const HEADROOM = 1.5;
-const REASONS = {
-  1: "start-up",
-  2: "not applicable",
-  3: "missing samples",
-  4: "no limit known here",
-  5: "other speed",
-  6: "other sample rate",
-};
 const HATCHES = {
   1: "M0 8L8 0",
   2: "M0 8L8 0M0 0L8 8",
@@ -231,7 +223,7 @@ function tracePlan(data, trace) {
         height: box.to - box.from,
         fill: `url(#hatch-${code})`,
       });
-      const words = [`not assessable: ${REASONS[code]}`, REASONS[code]].find((text) => text.length * 6.2 + 8 < width);
+      const words = [`not assessable: ${data.reasons[code]}`, data.reasons[code]].find((text) => text.length * 6.2 + 8 < width);
       if (words) draw(chart.front, "text", { class: "small halo", x: left + 4, y: box.to - 4 }, words);
     }
   }
@@ -268,7 +260,7 @@ function tracePlan(data, trace) {
     margin,
     offset: contact ? contact.start : 0,
     scale: contact ? 1e3 : 1,
-    label: contact ? "time from contact onset [ms]" : "time [s]",
+    label: contact ? data.axes.time : "time [s]",
     draw(chart) {
       const defs = draw(chart.svg, "defs");
       for (const [code, d] of Object.entries(HATCHES)) {
@@ -293,7 +285,7 @@ function tracePlan(data, trace) {
       const panel = rows[Math.floor((y - first) / heights.row)];
       if (!panel) return null;
       const i = Math.max(placeOf(panel.time, time) - 1, 0);
-      const status = panel.status[i] ? `not assessable: ${REASONS[panel.status[i]]}` : "";
+      const status = panel.status[i] ? `not assessable: ${data.reasons[panel.status[i]]}` : "";
       const limits = [panel.lower[i], panel.upper[i]].map((limit) => (Number.isFinite(limit) ? figure(limit) : "none"));
       const words = [
         when,
