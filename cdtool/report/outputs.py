@@ -71,7 +71,8 @@ def write_outputs(
 def _writer_of(target: Path, subject: Subject) -> Writer[Any]:
     writer = writer_of(target, subject) if not target.is_dir() else None
     if writer is None:
-        known = ", ".join(known_suffixes(subject))
+        *others, last = known_suffixes(subject)
+        known = f"{', '.join(others)} or {last}" if others else last
         folder = "a folder, or " if _has_folders(subject) else ""
         raise UsageError(f"--output is '{plain(target)}'", f"{folder}a name that ends in {known}")
     return writer

@@ -21,7 +21,7 @@ WRITERS = Registry(
         "comparison_markdown": "cdtool.report.writers.comparison_markdown:ComparisonMarkdown",
         "comparison_json": "cdtool.report.writers.comparison_json:ComparisonJson",
     },
-    contract=("name", "subject", "suffixes", "in_folder", "kinds", "files", "has_content", "write"),
+    contract=("name", "suffixes", "in_folder", "subject", "kinds", "files", "has_content", "write"),
 )
 
 
