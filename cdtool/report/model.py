@@ -64,8 +64,8 @@ _NOTES = {
     ),
     "amoc": (
         "Each point is a safety factor; the ringed point is in use. False alarms are those of the impact-free "
-        "operations. Left of the line there are none; this does not mean a rate of zero, and the upper bound is given "
-        "below. Open points: contacts were missed. A triangle at the top: the median is not reached."
+        "operations. Left of the line there is no false alarm; this does not mean a rate of zero, and the upper bound "
+        "is given below. Open points: contacts were missed. A triangle at the top: the median is not reached."
     ),
     "comparisons": (
         "Paired: the same contacts, as far as both detectors could assess them. Latency: over the contacts that both "

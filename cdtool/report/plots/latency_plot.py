@@ -1,4 +1,4 @@
-"""Latency of every detector in every group: each contact a mark, the median with its interval, and all the counts."""
+"""Latency of every detector in every group: a mark per contact, the median with its interval, and all counts."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ _COLUMNS = (
 _IMPACT_FREE = 70.0
 _ROW, _PANEL = 0.36, 0.2
 _MOST_MARKS = 400
-# Low-discrepancy sequences spread the marks evenly, without chance.
+# Low-discrepancy sequences spread the marks evenly, without random numbers.
 _GOLDEN, _ACROSS = 0.6180339887, 0.7548776662
-# Right of the axis's end lies a strip for the missed contacts that were watched for longer: its share of the width.
+# Share of the width of the strip right of the axis, for missed contacts that were monitored for longer.
 _BEYOND = 0.09
 
 
 @dataclass(frozen=True)
 class _Marks:
-    """Latencies of the detected contacts, and how long the missed ones were watched, both ascending [ms]."""
+    """Latencies of the detected contacts, and how long the missed ones were monitored, both ascending [ms]."""
 
     detected: FloatArray
     missed: FloatArray
@@ -61,13 +61,13 @@ class _Axis:
     logarithmic: bool
 
     def shown(self, times: FloatArray) -> FloatArray:
-        """Where times are drawn: below a logarithmic axis at its floor, beyond its end evenly over the strip."""
+        """Return where times are drawn: at least the lower end of a logarithmic axis, beyond its end in the strip."""
         inside = np.maximum(times, FLOOR_MS) if self.logarithmic else times
         share = 0.2 + 0.6 * (_ACROSS * np.arange(len(times), dtype=np.float64) % 1.0)
         return np.asarray(np.where(times > self.end, self._strip(share), inside))
 
     def placed(self, time: float) -> float:
-        """Where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
+        """Return where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
         if time > self.end:
             return float(self._strip(np.array(0.5, dtype=np.float64)))
         return max(time, FLOOR_MS) if self.logarithmic else time
@@ -79,9 +79,9 @@ class _Axis:
 
 
 def plot_latencies(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel a group and a row a detector; raises UsageError, CdtoolError (see `save`).
+    """Draw a panel per group and a row per detector; raises UsageError, CdtoolError (see `save`).
 
-    The median counts missed contacts as later than all others. It is to be read beside the counts at the right.
+    The median counts missed contacts as later than all others. Read it together with the counts at the right.
     """
     with drawing():
         save(_figure(evaluated), path)
@@ -92,7 +92,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     groups = list(dict.fromkeys(item.group for item in summaries))
     if not groups:
         figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact in any group: there is no latency to show", ha="center", va="center")
+        figure.text(0.5, 0.5, "no contact in any group: no latency to show", ha="center", va="center")
         return figure
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
@@ -170,7 +170,7 @@ def _name_strip(axes: Axes, missed: FloatArray, axis: _Axis) -> None:
 
 
 def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis) -> None:
-    """Detected contacts filled, missed ones open."""
+    """Draw detected contacts as filled marks, missed ones as open marks."""
     look = look_of(detector)
     for times, filled in ((marks.detected, True), (marks.missed, False)):
         shown = axis.shown(_thinned(times))
@@ -195,9 +195,9 @@ def _thinned(ordered: FloatArray) -> FloatArray:
 
 
 def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
-    """Below the marks: the interval of the median as a bar, open to the right where it has no end.
+    """Draw the median below the marks with its interval as a bar, open to the right if it has no upper end.
 
-    Below ten contacts the median stands alone: the marks show the range.
+    With fewer than ten contacts only the median: the marks show the range.
     """
     height, median = row + 0.28, summary.median
     if not draws_no_interval(summary) and median.low <= axis.end:
@@ -228,7 +228,7 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_fr
 
 
 def _count(item: Summary) -> str:
-    """False alarms; a dash where the detector could judge nothing."""
+    """Return the false alarms; a dash if the detector could not assess anything."""
     return f"{item.false_alarms} in {item.operations} op." if item.hours > 0.0 else NOTHING
 
 
@@ -236,14 +236,14 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
     below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
     missed = any(len(item.missed) for item in marks)
     lines = [f"{AXES['latency']}{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
-    lines.append(f"mark: one contact{', open where it was missed: watched up to there' if missed else ''}")
+    lines.append(f"each mark: a contact{', open if missed, at the end of its monitoring' if missed else ''}")
     if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
-        lines[-1] += f" ({_MOST_MARKS} at most are drawn)"
+        lines[-1] += f" (at most {_MOST_MARKS} are drawn)"
     few, later = [draws_no_interval(item) for item in summaries], ", missed contacts counted as later" if missed else ""
     interval = "" if all(few) else " and its 95 % interval"
     lines.append(f"black: median{interval}{later}")
     if any(few):
-        lines[-1] += f"; no bar below {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
+        lines[-1] += f"; no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""Figures in columns right of a panel: what its marks have to be read beside."""
+"""Columns of numbers right of a panel, which its marks must be read with."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _INDENT = 12.0
 
 @dataclass(frozen=True)
 class Column:
-    """A heading of one or two lines, and how wide the column is [points]; `left`: its texts begin at its left edge."""
+    """A heading of one or two lines, and the width of the column [points]; `left`: its texts are left-aligned."""
 
     heading: str
     width: float
@@ -27,7 +27,7 @@ class Column:
 
 @dataclass(frozen=True)
 class _Line:
-    """Where the cells of a line stand: at `y` in `coordinates`, lifted by `lift` [points]; `size` of their letters."""
+    """The position of a line of cells: `y` in `coordinates`, lifted by `lift` [points]; `size` of its letters."""
 
     coordinates: object
     y: float
@@ -45,21 +45,21 @@ class SideTable:
 
     @property
     def width(self) -> float:
-        """Room for all of it [inch]."""
+        """The width of all columns with the gap [inch]."""
         return (self.gap + sum(column.width for column in self.columns)) / 72.0
 
     def write_headings(self, axes: Axes) -> None:
-        """The headings above the panel's upper edge."""
+        """Write the headings above the panel's upper edge."""
         for i, column in enumerate(self.columns):
             self._write(axes, i, column.heading, _Line("axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE))
 
     def write_row(self, axes: Axes, y: float, cells: Sequence[str], loud: Sequence[bool]) -> None:
-        """A row at height `y` of the panel's own scale; `loud` cells are bold."""
+        """Write a row at height `y` in the panel's scale; `loud` cells are bold."""
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
             self._write(axes, i, cell, _Line(axes.get_yaxis_transform(), y), bold)
 
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
-        """A row counted from the panel's upper edge, the detector's mark before it."""
+        """Write a row counted from the panel's upper edge, after the detector's mark."""
         from matplotlib.lines import Line2D
         from matplotlib.transforms import ScaledTranslation
 
@@ -99,5 +99,5 @@ class SideTable:
 
 
 def key_height(rows: int) -> float:
-    """Room for so many rows of a key [inch]."""
+    """Return the height of a number of rows of a key [inch]."""
     return _ROW * rows / 72.0

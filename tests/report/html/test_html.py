@@ -25,7 +25,7 @@ from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import css_colour
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
 from cdtool.report.number_text import number, percent, with_interval
-from cdtool.report.plots.style import BAND, LIMIT, UNJUDGED, look_of
+from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.table import interval_cell
 from cdtool.report.tables.recordings import log_of
 from cdtool.report.writers.base import Report
@@ -306,7 +306,7 @@ def test_a_report_without_scored_recordings_states_this_and_has_no_plots():
 def test_colours_are_those_of_the_figures(page):
     looks = [(item["colour"], item["marker"]) for item in page.data["detectors"]]
     assert looks == [(css_colour(look_of(name).colour), look_of(name).marker) for name in ("quick", "slow")]
-    for name, colour in (("band", BAND), ("limit", LIMIT), ("unjudged", UNJUDGED)):
+    for name, colour in (("band", BAND), ("limit", LIMIT), ("not-assessed", NOT_ASSESSED)):
         assert f"--{name}: {css_colour(colour).lower()};" in page.styles[0]
 
 
@@ -356,7 +356,7 @@ def test_what_was_left_out_and_the_provenance_are_shown(page):
     assert page.tables["skipped-table"][1] == ["broken.csv", "empty file"]
     assert page.tables["findings-table"][1] == ["odd.csv", "a gap of 2 s"]
     assert page.tables["not-assessable-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
-    assert page.tables["calibration-table"][1] == ["quick", "1/15op", "5.50", "2", "30", "0.0600"]
+    assert page.tables["calibration-table"][1] == ["quick (q)", "1/15op", "5.50", "2", "30", "0.0600"]
     assert ["version of the tool", "9.8.7"] in page.tables["provenance-table"]
     assert page.tables["learned-table"][1] == ["learn.csv", "ef" * 32]
 

@@ -13,7 +13,7 @@ from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.plots.folder_figures import write_figures
-from cdtool.report.plots.trigger_plot import most_telling
+from cdtool.report.plots.trigger_plot import most_informative
 from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept
@@ -119,12 +119,12 @@ def test_groups_named_alike_or_with_a_path_get_safe_names_of_their_own(evaluated
     ]
 
 
-def test_the_most_telling_trace_has_a_contact_and_most_detectors_that_could_judge(hit, free):
+def test_the_most_informative_trace_has_a_contact_and_most_detectors_that_could_judge(hit, free):
     fewer = replace(hit, panels=hit.panels[:1])
     blind = replace(hit, panels=(replace(hit.panels[0], verdict="not_assessable"), hit.panels[1]))
-    assert most_telling([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
-    assert most_telling([free, fewer]) is fewer
-    assert most_telling([free]) is free
+    assert most_informative([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
+    assert most_informative([free, fewer]) is fewer
+    assert most_informative([free]) is free
 
 
 def test_the_same_report_gives_the_same_bytes(evaluated: Evaluated, hit, tmp_path):

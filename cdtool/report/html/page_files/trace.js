@@ -51,7 +51,7 @@ function triggersOf(trace, panel) {
 }
 
 /** Stretches of samples that could not be judged: first and last time, and the reason's number. */
-function unjudged(panel) {
+function notAssessed(panel) {
   const found = [];
   for (let i = 0; i < panel.status.length; i += 1) {
     const code = panel.status[i];
@@ -173,10 +173,10 @@ function tracePlan(data, trace) {
     drawBand(layer, chart, panel, box, from, to);
     levels(chart, box, low, high);
     drawTrigger(chart, panel, detector, box);
-    drawUnjudged(chart, panel, box);
+    drawNotAssessed(chart, panel, box);
     const group = tint(draw(layer, "g"), detector);
     draw(layer, "path", {
-      class: "unjudged",
+      class: "not-assessed",
       d: line(chart, panel.time, panel.value, box.y, from, to, (i) => panel.status[i] !== 0),
     });
     draw(group, "path", {
@@ -211,8 +211,8 @@ function tracePlan(data, trace) {
     draw(layer, "path", { class: "band", d: path });
   }
 
-  function drawUnjudged(chart, panel, box) {
-    for (const { code, from, to } of unjudged(panel)) {
+  function drawNotAssessed(chart, panel, box) {
+    for (const { code, from, to } of notAssessed(panel)) {
       const left = Math.max(chart.x(from), margin.left),
         width = Math.min(chart.x(to), chart.right) - left;
       if (width < 1) continue;
@@ -377,7 +377,7 @@ function makeTraceLegend(host) {
     ["onset", "M0 6H26", "contact onset"],
     ["limit", "M0 6H26", "limit"],
     ["band", "M0 0H26V12H0Z", "normal band"],
-    ["unjudged", "M0 12L12 0M8 12L20 0M16 12L26 2", "not assessable"],
+    ["not-assessed", "M0 12L12 0M8 12L20 0M16 12L26 2", "not assessable"],
   ];
   for (const [kind, d, words] of marks) {
     const entry = make(host, "span");
