@@ -76,6 +76,11 @@ class Table:
     marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
     logs: Sequence[Log] = ()
 
+    @property
+    def counted_title(self) -> str:
+        """The title with the number of rows."""
+        return f"{self.title} ({len(self.rows)})"
+
     def cells(self, heading: str) -> list[Cell]:
         """Return the cells below a heading."""
         place = [column.heading for column in self.columns].index(heading)

@@ -96,7 +96,7 @@ def _forces(model: Model) -> Sequence[tuple[str, str]]:
 
 
 def _section(table: Table, lead: str = "", tail: str = "", *, folded: bool = False) -> Section:
-    return Section(f"{table.title} ({len(table.rows)})" if folded else escape(table.title), lead, table, tail, folded)
+    return Section(table.counted_title if folded else escape(table.title), lead, table, tail, folded)
 
 
 def _image(image: Image) -> str:

@@ -11,11 +11,11 @@ from cdtool.report.table import Cell, Column, Row, Table, name_cell, shown
 from cdtool.report.tables.results import detector_cell, part_of
 
 _NAMES = {
-    "tool": "tool",
-    "tool_version": "version of the tool",
+    "tool_version": "cdtool version",
     "machine": "machine",
     "watched_joints": "joints monitored, of all",
     "threshold": "threshold",
+    "threshold_rule": "rule of the threshold",
     "signature_rule": "rule of the normal band",
     "safety_factor_set": "safety factor or limits set",
     "false_alarm_budget": "false-alarm budget",
@@ -26,6 +26,7 @@ _NAMES = {
     "hysteresis": "hysteresis, share of the safety factor",
     "latch": "alarms latch",
     "onset": "onset of a contact",
+    "separation_s": "separation of contacts [s]",
     "label_file": "label file",
     "synchronisation_s": "synchronisation of the load cell [s]",
     "mass_before_cell_kg": "mass before the load cell [kg]",
@@ -34,8 +35,8 @@ _NAMES = {
     "plugins": "plug-ins",
     "learned_runs": "operations learned from",
 }
-# Parts of the provenance that have tables of their own, or only name other values.
-_OTHER_TABLES = ("gains", "signature_sha256", "learned_sha256", "units", "short_names", "force_profiles")
+# Entries that have tables of their own, are part of another, or are the same in every report.
+_OTHER_TABLES = ("tool", "gains", "signature_sha256", "learned_sha256", "units", "short_names", "force_profiles")
 
 
 def provenance_tables(results: Results) -> list[Table]:

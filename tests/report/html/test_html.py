@@ -357,7 +357,7 @@ def test_what_was_left_out_and_the_provenance_are_shown(page):
     assert page.tables["findings-table"][1] == ["odd.csv", "a gap of 2 s"]
     assert page.tables["not-assessable-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
     assert page.tables["calibration-table"][1] == ["quick (q)", "1/15op", "5.50", "2", "30", "0.0600"]
-    assert ["version of the tool", "9.8.7"] in page.tables["provenance-table"]
+    assert ["cdtool version", "9.8.7"] in page.tables["provenance-table"]
     assert page.tables["learned-table"][1] == ["learn.csv", "ef" * 32]
 
 
