@@ -1,4 +1,4 @@
-"""Contacts and forces as CSV: untouched numbers, and nothing that a spreadsheet or a terminal would run."""
+"""Contacts and forces as CSV: unchanged numbers, and nothing that a spreadsheet or a terminal would run."""
 
 from __future__ import annotations
 

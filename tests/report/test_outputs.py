@@ -1,4 +1,4 @@
-"""Targets and folders: each suffix gets its content, a folder holds everything, nothing leaves it."""
+"""Targets and folders: each suffix gets its content, a folder contains all reports, nothing is written outside."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ WHOLE = {"report.html", "report.md", "results.json", "results.traces.json.gz", "
 
 @pytest.fixture
 def done(bench: Bench, simulated, results) -> Report:
-    """Traces of groups whose names are hostile, or alike once they are file names."""
+    """Traces of groups whose names are hostile, or equal as file names."""
     recording = simulated("stiff", 1)
     groups = (*HOSTILE.values(), "Stiff", "stiff", "stiff_momentum")
     traces = tuple(bench.trace(replace(recording, name=ALL), group, ("momentum",)) for group in groups)

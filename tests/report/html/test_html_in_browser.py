@@ -1,4 +1,4 @@
-"""The HTML report as a reader meets it: in a real browser, without network."""
+"""The HTML report in a real browser, without network."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FLAGS = (
 )
 
 pytestmark = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER), reason="Chromium or chromedriver is absent: the HTML report was not looked at"
+    not (CHROMIUM and DRIVER), reason="Chromium or chromedriver is absent: the HTML report was not checked"
 )
 
 
@@ -69,14 +69,14 @@ def texts(browser: Any, selector: str) -> list[str]:
 
 
 def drawn_range(browser: Any, selector: str = "#viewer-plot") -> tuple[float, float]:
-    """What the plot's axis spans; a zoom is drawn with the next frame."""
+    """Return the range of the plot's axis; a zoom is drawn with the next frame."""
     browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
     element = all_of(browser, selector)[0]
     return float(element.get_attribute("data-from")), float(element.get_attribute("data-to"))
 
 
 def drag(browser: Any, element: Any, begin: float, end: float) -> None:
-    """From one share of an element's width to another."""
+    """Drag from one share of an element's width to another."""
     from selenium.webdriver.common.action_chains import ActionChains
 
     browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", element)

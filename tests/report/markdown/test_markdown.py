@@ -1,4 +1,4 @@
-"""The Markdown report: verdict first, right figures, cut to a length without losing the verdict, names as text."""
+"""The Markdown report: verdict first, correct numbers, cut to a length without losing the verdict, names as text."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def rows(text: str) -> list[list[str]]:
 
 
 def header(text: str, group: str) -> list[str]:
-    """The headings of a group's table."""
+    """Return the headings of a group's table."""
     return rows(text.split(f"## {group}\n")[1])[0]
 
 
@@ -303,7 +303,7 @@ def five_thousand() -> Evaluated:
 
 
 def whole_blocks(text: str) -> None:
-    """Every block that is opened is closed, none within another, and no row is cut."""
+    """Check that every opened block is closed, none is inside another, and no row is cut."""
     assert re.findall(r"</?details>", text) == ["<details>", "</details>"] * text.count("<details>")
     assert all(line.endswith(" |") for line in text.splitlines() if line.startswith("|"))
 
