@@ -31,7 +31,7 @@ def reports(request) -> dict[str, object]:
     del provenance["force_profiles"]  # a figure needs profiles with names
     benchmark = Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
     builds = [build({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
-    return {"benchmark": benchmark, "comparison": compare_builds(*builds)}
+    return {"benchmark": benchmark, "comparison": compare_builds(builds[0], builds[1])}
 
 
 @pytest.mark.parametrize(("name", "suffix"), SUFFIXES)

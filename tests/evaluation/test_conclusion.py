@@ -177,8 +177,8 @@ def test_without_profile_and_limit_a_miss_is_named_and_not_green_but_asks_for_no
         conclusion = evaluated.results.conclusion
         assert (conclusion.outcome, conclusion.exit_status) == (outcome, 0)
         assert "1 detection missed without a limit" in conclusion.headline
-        assert 'class="verdict unknown"' in to_html(evaluated, ())
-        assert 'failures="0"' in to_junit(evaluated)
+        assert 'class="verdict unknown"' in to_html(Report(evaluated))
+        assert 'failures="0"' in to_junit(Report(evaluated))
 
 
 def test_a_limit_that_nothing_was_measured_for_is_not_met():

@@ -126,8 +126,8 @@ def _column(
         force = found.recording["force"]
         draw_force(rows[-1], force.time, force.values[:, 0], span, contact=bool(matches))
     for axes in rows:
-        for item in matches:
-            draw_onset(axes, item.contact.start, legend)
+        for event in matches:
+            draw_onset(axes, event.contact.start, legend)
         axes.set_xlim(span)
 
 
