@@ -20,6 +20,7 @@ from cdtool.report.table import (
     Cell,
     Column,
     Fields,
+    Row,
     Table,
     count_cell,
     empty_cell,
@@ -200,13 +201,13 @@ def _false_alarms(item: Summary) -> Cell:
     """Return the count with its exposure; without any exposure no number but words."""
     operations = counted(item.operations, "operation")
     if not _has_exposure(item):
-        details = (" in any of", f" {operations}")
-        return Cell(NOT_ASSESSABLE, details, key_of(None), "unknown") if item.operations else empty_cell()
+        nowhere = (" in any of", f" {operations}")
+        return Cell(NOT_ASSESSABLE, nowhere, key_of(None), "unknown") if item.operations else empty_cell()
     part = item.judged_operations < item.operations
-    details = (f" in {item.judged_operations} of", f" {operations}") if part else (f" in {operations}",)
+    within = (f" in {item.judged_operations} of", f" {operations}") if part else (f" in {operations}",)
     return Cell(
         str(item.false_alarms),
-        (*details, f", {number(item.hours)} h"),
+        (*within, f", {number(item.hours)} h"),
         item.false_alarms,
         "bad" if item.false_alarms else "",
     )
@@ -249,8 +250,8 @@ def _difference_cell(item: Comparison, without: str) -> Cell:
     return Cell("; ".join(words) or without, tone="" if words else "unknown")
 
 
-def _differences(results: Results, item: Comparison) -> list[tuple[Cell, ...]]:
-    rows = []
+def _differences(results: Results, item: Comparison) -> list[Row]:
+    rows: list[Row] = []
     names = {name: detector_cell(results, name).line for name in (item.first, item.second)}
     other = {item.first: names[item.second], item.second: names[item.first]}
     if item.faster:
