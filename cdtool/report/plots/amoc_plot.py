@@ -19,7 +19,17 @@ from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
-from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.figures import (
+    Margins,
+    between,
+    drawing,
+    label,
+    new_figure,
+    save,
+    stacked_panels,
+    text_width,
+    write,
+)
 from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
 from cdtool.report.plots.side_table import Column, SideTable, key_height
@@ -275,18 +285,7 @@ def _explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
         (rates, _ZONE + 0.5 * (1.0 - _ZONE), -22.0, 9.0, "center"),
         (_marks(curves, floored), 0.0, -46.0, 8.0, "left"),
     ):
-        axes.annotate(
-            text,
-            (share, 0.0),
-            xycoords="axes fraction",
-            xytext=(0.0, lift),
-            textcoords="offset points",
-            ha=side,
-            va="top",
-            fontsize=size,
-            linespacing=1.35,
-            annotation_clip=False,
-        )
+        write(axes, text, (share, 0.0), (0.0, lift), ha=side, va="top", fontsize=size, linespacing=1.35)
 
 
 def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:

@@ -18,7 +18,7 @@ from cdtool.evaluation.truth.matching import Match
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import Contact
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
+from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -162,18 +162,9 @@ def _name_event(rows: list[Axes], joints: list[int], event: _Event) -> None:
 
 
 def _write_above(axes: Axes, time: float, text: str, side: str, *, bold: bool = False) -> None:
-    axes.annotate(
-        text,
-        (time, 1.0),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(0, 3),
-        textcoords="offset points",
-        ha=side,
-        va="bottom",
-        fontsize=9,
-        fontweight="bold" if bold else "normal",
-        annotation_clip=False,
-    )
+    weight = "bold" if bold else "normal"
+    frame = axes.get_xaxis_transform()
+    write(axes, text, (time, 1.0), (0, 3), frame, ha=side, va="bottom", fontsize=9, fontweight=weight)
 
 
 def _write_latency(axes: Axes, event: _Event, latency: float) -> None:

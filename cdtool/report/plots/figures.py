@@ -147,6 +147,18 @@ def save(figure: Figure, path: Path) -> None:
         write_bytes(path, drawn.getvalue())
 
 
+def write(
+    axes: Axes,
+    text: str,
+    at: tuple[float, float],
+    offset: tuple[float, float],
+    frame: Any = "axes fraction",
+    **look: Any,
+) -> None:
+    """Write a text at a position in `frame`, moved by `offset` [points]; never clipped. `look`: size, weight, side."""
+    axes.annotate(text, at, xycoords=frame, xytext=offset, textcoords="offset points", annotation_clip=False, **look)
+
+
 def label(text: object, length: int = 40) -> str:
     """Return a text from a file as a figure shows it: plain and at most `length` characters."""
     return shorten(plain(text), length)

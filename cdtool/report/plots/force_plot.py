@@ -21,7 +21,7 @@ from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.model import AXES
-from cdtool.report.plots.figures import drawing, label, new_figure, save, slug
+from cdtool.report.plots.figures import drawing, label, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.writers.base import Image, Report
@@ -201,17 +201,7 @@ def _write_outcomes(axes: Axes, curves: Sequence[ForceCurve]) -> None:
         lines.append(f"and {len(alarms) - _ALARMS_LISTED} later")
     verdict = worst.verdict.outcome.replace("_", " ")
     for text, lift, size, weight in ((verdict, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
-        axes.annotate(
-            text,
-            (1.0, 1.0),
-            xycoords="axes fraction",
-            xytext=(10, lift),
-            textcoords="offset points",
-            va="top",
-            fontsize=size,
-            fontweight=weight,
-            annotation_clip=False,
-        )
+        write(axes, text, (1.0, 1.0), (10, lift), va="top", fontsize=size, fontweight=weight)
 
 
 def _step_text(step: StepVerdict) -> str:

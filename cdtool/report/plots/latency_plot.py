@@ -17,7 +17,17 @@ from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, with_interval
-from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.figures import (
+    Margins,
+    between,
+    drawing,
+    label,
+    new_figure,
+    save,
+    stacked_panels,
+    text_width,
+    write,
+)
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable
 from cdtool.report.plots.style import look_of
@@ -157,16 +167,8 @@ def _name_strip(axes: Axes, missed: FloatArray, axis: _Axis) -> None:
     beyond = missed[missed > axis.end]
     if not len(beyond):
         return
-    axes.annotate(
-        f"> {between(float(beyond.min()), float(beyond.max()))} ms",
-        (1.0, 1.0),
-        xycoords="axes fraction",
-        xytext=(2, 3),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=7.5,
-    )
+    words = f"> {between(float(beyond.min()), float(beyond.max()))} ms"
+    write(axes, words, (1.0, 1.0), (2, 3), ha="right", va="bottom", fontsize=7.5)
 
 
 def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis) -> None:

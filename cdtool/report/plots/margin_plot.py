@@ -18,7 +18,7 @@ from cdtool.evaluation.traces.trace import Course, Span
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray, Recording
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
+from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.plots.style import BAND, look_of
 
@@ -179,17 +179,7 @@ def _colour(movement: Movement, item: Explanation) -> str:
 
 def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], side: str) -> None:
     """Write a text next to a time [s] and a height as a share of the panel; `offset` in points."""
-    axes.annotate(
-        text,
-        place,
-        xycoords=axes.get_xaxis_transform(),
-        xytext=offset,
-        textcoords="offset points",
-        ha=side,
-        va="bottom",
-        fontsize=8,
-        annotation_clip=False,
-    )
+    write(axes, text, place, offset, axes.get_xaxis_transform(), ha=side, va="bottom", fontsize=8)
 
 
 def _name(axes: Axes, text: str) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cdtool.report.plots.figures import write
 from cdtool.report.plots.style import look_of
 
 if TYPE_CHECKING:
@@ -84,18 +85,9 @@ class SideTable:
         column = self.columns[number]
         before = self.gap + sum(item.width for item in self.columns[:number])
         offset = before + (indent if column.left else 0.5 * column.width)
-        axes.annotate(
-            text,
-            (1.0, line.y),
-            xycoords=line.coordinates,  # type: ignore[arg-type]
-            xytext=(offset, line.lift),
-            textcoords="offset points",
-            ha="left" if column.left else "center",
-            va=line.side,
-            fontsize=line.size,
-            fontweight="bold" if bold else "normal",
-            annotation_clip=False,
-        )
+        side, weight = "left" if column.left else "center", "bold" if bold else "normal"
+        look = {"ha": side, "va": line.side, "fontsize": line.size, "fontweight": weight}
+        write(axes, text, (1.0, line.y), (offset, line.lift), line.coordinates, **look)
 
 
 def key_height(rows: int) -> float:

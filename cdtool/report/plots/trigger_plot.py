@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
 from cdtool.plain_text import counted
 from cdtool.report.model import AXES
-from cdtool.report.plots.figures import Margins, drawing, label, save, slug, stacked_panels, text_width, unit_label
+from cdtool.report.plots.figures import (
+    Margins,
+    drawing,
+    label,
+    save,
+    slug,
+    stacked_panels,
+    text_width,
+    unit_label,
+    write,
+)
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -99,25 +109,9 @@ def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) 
         legend.add("trigger")
     _name(axes, _row_name(trace, row))
     verdict, detail = _verdict(trace, row)
-    axes.annotate(
-        verdict,
-        (1.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(_AWAY, 0),
-        textcoords="offset points",
-        va="bottom" if detail else "center",
-        fontsize=_VERDICT_SIZE,
-        fontweight="bold",
-    )
-    axes.annotate(
-        detail,
-        (1.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(_AWAY, -3),
-        textcoords="offset points",
-        va="top",
-        fontsize=_DETAIL_SIZE,
-    )
+    side = "bottom" if detail else "center"
+    write(axes, verdict, (1.0, 0.5), (_AWAY, 0), va=side, fontsize=_VERDICT_SIZE, fontweight="bold")
+    write(axes, detail, (1.0, 0.5), (_AWAY, -3), va="top", fontsize=_DETAIL_SIZE)
 
 
 def _seen(trace: Trace, row: Panel) -> Seen | None:
@@ -169,16 +163,7 @@ def _row_name(trace: Trace, row: Panel) -> str:
 
 def _name(axes: Axes, text: str) -> None:
     """Write the names of rows aligned with each other, whatever the numbers of the ticks."""
-    axes.annotate(
-        text,
-        (0.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(-_TICKS, 0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize=_NAME_SIZE,
-    )
+    write(axes, text, (0.0, 0.5), (-_TICKS, 0), ha="right", va="center", fontsize=_NAME_SIZE)
 
 
 def _title(trace: Trace) -> str:
