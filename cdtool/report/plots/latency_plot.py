@@ -29,7 +29,7 @@ from cdtool.report.plots.figures import (
     write,
 )
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable
+from cdtool.report.plots.side_table import Column, SideTable, count_cells
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 
@@ -217,16 +217,9 @@ def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
-    cells = (
-        with_interval(row.median),
-        f"{row.detected} of {row.contacts}",
-        str(row.missed),
-        str(row.not_assessable),
-        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
-        *impact_free,
-    )
-    loud = [False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0]
-    table.write_row(axes, place, cells, [*loud, *(not cell.startswith(("0 ", NOTHING)) for cell in impact_free)])
+    cells, loud = count_cells(row)
+    alarmed = (not cell.startswith(("0 ", NOTHING)) for cell in impact_free)
+    table.write_row(axes, place, (with_interval(row.median), *cells, *impact_free), (False, *loud, *alarmed))
 
 
 def _count(item: Summary) -> str:

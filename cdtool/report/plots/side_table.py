@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cdtool.evaluation.summary import Summary
+from cdtool.report.number_text import NOTHING
 from cdtool.report.plots.figures import write
 from cdtool.report.plots.style import look_of
 
@@ -88,6 +90,13 @@ class SideTable:
         side, weight = "left" if column.left else "center", "bold" if bold else "normal"
         look = {"ha": side, "va": line.side, "fontsize": line.size, "fontweight": weight}
         write(axes, text, (1.0, line.y), (offset, line.lift), line.coordinates, **look)
+
+
+def count_cells(row: Summary) -> tuple[tuple[str, ...], tuple[bool, ...]]:
+    """Return the cells of detected, missed and not assessable contacts and false alarms, and which are bold."""
+    false_alarms = str(row.false_alarms) if row.watched else NOTHING
+    cells = (f"{row.detected} of {row.contacts}", str(row.missed), str(row.not_assessable), false_alarms)
+    return cells, (False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
 
 
 def key_height(rows: int) -> float:

@@ -13,10 +13,10 @@ from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
 from cdtool.report.model import AXES
-from cdtool.report.number_text import NOTHING, number
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable, key_height
+from cdtool.report.plots.side_table import Column, SideTable, count_cells, key_height
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 
@@ -142,16 +142,9 @@ def _by_median(curves: Sequence[SurvivalCurve], summaries: dict[tuple[str, str],
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary) -> None:
-    cells = (
-        label(row.detector, _NAME),
-        number(row.median.value),
-        f"{row.detected} of {row.contacts}",
-        str(row.missed),
-        str(row.not_assessable),
-        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
-    )
-    loud = (False, False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
-    table.write_key(axes, place, row.detector, cells, loud)
+    cells, loud = count_cells(row)
+    first = (label(row.detector, _NAME), number(row.median.value))
+    table.write_key(axes, place, row.detector, (*first, *cells), (False, False, *loud))
 
 
 def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
