@@ -85,7 +85,7 @@ def test_a_caption_states_how_many_of_the_contacts_with_a_verdict_are_drawn(resu
     full = with_forces(results, bench, simulated, hit.recording, "another log", "a third")
     images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
     caption = next(image.caption for image in images if image.name == "forces.png")
-    assert "the 1 of 3 contacts whose curves were kept" in caption
+    assert "the 1 of 3 contacts with stored curves" in caption
     assert "mass" not in caption
     heavy = replace(full, provenance={**full.provenance, "mass_before_cell_kg": 4.0})
     images = write_figures(Report(evaluate(heavy), (hit,)), tmp_path)
