@@ -33,14 +33,12 @@ TO_REWRITE = (
     "cdtool/evaluation/explanation",
     "cdtool/evaluation/force/course.py",
     "cdtool/formats",
-    "cdtool/report",
     "cdtool/workflows",
     "sample_logs",
     "tests/*.py",
     "tests/cli",
     "tests/evaluation",
     "tests/formats",
-    "tests/report",
     "tests/workflows",
 )
 

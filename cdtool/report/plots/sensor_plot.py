@@ -1,4 +1,4 @@
-"""Which sensor sees an impact first: figure 4.10 of the thesis with times, over the force that grows meanwhile."""
+"""Which sensor detects an impact first: figure 4.10 of the thesis with times, and the contact force until then."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.impact.sensor_ranking import Ranking, SensorResponse
-from cdtool.report.figure_text import number
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 from cdtool.report.plots.style import FORCE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Kinds of sensor by where they are, from the contact to the controller.
+# Kinds of sensor by location, from the contact to the controller.
 _COLOURS = {
     "contact_force": "#D55E00",
     "drive_force": "#E69F00",
@@ -26,7 +26,7 @@ _COLOURS = {
 
 
 def plot_ranking(ranking: Ranking, path: Path) -> None:
-    """The contact force, and below it a row a sensor up to the moment when it sees the impact; the first on top.
+    """Draw the contact force, and below it a row per sensor up to its detection of the impact; the fastest on top.
 
     Raises UsageError, CdtoolError (see `save`).
     """
@@ -76,7 +76,7 @@ def _draw_row(axes: Axes, row: int, response: SensorResponse, end: float) -> Non
     colour = _COLOURS[response.sensor.quantity]
     if response.time is None:
         axes.plot([0.0, end], [row, row], color=colour, linewidth=1.2, linestyle=(0, (1, 2)))
-        axes.text(0.5 * end, row - 0.08, "sees nothing", ha="center", va="bottom", fontsize=7.5)
+        axes.text(0.5 * end, row - 0.08, "does not detect it", ha="center", va="bottom", fontsize=7.5)
         return
     at = 1e3 * response.time
     axes.barh(row, at, height=0.42, color=colour)

@@ -15,7 +15,7 @@ from cdtool.evaluation.results_file import to_json as results_json
 from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p
 from cdtool.evaluation.statistics.rates import poisson_difference_p
 from cdtool.evaluation.statistics.sample_size import detectable_difference, impacts_for_unpaired
-from cdtool.report.build_report import to_json
+from cdtool.report.writers.comparison_json import to_json
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
 from tests.made_up.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
 from tests.report.hostile import HOSTILE

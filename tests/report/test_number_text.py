@@ -1,4 +1,4 @@
-"""Figures as text."""
+"""Numbers as text."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import pytest
 
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.report.figure_text import missed, number, percent, rate, with_interval
+from cdtool.report.number_text import missed, number, percent, rate, with_interval
 
 NAN, INF = math.nan, math.inf
 
@@ -24,12 +24,12 @@ NAN, INF = math.nan, math.inf
         (12345.6, "12346"),
     ],
 )
-def test_a_figure_has_three_digits_and_no_exponent(value, text):
+def test_a_number_has_three_digits_and_no_exponent(value, text):
     assert number(value) == text
 
 
 @pytest.mark.parametrize(
-    ("figure", "text"),
+    ("interval", "text"),
     [
         (Interval(38.0, 36.21, 41.46), "38.0 (36.2 to 41.5)"),
         (Interval(148.75, 133.7, 163.5), "149 (134 to 164)"),
@@ -47,17 +47,17 @@ def test_a_figure_has_three_digits_and_no_exponent(value, text):
         (Interval(0.002, NAN, NAN), "0.00200 (–)"),
     ],
 )
-def test_an_interval_has_the_digits_of_its_figure(figure, text):
-    assert with_interval(figure) == text
+def test_an_interval_has_the_digits_of_its_value(interval, text):
+    assert with_interval(interval) == text
 
 
-def test_none_missed_is_a_bound_and_not_zero():
-    assert missed(0, 30, 1 - 0.05 ** (1 / 30)) == "0 of 30: at most 9.5 %"
-    assert missed(0, 0, NAN) == "–"
+def test_no_missed_contact_is_a_bound_and_not_zero():
+    assert "".join(missed(0, 30, 1 - 0.05 ** (1 / 30))) == "0 of 30: at most 9.5 %"
+    assert missed(0, 0, NAN) == ("–",)
     assert percent(NAN) == "–"
 
 
-def test_a_rate_without_an_alarm_is_its_bound_alone():
-    assert rate(0, Interval(0.0, 0.0, 37.0), 29.957) == "0: at most 30.0"
-    assert rate(1, Interval(10.0, 0.25, 55.7), 47.44) == "10.0 (0.2 to 55.7): at most 47.4"
-    assert rate(0, Interval(NAN, 0.0, INF), NAN) == "–"
+def test_a_rate_without_an_alarm_is_only_its_bound():
+    assert "".join(rate(0, Interval(0.0, 0.0, 37.0), 29.957)) == "0: at most 30.0"
+    assert "".join(rate(1, Interval(10.0, 0.25, 55.7), 47.44)) == "10.0 (0.2 to 55.7): at most 47.4"
+    assert "".join(rate(0, Interval(NAN, 0.0, INF), NAN)) == "–"
