@@ -86,7 +86,12 @@ function forcePlan(data, panel, readTrace, openTrace) {
       draw(
         chart.layer,
         "text",
-        { class: "small worst-text halo", x: after ? x + 8 : x - 8, y: at + 15, "text-anchor": after ? "start" : "end" },
+        {
+          class: "small worst-note halo",
+          x: after ? x + 8 : x - 8,
+          y: at + 15,
+          "text-anchor": after ? "start" : "end",
+        },
         `exceeded after ${numberText(worst.budget)} ms`,
       );
     }

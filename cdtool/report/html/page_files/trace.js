@@ -223,7 +223,8 @@ function tracePlan(data, trace) {
         height: box.to - box.from,
         fill: `url(#hatch-${code})`,
       });
-      const words = [`not assessable: ${data.reasons[code]}`, data.reasons[code]].find((text) => text.length * 6.2 + 8 < width);
+      const reason = data.reasons[code];
+      const words = [`not assessable: ${reason}`, reason].find((text) => text.length * 6.2 + 8 < width);
       if (words) draw(chart.front, "text", { class: "small halo", x: left + 4, y: box.to - 4 }, words);
     }
   }
@@ -281,12 +282,15 @@ function tracePlan(data, trace) {
       if (x < margin.left || x > chart.right || y > chart.bottom) return null;
       const time = chart.valueAtPixel(x);
       const when = contact ? `${numberText(1e3 * (time - contact.start), 4)} ms from onset` : `${time.toFixed(3)} s`;
-      if (y < first) return { x, y, words: `${when}\nload cell ${numberText(valueAt(trace.times, trace.values, time))} N` };
+      const force = () => numberText(valueAt(trace.times, trace.values, time));
+      if (y < first) return { x, y, words: `${when}\nload cell ${force()} N` };
       const panel = rows[Math.floor((y - first) / heights.row)];
       if (!panel) return null;
       const i = Math.max(placeOf(panel.time, time) - 1, 0);
       const status = panel.status[i] ? `not assessable: ${data.reasons[panel.status[i]]}` : "";
-      const limits = [panel.lower[i], panel.upper[i]].map((limit) => (Number.isFinite(limit) ? numberText(limit) : "none"));
+      const limits = [panel.lower[i], panel.upper[i]].map((limit) =>
+        Number.isFinite(limit) ? numberText(limit) : "none",
+      );
       const words = [
         when,
         `${data.detectors[panel.detector].name}: ${numberText(panel.value[i])} ${panel.unit}`,
