@@ -56,7 +56,7 @@ class Csv:
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """All numeric columns, or those of `keys`, a MiB of the file at a time; raises RecordingError."""
-        from cdtool.formats.csv.table_pieces import table_pieces
+        from cdtool.formats.csv.table import table_pieces
 
         dialect = _dialect(path, TablePins())
         # The last column, too: it shows whether the file's end is whole.
@@ -79,7 +79,7 @@ def _survey(path: Path, dialect: Dialect) -> TableSource:
     from cdtool.formats.csv.several_clocks import Clocks, clock_findings
     from cdtool.formats.csv.table import read_table
 
-    table = read_table(path, dialect, dialect.names, None, None)
+    table = read_table(path, dialect, dialect.names)
     table.findings += clock_findings(dialect, Clocks.by_names(dialect), table.values)
     return _source(path, dialect, table)
 
