@@ -17,8 +17,8 @@ from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source
 from cdtool.messages.batch import Batch
-from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
+from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
@@ -124,42 +124,20 @@ class _Bag:
             name = stream.channel.topic
             yield from topics.setdefault(name, TopicSurvey(name)).pieces(stream, batch, self.origin)
         columns, findings = {}, self._losses()
-        for item in (item for topic in topics.values() for item in topic.found()):
-            if isinstance(item, Finding):
-                findings.append(item)
-            else:
-                columns[item.name] = item
+        for topic in topics.values():
+            of_topic, found = topic.found()
+            columns |= of_topic
+            findings += found
         return columns, findings
 
     def wanted(self, wanted: ChannelMap) -> tuple[dict[str, Column], list[Finding]]:
-        """The fields of a map."""
-        fields: dict[str, list[str]] = {}
-        for source in wanted.sources:
-            if source.field not in fields.setdefault(source.topic, []):
-                fields[source.topic].append(source.field)
-        topics = {}
-        for name, texts in fields.items():
-            where = f"{self.path}: {name}"
-            parsed = [parse_field(text, where) for text in texts]
-            topics[name] = Gathering(where, name, parsed, wanted.time.clock, wanted.joint_names)
-        for stream, batch in self._batches(fields.__contains__):
+        """Return the fields of a map."""
+        topics = wanted_topics(self.path, wanted, Gathering)
+        for stream, batch in self._batches(topics.__contains__):
             topics[stream.channel.topic].add(stream, batch)
         held = with_topics(self.path, wanted, [name for name, (_, count) in self.topics.items() if count])
-        topics = {name: topics[name] for name in dict.fromkeys(source.topic for source in held.sources)}
-        columns, findings = {}, self._losses()
-        for name, topic in topics.items():
-            if not topic.decoders.decoded:
-                text = f"{self.path}: no message of {name} can be decoded: {topic.decoders.reason}"
-                raise RecordingError(text, "record it with its message definition")
-            findings += topic.decoders.failure(name)
-        if wanted.time.clock != "log":
-            self.origin = min(topic.first_stamp or 0 for topic in topics.values())
-        for name, topic in topics.items():
-            for i in range(len(fields[name])):
-                column, found = topic.column(i, self.origin)
-                columns[column.name] = column
-                findings += found
-        return columns, findings
+        columns, findings, self.origin = wanted_columns(self.path, held, topics, self.origin)
+        return columns, self._losses() + findings
 
     def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[_Stream, Batch]]:
         """The messages of the topics that are asked for, batch by batch."""

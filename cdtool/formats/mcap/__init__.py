@@ -14,25 +14,22 @@ from typing import ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
-from cdtool.formats.mcap.mapped_pieces import MappedFields
+from cdtool.formats.mcap.mapped_pieces import MappedFields, mapped_source_of, source_of
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source
-from cdtool.large_integers import rounding_finding
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
 from cdtool.messages.taken import Bound
+from cdtool.messages.topic import wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
-from cdtool.recording import Finding
 
 __all__ = ["Mcap"]
 
@@ -71,13 +68,11 @@ class Mcap:
                 yield from survey.pieces(messages.stream, messages.batch, origin)
         findings = log.findings()
         columns: dict[str, Column] = {}
-        for name in log.topics:
-            for item in topics[name].found() if name in topics else ():
-                if isinstance(item, Finding):
-                    findings.append(item)
-                else:
-                    columns[item.name] = item
-        return _source(path, log, columns, findings + jumps.findings(), log.origin)
+        for name in (name for name in log.topics if name in topics):
+            of_topic, found = topics[name].found()
+            columns |= of_topic
+            findings += found
+        return source_of(log, columns, findings + jumps.findings(), log.origin)
 
     def exact_pieces(self, path: Path) -> Pieces:
         """What `pieces` gives; of a log that cdtool converted with the times that were written."""
@@ -102,24 +97,10 @@ class Mcap:
 
 
 def _wanted(path: Path, wanted: ChannelMap) -> Source:
-    texts: dict[str, list[str]] = {}
-    for source in wanted.sources:
-        fields = texts.setdefault(source.topic, [])
-        if source.field not in fields:
-            fields.append(source.field)
+    asked = {source.topic for source in wanted.sources}
     taker = UniformTaker(publish=wanted.time.clock == "publish")
-    log = Log(path, texts.__contains__, taker=taker)
-    topics = {
-        name: Gathering(
-            f"{path}: {name}",
-            name,
-            [parse_field(text, f"{path}: {name}") for text in fields],
-            wanted.time.clock,
-            wanted.joint_names,
-            log.expected(name),
-        )
-        for name, fields in texts.items()
-    }
+    log = Log(path, asked.__contains__, taker=taker)
+    topics = wanted_topics(path, wanted, lambda *of: Gathering(*of, expected=log.expected(of[1])))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
@@ -131,18 +112,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
                 topic.add(messages.stream, messages.batch)
         if any(not messages.parts for messages in piece):
             taker.learn(_bound(log, topics))
-    findings = log.findings()
-    wanted = with_topics(path, wanted, [topic.name for topic in log.topics.values() if topic.count])
-    for name in dict.fromkeys(source.topic for source in wanted.sources):
-        findings += topics[name].decoders.told(f"{path}", name) + topics[name].orders.findings()
-    # A header's clock may be another one (simulated time): its own first stamp is its origin.
-    stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
-    origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
-    asked = dict.fromkeys((source.topic, texts[source.topic].index(source.field)) for source in wanted.sources)
-    gathered = [(*topics[name].column(index, origin), topics[name].rounded(index)) for name, index in asked]
-    for column, field_findings, rounded in gathered:
-        findings += [*field_findings, *rounding_finding(column.name, rounded)]
-    return _source(path, log, {column.name: column for column, _, _ in gathered}, findings, origin)
+    return mapped_source_of(log, wanted, topics)[0]
 
 
 def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
@@ -167,8 +137,3 @@ def _origin(path: Path, log: Log) -> int:
             pass
         return log.origin
     return first
-
-
-def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
-    details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))
