@@ -12,11 +12,10 @@ from cdtool.formats.groups import Group, Part
 from cdtool.formats.pieces import MappedLog
 from cdtool.formats.time_order import by_time
 from cdtool.ingest.logged_file import LoggedChannel, LoggedFile
-from cdtool.ingest.part_gaps import gaps_between
-from cdtool.ingest.part_pieces import FoundParts
-from cdtool.ingest.parts import not_alike, of_part, overlapping
+from cdtool.ingest.parts import check_parts, gaps_between, of_part
+from cdtool.ingest.reading import FoundParts
 from cdtool.machine_file import MachineFile
-from cdtool.recording import GROUND_TRUTH, Finding
+from cdtool.recording import Finding
 
 
 class ChannelPieces:
@@ -34,10 +33,15 @@ class ChannelPieces:
         self._folder, self._joints = folder, machine_file.topics.joints
         self.origin = self._files[0].origin
         self.is_coarse = any(file.is_coarse for file in self._files)
+        check_parts([file.spanned for file in self._files])
         self._late = max(file.late for file in self._files)
+        latest = -np.inf  # how far a part's channels stand behind any of those before it is lateness, too
+        for file in self._files:
+            shift = file.origin - self.origin
+            self._late = max(self._late, latest - (file.start + shift))
+            latest = max(latest, file.end + shift)
         clocks: dict[tuple[bytes, ...], list[str]] = {}
         for name in dict.fromkeys(name for file in self._files for name in file.channels):
-            self._check(name)
             digests = (file.channels[name].digest.digest() if name in file.channels else b"" for file in self._files)
             clocks.setdefault(tuple(digests), []).append(name)
         self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
@@ -60,24 +64,6 @@ class ChannelPieces:
     def _pieces(self, names: dict[str, list[Column]]) -> Iterator[Piece]:
         for file in self._files:
             yield from file.pieces(names, file.origin - self.origin)
-
-    def _check(self, name: str) -> None:
-        """Raise RecordingError where a part lacks the channel, or begins before the one before it ends.
-
-        How far it stands behind other channels of parts before it, is kept.
-        """
-        end, latest = -np.inf, -np.inf
-        for file in self._files:
-            shift = file.origin - self.origin
-            if name in file.channels:
-                first, last = file.channels[name].span
-                if first + shift <= end:
-                    raise overlapping(str(file.path), name, first + shift, end)
-                self._late = max(self._late, latest - (first + shift))
-                end = last + shift
-            elif name not in GROUND_TRUTH:
-                raise not_alike(str(file.path), name, str(self._files[0].path))
-            latest = max(latest, file.end + shift)
 
     def _group(self, name: str, channels: Sequence[str]) -> Group:
         holding = [file for file in self._files if channels[0] in file.channels]

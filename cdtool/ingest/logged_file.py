@@ -26,7 +26,7 @@ from cdtool.ingest.channel_assembly import (
     in_si,
     stuck_findings,
 )
-from cdtool.ingest.part_gaps import PartSpan
+from cdtool.ingest.parts import ChannelSpan, PartSpan
 from cdtool.machine_file import MachineFile
 from cdtool.recording import MEASURED, Finding, FloatArray
 
@@ -135,10 +135,11 @@ class LoggedFile:
     @property
     def spanned(self) -> PartSpan:
         """What its channels span."""
-        steps = {name: each.steps.median if each.steps.count else np.inf for name, each in self.channels.items()}
-        return PartSpan(
-            self.path, self.origin, {name: (*each.span, steps[name]) for name, each in self.channels.items()}
-        )
+        spans = {
+            name: ChannelSpan(*each.span, each.steps.median if each.steps.count else np.inf, each.item.unit)
+            for name, each in self.channels.items()
+        }
+        return PartSpan(str(self.path), self.origin, spans)
 
     @property
     def is_coarse(self) -> bool:

@@ -27,13 +27,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class TableSource(Source):
-    """A table's columns; `dialect` is how it is written, as `[csv]` of a machine file."""
-
-    dialect: str = ""
-
-
-@dataclass(frozen=True)
 class Csv:
     """Tables of text: separator, header, decimal mark and encoding are found from the first lines, or pinned."""
 
@@ -49,7 +42,7 @@ class Csv:
         sample = read_sample(path)
         return bool(sample.strip()) and looks_like_text(sample)
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> TableSource:
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError with the line number."""
         dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
         return _survey(path, dialect) if wanted is None else _wanted(path, dialect, wanted)
@@ -75,7 +68,7 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     return find_dialect(path, sample, pins)
 
 
-def _survey(path: Path, dialect: Dialect) -> TableSource:
+def _survey(path: Path, dialect: Dialect) -> Source:
     from cdtool.formats.csv.several_clocks import Clocks, clock_findings
     from cdtool.formats.csv.table import read_table
 
@@ -84,7 +77,7 @@ def _survey(path: Path, dialect: Dialect) -> TableSource:
     return _source(path, dialect, table)
 
 
-def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
+def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
     from cdtool.formats.csv.table import read_table
     from cdtool.formats.csv.written_origin import written_origin
@@ -112,7 +105,7 @@ def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
     return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
 
 
-def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
+def _source(path: Path, dialect: Dialect, table: Table) -> Source:
     from cdtool.formats.csv.several_clocks import told_unit
     from cdtool.formats.csv.written_origin import written_origin
 
@@ -120,7 +113,7 @@ def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
         key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
         for key, values in table.values.items()
     }
-    return TableSource(
+    return Source(
         path=path,
         format=Csv.name,
         columns=columns,
