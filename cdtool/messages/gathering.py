@@ -154,7 +154,7 @@ class Gathering(Topic):
         for part in _joined(parts):
             self.decoders.decoded += part.count
             self._stamps.confirm(part.destination.stamps, part.rows)
-            self.orders.add(stream.channel.id, part.destination.stamps[part.rows], part.ascending)
+            self.orders.add(stream.id, part.destination.stamps[part.rows], part.ascending)
             for (text, rows), table in zip(self._rows.items(), part.destination.tables, strict=True):
                 self.fields[text].count(part.count, Counter(dict.fromkeys(table.shape[1:], part.count)))
                 rows.rows.confirm(table, part.rows)

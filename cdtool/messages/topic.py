@@ -92,7 +92,7 @@ class Topic:
         whole = self.decoders.keep(gathered)
         all_whole = bool(whole.all())
         stamps = stamps if all_whole else stamps[whole]
-        self.orders.add(stream.channel.id, stamps)
+        self.orders.add(stream.id, stamps)
         if self.first_stamp is None and len(stamps):
             self.first_stamp = int(stamps[0])
         values: dict[str, Values] = {}

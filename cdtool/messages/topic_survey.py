@@ -69,7 +69,7 @@ class TopicSurvey:
         whole = self.decoders.keep(gathered)
         self._add_stamps(batch, gathered, whole)
         stamps = batch.log_time if whole.all() else batch.log_time[whole]
-        self._orders.add(stream.channel.id, stamps)
+        self._orders.add(stream.id, stamps)
         time, order = in_order(stamps, origin)
         values: dict[str, FloatArray] = {}
         for name, picked in zip(self._fields, gathered.picked, strict=True):

@@ -63,7 +63,7 @@ class Mcap:
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
-                name = messages.stream.channel.topic
+                name = messages.stream.topic
                 survey = topics.setdefault(name, TopicSurvey(name))
                 yield from survey.pieces(messages.stream, messages.batch, origin)
         findings = log.findings()
@@ -105,7 +105,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
         for messages in piece:
-            topic = topics[messages.stream.channel.topic]
+            topic = topics[messages.stream.topic]
             if messages.parts:
                 topic.confirm(messages.stream, messages.parts)
             else:

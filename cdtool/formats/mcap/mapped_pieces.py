@@ -45,7 +45,7 @@ class MappedFields:
             if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
                 start = first
             for messages in piece:
-                topic = topics[messages.stream.channel.topic]
+                topic = topics[messages.stream.topic]
                 taken = topic.take(messages.stream, messages.batch)
                 if taken is None or not len(taken[0]):
                     continue

@@ -12,7 +12,7 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
-from cdtool.formats.mcap.container.definitions import Definitions, Stream
+from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.container.ends import end_of_log, profile_of
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
@@ -32,7 +32,7 @@ class Messages:
     They are either a batch or `parts` that a taker made columns of, chunk by chunk.
     """
 
-    stream: Stream
+    stream: DefinedStream
     batch: Batch
     covered: bool
     parts: tuple[Part, ...] = ()
@@ -132,7 +132,7 @@ class Log:
         self.counts[channel] += count
         covered = covered and stream.covered
         self.unverified += 0 if covered else count
-        if self._wanted(stream.channel.topic):
+        if self._wanted(stream.topic):
             yield Messages(stream, batch, covered, parts)
 
     def _finish(self) -> None:
@@ -140,11 +140,11 @@ class Log:
         for place in self._skip.keys() & section.chunks.keys():
             self.counts.update(self._skip[place])
         for stream in self._definitions.streams():
-            name = stream.channel.topic
+            name = stream.topic
             schema = stream.schema.name if stream.schema is not None else "no schema"
-            topic = self.topics.setdefault(name, Topic(name, schema, stream.channel.message_encoding))
-            topic.count += self.counts[stream.channel.id]
-            topic.channels += bool(self.counts[stream.channel.id])
+            topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
+            topic.count += self.counts[stream.id]
+            topic.channels += bool(self.counts[stream.id])
         self.origin = section.room.first_time or 0
         self._check_data_crc()
         self._look_behind()
