@@ -42,7 +42,8 @@ class ChannelPieces:
             latest = max(latest, file.end + shift)
         clocks: dict[tuple[bytes, ...], list[str]] = {}
         for name in dict.fromkeys(name for file in self._files for name in file.channels):
-            digests = (file.channels[name].digest.digest() if name in file.channels else b"" for file in self._files)
+            held = (file.channels.get(name) for file in self._files)
+            digests = (b"" if channel is None else channel.clock.digest.digest() for channel in held)
             clocks.setdefault(tuple(digests), []).append(name)
         self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
 
@@ -68,7 +69,7 @@ class ChannelPieces:
     def _group(self, name: str, channels: Sequence[str]) -> Group:
         holding = [file for file in self._files if channels[0] in file.channels]
         start = holding[0].channels[channels[0]].span[0] + (holding[0].origin - self.origin)
-        rows = sum(file.channels[channels[0]].rows for file in holding)
+        rows = sum(file.channels[channels[0]].clock.rows for file in holding)
         columns = tuple(_header(holding[0].channels[channel]) for channel in channels)
         return Group(name, columns, rows, True, start, self._joints)
 

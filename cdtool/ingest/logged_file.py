@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cdtool.channels import ChannelSource
 from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
 from cdtool.columns import Column, Piece
-from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.pieces import MappedLog, Run
@@ -24,8 +21,10 @@ from cdtool.ingest.channel_assembly import (
     apart_findings,
     check_width,
     in_si,
+    masked_findings,
     stuck_findings,
 )
+from cdtool.ingest.log_figures import ClockFigures
 from cdtool.ingest.parts import ChannelSpan, PartSpan
 from cdtool.machine_file import MachineFile
 from cdtool.recording import MEASURED, Finding, FloatArray
@@ -39,13 +38,9 @@ class LoggedChannel:
 
     def __init__(self, path: Path, item: ChannelSource, names: Sequence[str], period: float | None = None) -> None:
         self._path, self.item, self.joints, self._names = path, item, len(item.factor), names
-        self.clean = CleanPieces()
-        self.rows, self.first, self.last = 0, np.nan, np.nan
-        self.steps = Distribution()
-        self.digest: Any = hashlib.blake2b(digest_size=16)  # of the times
+        self.clean, self.clock = CleanPieces(), ClockFigures()
         self._gaps = None if period is None else Gaps(period, item.channel)
-        self._masked, self._missing = in_si(item, np.empty((0, self.joints)))[1], 0
-        self._known = np.zeros(self.joints, np.int64)
+        self._masked, self._known = np.zeros((3, self.joints), np.int64), np.zeros(self.joints, np.int64)
         self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
 
     def add(self, stamps: FloatArray, values: FloatArray | None, final: bool = False) -> tuple[FloatArray, FloatArray]:
@@ -58,18 +53,12 @@ class LoggedChannel:
         time, table = self.clean.rows(stamps, stamps, table, final)
         rows, masked = in_si(self.item, table)
         self._masked += masked
-        present = np.isfinite(rows)
-        self._missing += rows.size - int(np.count_nonzero(present))
-        self._known += np.count_nonzero(present, axis=0)
+        self._known += np.count_nonzero(np.isfinite(rows), axis=0)
         self._least = np.fmin(self._least, np.fmin.reduce(rows, axis=0, initial=np.inf))
         self._most = np.fmax(self._most, np.fmax.reduce(rows, axis=0, initial=-np.inf))
-        if len(time):
-            self.steps.add(np.diff(time) if self.rows == 0 else np.diff(time, prepend=self.last))
-            self.first, self.last = float(time[0]) if self.rows == 0 else self.first, float(time[-1])
-            self.digest.update(time)
-            self.rows += len(time)
-            if self._gaps is not None:
-                self._gaps.add(time)
+        self.clock.add(time, len(time))
+        if self._gaps is not None:
+            self._gaps.add(time)
         return (time + self.item.time_offset if self.item.time_offset else time), rows
 
     @property
@@ -80,7 +69,7 @@ class LoggedChannel:
     @property
     def span(self) -> tuple[float, float]:
         """First and last time [s], `time_offset` included."""
-        return self.first + self.item.time_offset, self.last + self.item.time_offset
+        return self.clock.first + self.item.time_offset, self.clock.last + self.item.time_offset
 
     @property
     def constant(self) -> list[bool]:
@@ -90,9 +79,11 @@ class LoggedChannel:
     def findings(self) -> list[Finding]:
         """What is odd, in the words of channel_assembly."""
         found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
-        found += self._masked.findings(self.item, self._names)
+        found += masked_findings(self._masked, self.item, self._names)
         found += self._gaps.findings() if self._gaps is not None else []
-        return found + missing_findings(self._missing, self.rows * self.joints, self.item.channel, self._masked.total)
+        values = self.clock.rows * self.joints
+        absent = values - int(self._known.sum())
+        return found + missing_findings(absent, values, self.item.channel, int(self._masked.sum()))
 
 
 class LoggedFile:
@@ -117,7 +108,7 @@ class LoggedFile:
         self.origin, self._told = source.origin, source.findings
         for channel in self.channels.values():
             check_width(path, channel.item, math.prod(source.columns[channel.item.described].values.shape[1:]))
-            if not channel.rows:
+            if not channel.clock.rows:
                 raise RecordingError(f"{path}: channel '{channel.item.channel}' has no sample with a time")
         offsets = [item.time_offset for item in held.sources]
         self.late += max(offsets, default=0.0) - min(offsets, default=0.0)
@@ -136,7 +127,7 @@ class LoggedFile:
     def spanned(self) -> PartSpan:
         """What its channels span."""
         spans = {
-            name: ChannelSpan(*each.span, each.steps.median if each.steps.count else np.inf, each.item.unit)
+            name: ChannelSpan(*each.span, each.clock.steps.median if each.clock.steps.count else np.inf, each.item.unit)
             for name, each in self.channels.items()
         }
         return PartSpan(str(self.path), self.origin, spans)
@@ -158,7 +149,7 @@ class LoggedFile:
     def pieces(self, names: Collection[str], shift: float) -> Iterator[Piece]:
         """The channels of those names, each a clock of its own; `shift` [s] is added to their times."""
         again = {
-            name: LoggedChannel(self.path, channel.item, self._joints, channel.steps.median)
+            name: LoggedChannel(self.path, channel.item, self._joints, channel.clock.steps.median)
             for name, channel in self.channels.items()
             if name in names
         }
