@@ -13,10 +13,9 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
-from cdtool.formats.arrow_check import check_batches
 from cdtool.formats.column_names import OWN_CLOCK, asked_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.parquet_check import check_pages
+from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.formats.pieces import VALUES_A_PIECE, Pieces, joined
 from cdtool.formats.source import Source
 from cdtool.recording import Finding, FloatArray

@@ -24,6 +24,15 @@ from cdtool.recording import FloatArray
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect
     from cdtool.formats.csv.table import Table
+import math
+from itertools import takewhile
+
+from cdtool.formats.groups import PREFIX
+
+_MARK = b"# " + PREFIX.encode()
+_KEY = _MARK + b"origin_s: "
+# A long list of parts, or of what was lost, stands behind it.
+_HEAD = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,6 @@ def _survey(path: Path, dialect: Dialect) -> Source:
 def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
     from cdtool.formats.csv.table import read_table
-    from cdtool.formats.csv.written_origin import written_origin
 
     names, time = dialect.names, wanted.time
     clock = column_key(time.column, names) if time.column is not None else None
@@ -107,7 +115,6 @@ def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
 
 def _source(path: Path, dialect: Dialect, table: Table) -> Source:
     from cdtool.formats.csv.several_clocks import told_unit
-    from cdtool.formats.csv.written_origin import written_origin
 
     columns = {
         key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
@@ -135,3 +142,16 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
     values = np.column_stack(list(columns.values()))
     body = (row * len(values)) % tuple(values.ravel().tolist())
     path.write_text(",".join(columns) + "\n" + body, encoding="utf-8", newline="\n")
+
+
+def written_origin(path: Path) -> float:
+    """Return the origin [s] that stands in a text table's own head; 0 where there is none."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
+    written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
+    try:
+        origin = float(written)
+    except ValueError:  # somebody has edited it
+        return 0.0
+    return origin if math.isfinite(origin) else 0.0

@@ -5,6 +5,7 @@ A table is read as a whole, or block by block where it need not fit into memory.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,17 +18,84 @@ from cdtool.columns import Piece
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.exact_clock import exact_differences
-from cdtool.formats.csv.excel_days import DAY_S, since_1970, two_readings
-from cdtool.formats.csv.last_line import RECENT, is_whole
+from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
 from cdtool.formats.csv.odd_lines import OddLines, not_numeric
 from cdtool.formats.csv.row_arrays import Rows
+from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
-from cdtool.formats.csv.stamp_columns import StampColumns
-from cdtool.formats.csv.stamps import NS
+from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrapped
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import Finding, FloatArray
+
+RECENT = 20
+_SHAPE = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
+
+
+class StampColumns:
+    """Dates and times of day as seconds: since the first that has a date (`origin` [ns]), midnight or the full hour.
+
+    Rows may come piece by piece, in the file's order.
+    """
+
+    def __init__(self, dialect: Dialect, read: Sequence[int], dates: Mapping[int, int]) -> None:
+        self._dialect, self._read, self._dates = dialect, read, dates
+        self._columns = [column for column in read if column not in dates.values()]
+        self.origin: int | None = None
+        self._passed = dict.fromkeys(self._columns, 0)  # midnights, or full hours
+        self._last: dict[int, Integers] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """The columns that it makes."""
+        return [self._dialect.names[column] for column in self._columns]
+
+    def seconds(self, rows: Rows) -> dict[str, FloatArray]:
+        """The next rows."""
+        return {self._dialect.names[column]: self._of(column, rows) for column in self._columns}
+
+    def _of(self, column: int, rows: Rows) -> FloatArray:
+        stamps = rows.stamps[self._read.index(column)].copy()
+        known = stamps != MISSING_STAMP
+        dated = self._dated(column)
+        if column in self._dates:
+            days = rows.stamps[self._read.index(self._dates[column])]
+            known &= days != MISSING_STAMP
+            stamps[known] += days[known]
+        elif not dated and known.any():
+            # Before them the last stamp so far: midnight may lie between two pieces.
+            times = np.concatenate((self._last.get(column, stamps[known][:1]), stamps[known]))
+            self._last[column] = times[-1:].copy()
+            period, _ = self._layout(column).wraps
+            passed = unwrapped(times, np.ones(len(times), dtype=bool), period)
+            stamps[known] = times[1:] + self._passed[column] * period
+            self._passed[column] += passed
+        if dated and self.origin is None and known.any():
+            self.origin = int(stamps[known][0])
+        return seconds_since(stamps, known, self._start(column))
+
+    def _dated(self, column: int) -> bool:
+        return self._layout(column).dated or column in self._dates
+
+    def _layout(self, column: int) -> Layout:
+        return self._dialect.stamped[column].layouts[0]
+
+    def _start(self, column: int) -> int:
+        return self.origin if self._dated(column) and self.origin is not None else 0
+
+    def findings(self) -> list[Finding]:
+        """How each is written, and what its seconds count from."""
+        found = []
+        for column in self._columns:
+            text, wrap = "", self._layout(column).wraps[1]
+            if column in self._dates:
+                text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
+            elif self._passed[column]:
+                text = f"passes {wrap} {self._passed[column]} times; "
+            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wrap
+            text += f"written as {self._layout(column).pattern}; in s since {since}"
+            found.append(Finding(text, self._dialect.names[column], "note"))
+        return found
 
 
 @dataclass
@@ -275,3 +343,51 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
         return []
     text = f"the last line ({line}) has no line end, and '{cell}' may be cut off, dropped"
     return [Finding(text, severity="loss")]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Digits before and after the decimal mark (-1: no mark), and of the exponent (-1: none)."""
+
+    whole: int
+    decimals: int
+    power: int
+
+    @classmethod
+    def of(cls, cell: str) -> _Shape | None:
+        found = _SHAPE.fullmatch(cell)
+        if found is None:
+            return None
+        decimals, power = found["decimals"], found["power"]
+        return cls(len(found["whole"]), -1 if decimals is None else len(decimals), -1 if power is None else len(power))
+
+
+def is_whole(cell: str, above: Sequence[str]) -> tuple[bool, bool]:
+    """Is the last cell of an unfinished line whole, and is that certain? `above` are cells of its column.
+
+    A cut leaves fewer digits. So the last number is believed if it has as many decimals as all those above it; where
+    their number varies, if it has no fewer than any of them, and that is said; else the line is dropped.
+    """
+    if not above:
+        return True, False
+    if cell == '"':  # the quote that closes it is there
+        return True, True
+    last, shapes = _Shape.of(cell), [_Shape.of(other) for other in above]
+    known = [shape for shape in shapes if shape is not None]
+    if last is None:  # words, a stamp, nothing: as long as those above
+        lengths = {len(other) for other in above}
+        return bool(lengths) and len(cell) >= min(lengths), len(lengths) == 1 and len(cell) in lengths
+    if not known:
+        return False, False
+    powers = {shape.power for shape in known}
+    if len(powers) == 1 and last.power not in powers:
+        return False, False
+    if last.power >= 0:
+        fewest = min((shape.power for shape in known if shape.power >= 0), default=2)
+        return last.power >= fewest, powers == {last.power}
+    decimals = {shape.decimals for shape in known if shape.power < 0}
+    if decimals == {-1} or not decimals:
+        digits = {shape.whole for shape in known}
+        return last.whole >= min(digits), digits == {last.whole}
+    certain = len(decimals) == 1 and last.decimals in decimals and last.decimals > 0
+    return certain or last.decimals >= max(1, min(decimals)), certain

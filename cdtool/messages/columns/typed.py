@@ -12,9 +12,8 @@ import numpy.typing as npt
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns.by_name import NamedPlan, gather_by_name
 from cdtool.messages.columns.gathered import ByteArray, Gathered, IntArray
-from cdtool.messages.columns.pattern import Pattern
+from cdtool.messages.columns.pattern import Pattern, recipe_of
 from cdtool.messages.columns.picking import Plan, nowhere, pick
-from cdtool.messages.columns.recipes import recipe_of
 from cdtool.messages.columns.resolution import names_place, resolve
 from cdtool.messages.columns.slots import Found, Place
 from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError

@@ -25,7 +25,6 @@ from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss, Losses
-from cdtool.formats.mcap.container.record_length import NO_KIND, record_length
 from cdtool.formats.mcap.container.records import (
     MAGIC,
     PREFIX,
@@ -47,8 +46,9 @@ from cdtool.messages.taken import Taker
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
+_NO_KIND = "a record of kind 0, which there is not"
 _REASONS = {
-    why.NO_KIND: NO_KIND,
+    why.NO_KIND: _NO_KIND,
     why.TOO_LONG: "a record claims more bytes than its chunk has left",
     why.SHORT_MESSAGE: "a message shorter than its header",
 }
@@ -249,3 +249,19 @@ class DataSection:
                 self.extras[opcode, at, length] = None
                 if opcode == Attachment.opcode:
                     self._resync.proven = at + length
+
+
+def record_length(at: int, head: memoryview, size: int) -> int:
+    """Return the length of the record at byte `at`, prefix included, as far as that can be believed.
+
+    Section "Records": opcode, length of the content, content. The file has `size` bytes. Raises DamageError.
+    """
+    left = size - at - PREFIX
+    if left < 0:
+        raise DamageError(f"the file ends within a record: {left + PREFIX} bytes are left")
+    length = int.from_bytes(head[1:PREFIX], "little")
+    if head[0] == 0:
+        raise DamageError(_NO_KIND)
+    if length > left:
+        raise DamageError(f"a record claims {length} bytes where {left} are left")
+    return PREFIX + length

@@ -13,9 +13,9 @@ from cdtool.errors import RecordingError
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
-from cdtool.formats.mcap.container.ends import end_of_log, profile_of
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
+from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
@@ -23,6 +23,8 @@ from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.taken import Part, Taker
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
+
+_LONGEST_HEADER = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -238,3 +240,27 @@ class Log:
                 found.append(Finding("the summary disagrees with the data: other message counts by channel"))
         text = "the summary defines it otherwise than the data"
         return found + [Finding(text, topic) for topic in self._definitions.told_otherwise()]
+
+
+def profile_of(file: FileBytes) -> str:
+    """What the header calls the file's profile, `ros2` for one; empty where there is none."""
+    head = file.read(len(MAGIC), PREFIX)
+    length = int.from_bytes(head[1:], "little")
+    if len(head) < PREFIX or head[0] != Header.opcode or length > _LONGEST_HEADER:
+        return ""
+    try:
+        return Header.read(file.read(len(MAGIC) + PREFIX, length)).profile
+    except DamageError:
+        return ""
+
+
+def end_of_log(file: FileBytes, at: int) -> int | None:
+    """Where the log ends whose end of data stands at byte `at`: behind the magic bytes that follow its footer."""
+    while True:
+        head = file.read(at, PREFIX)
+        length = PREFIX + int.from_bytes(head[1:], "little")
+        if len(head) < PREFIX or not head[0] or length > file.size - at:
+            return None
+        at += length
+        if head[0] == Footer.opcode:
+            return at + len(MAGIC) if bytes(file.read(at, len(MAGIC))) == MAGIC else None
