@@ -14,7 +14,7 @@ from cdtool.recording import Recording
 class LoggedRecording:
     """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers.
 
-    `format`, `details` and, of a table of text, `dialect` are what its files say of themselves.
+    `format`, `details` and, of a table of text, `dialect` are what its files state.
     """
 
     recording: Recording

@@ -98,7 +98,8 @@ class _Bag:
         for stream, batch in self._batches(lambda _: True):
             name = stream.topic
             yield from topics.setdefault(name, TopicSurvey(name)).pieces(stream, batch, self.origin)
-        columns, findings = {}, self._losses()
+        columns: dict[str, Column] = {}
+        findings = self._losses()
         for topic in topics.values():
             of_topic, found = topic.found()
             columns |= of_topic

@@ -91,7 +91,7 @@ class LoggedChannel:
 class LoggedFile:
     """A file of messages that is read once for its figures, twice where they do not stand in the order of time.
 
-    `channels` hold the figures, `late` [s] by how much any sample stands behind later ones. Gaps are known once
+    `channels` hold the figures, `late` [s] how late any sample is at most (Lateness). Gaps are known once
     `pieces` has been run through. `log` gives the mapped fields of the file at `path`. Raises RecordingError.
     """
 
@@ -141,7 +141,7 @@ class LoggedFile:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is odd about the file and its channels."""
+        """The findings of the file and its channels."""
         found = [*self._told, *(item for channel in self.channels.values() for item in channel.findings())]
         constant = {name: self.channels[name].constant for name in MEASURED if name in self.channels}
         found += stuck_findings(constant, self._joints)
@@ -230,7 +230,7 @@ class ChannelPieces:
         self.is_coarse = any(file.is_coarse for file in self._files)
         check_parts([file.spanned for file in self._files])
         self._late = max(file.late for file in self._files)
-        latest = -np.inf  # how far a part's channels stand behind any of those before it is lateness, too
+        latest = -np.inf  # a part that begins before others end is late, too
         for file in self._files:
             shift = file.origin - self.origin
             self._late = max(self._late, latest - (file.start + shift))
@@ -244,7 +244,7 @@ class ChannelPieces:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is odd; gaps are among it once the rows have been run through."""
+        """All findings; gaps are among them once the rows have been run through."""
         if self._folder is None:
             return self._files[0].findings
         of_parts = (item for file in self._files for item in of_part(file.path, file.findings))

@@ -63,7 +63,7 @@ def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
 def joined_sources(
     folder: Path, parts: Sequence[tuple[Source, Mapping[str, Span]]], unread: Mapping[Path, RecordingError]
 ) -> Source:
-    """Return the columns of all parts without rows, with what is odd about every part, in the order of their times.
+    """Return the columns of all parts without rows, with the findings of every part, in the order of their times.
 
     Each part comes with what its columns span [s], on one clock. A column may be absent in some of them; one whose
     arrays differ in length is left out, and that is said, as are parts that could not be read (`unread`).
@@ -122,7 +122,7 @@ class PartSpan:
 
 
 def check_parts(parts: Sequence[PartSpan]) -> None:
-    """Raise RecordingError where a part lacks a channel, or begins before the one before it ends.
+    """Raise RecordingError where a part has no such channel, or begins before the one before it ends.
 
     Ground truth may be in some of them only, such as the events of a stroke.
     """
@@ -185,12 +185,12 @@ def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
 
 
 def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
-    """What is odd about a part, with its name."""
+    """The findings of a part, with its name."""
     return (replace(found, message=f"{path.name}: {found.message}") for found in findings)
 
 
 def joined_details(parts: Sequence[tuple[Path, Mapping[str, str]]]) -> dict[str, str]:
-    """Return what the parts of a log say of themselves, and of each topic once: the messages of all are added up."""
+    """Return what the parts of a log state, each topic once: the messages of all are added up."""
     if len(parts) == 1:
         return dict(parts[0][1])
     said: dict[str, list[str]] = {}
@@ -232,7 +232,7 @@ def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
 
 
 def _block_list(below: Sequence[str]) -> Iterator[str]:
-    """Lines `- bag_0.mcap`, until one that is no item."""
+    """Lines `- bag_0.mcap`, until one that is not an item."""
     for line in below:
         text = line.strip()
         if not text or text.startswith("#"):

@@ -157,7 +157,7 @@ def read_as_logged(
         return read_parts([path], machine_file, path.stem)
     if unread == "loss":
         found = FoundParts.of(path)
-        parts, lost = found.filled, found.findings
+        parts, lost = list(found.filled), list(found.findings)
         if not parts:
             raise RecordingError(f"{path}: no part of the log holds a message", "was the recording stopped at once?")
     else:

@@ -1,6 +1,6 @@
 """The wanted fields of a topic, gathered batch by batch into columns.
 
-Arrays grow by batches, without a copy where their length was foretold; others may write rows of their own into them.
+Arrays grow by batches, without a copy where their length was expected; others may write rows of their own into them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdtool.messages.taken import Bound, Destination, Part
 from cdtool.messages.topic import Topic, Values, in_order
 from cdtool.recording import Finding, FloatArray
 
-# A foretold length is no more than a hint: this much is reserved at most [bytes].
+# An expected length is no more than a hint: this much is reserved at most [bytes].
 _MOST_RESERVED = 1 << 28
 # How often an array that others write into is replaced: each time it is copied.
 _MOST_REPLACED = 16
@@ -115,7 +115,7 @@ class _FieldRows:
 
 
 class Gathering(Topic):
-    """A topic whose rows are kept; `expected` messages are foretold."""
+    """A topic whose rows are kept in memory; so many messages are `expected`."""
 
     def __init__(
         self, path: Path, topic: str, texts: Iterable[str], clock: str, joints: Sequence[str], expected: int = 0
@@ -161,7 +161,7 @@ class Gathering(Topic):
                 rows.mark(part.count)
 
     def column(self, text: str) -> tuple[Column, list[Finding]]:
-        """Return a field as a column in the order of its times, and what is odd about it; raises RecordingError."""
+        """Return a field as a column in the order of its times, and its findings; raises RecordingError."""
         column, findings = super().column(text)
         rows = self._rows[text]
         values = rows.rows.values

@@ -10,7 +10,7 @@ class Stream:
     """A channel by its number in its log; several may write to one topic.
 
     `encoding` is how its messages are written, such as `cdr`; `definition` is how they are laid out: a language such as
-    `ros2msg`, the type of the messages, such as `sensor_msgs/msg/JointState`, and the text; all empty: there is none.
+    `ros2msg`, the type of the messages, such as `sensor_msgs/msg/JointState`, and the text; all empty: unknown.
     """
 
     id: int

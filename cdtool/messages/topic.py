@@ -1,4 +1,4 @@
-"""The fields of a log's topics that a channel map names: their values batch by batch, and what is odd about them."""
+"""The fields of a log's topics that a channel map names: their values batch by batch, and the findings about them."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Topic:
         return stamps, values
 
     def column(self, text: str) -> tuple[Column, list[Finding]]:
-        """Return a field as a column, here without rows, and what is odd about it; raises RecordingError."""
+        """Return a field as a column, here without rows, and its findings; raises RecordingError."""
         each, name = self.fields[text], f"{self.topic} {text}"
         findings = []
         if each.elsewhere:
@@ -143,7 +143,7 @@ def wanted_topics(
 def wanted_columns(
     path: Path, wanted: ChannelMap, topics: Mapping[str, Topic], origin: int
 ) -> tuple[dict[str, Column], list[Finding], int]:
-    """Return the columns of a map whose topics the log holds, what is odd, and what their times count from [ns].
+    """Return the columns of a map whose topics the log holds, their findings, and what their times count from [ns].
 
     A header's clock may be another one (simulated time): its own first stamp is its origin; by the log's clock it is
     `origin`. Raises RecordingError where no message of a topic can be decoded, or a field's messages do not agree.

@@ -113,7 +113,7 @@ class TopicSurvey:
         return values
 
     def found(self) -> tuple[dict[str, Column], list[Finding]]:
-        """Return the columns without rows, and what is odd: arrays whose length varies, undecodable messages."""
+        """Return the columns without rows, and the findings: arrays whose length varies, undecodable messages."""
         columns: dict[str, Column] = {}
         findings = self.decoders.failure(self.topic) + self._orders.findings()
         for name in self._fields:

@@ -101,7 +101,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     asked = {source.topic for source in wanted.sources}
     taker = UniformTaker(publish=wanted.time.clock == "publish")
     log = Log(path, asked.__contains__, taker=taker)
-    topics = wanted_topics(path, wanted, lambda *of: Gathering(*of, expected=log.expected(of[1])))
+    topics = wanted_topics(path, wanted, lambda *topic: Gathering(*topic, log.expected(topic[1])))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
@@ -173,9 +173,9 @@ class MappedFields:
                 start = int(taken[0][0]) if start is None else start
                 for text in taken[1]:
                     if (name := f"{topic.topic} {text}") in self._asked:
-                        piece = self._piece(name, text, taken, start)
-                        if piece.rows:
-                            yield piece
+                        of_field = self._piece(name, text, taken, start)
+                        if of_field.rows:
+                            yield of_field
         source, self.origin = mapped_source_of(log, self.wanted, topics)
         self.settled = self.origin == start
         if self._converted is None:

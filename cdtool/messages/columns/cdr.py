@@ -1,6 +1,6 @@
 """ROS 2's plain CDR and ROS 1 (MCAP, "Well-known message encodings"; OMG DDS-XTypes 1.3, 7.4.1).
 
-A CDR message begins with four bytes of encapsulation; the second one tells the byte order: 0 big, 1 little. Other kinds
+A CDR message begins with four bytes of encapsulation; the second one is the byte order: 0 big, 1 little. Other kinds
 (parameter lists, encoding version 2) align differently and are refused. An int64 or uint64 beyond 2^53 is rounded to
 the nearest float64.
 """
