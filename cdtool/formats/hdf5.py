@@ -23,7 +23,7 @@ from cdtool.formats.container_checks import (
     one_line_errors,
 )
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
@@ -38,7 +38,7 @@ _WIDEST = 64
 
 
 @dataclass(frozen=True)
-class Hdf5:
+class Hdf5(InPieces):
     """HDF5 files: a column is a dataset's path, `drive/torque`; a matrix `q` is `q[0]`, `q[1]` and so on.
 
     A dataset `time`, `t` or `timestamp` with a unit of time (`s`, `seconds since 2024-01-01`) is the clock of those
@@ -56,14 +56,6 @@ class Hdf5:
                 if file.read(len(_MAGIC)) == _MAGIC:
                     return True
         return False
-
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
-
-    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         h5py = library("h5py", "hdf5", path)

@@ -22,7 +22,7 @@ from cdtool.formats.column_names import OWN_CLOCK, asked_keys
 from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
 from cdtool.formats.groups import Group, Part, Parts, Written, stored
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
@@ -36,7 +36,7 @@ _CLOCK_NAMES = ("time", "t", "timestamp")
 
 
 @dataclass(frozen=True)
-class Tdms:
+class Tdms(InPieces):
     """TDMS files: a column is a channel, with its group before it where several groups have one of that name.
 
     A waveform's clock (`wf_increment`), or a channel `time` of its group with a unit of time, is a channel's clock.
@@ -49,14 +49,6 @@ class Tdms:
         """True if the file starts as TDMS does."""
         with path.open("rb") as file:
             return file.read(len(_MAGIC)) == _MAGIC
-
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
-
-    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)

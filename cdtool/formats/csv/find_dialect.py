@@ -13,8 +13,11 @@ from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
 from cdtool.formats.csv.cell_grid import CellGrid, SampleLines, cut_rows, sort_lines
 from cdtool.formats.csv.cells import MISSING, kind, split_line
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.doubtful_commas import refuse_commas_that_may_be_decimal, refuse_one_column_of_decimals
-from cdtool.formats.csv.doubtful_points import settled_marks
+from cdtool.formats.csv.doubtful_marks import (
+    refuse_commas_that_may_be_decimal,
+    refuse_one_column_of_decimals,
+    settled_marks,
+)
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.footer import find_footer
 from cdtool.formats.csv.head import Head, refuse_table_above
