@@ -191,8 +191,6 @@ def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
 
 def joined_details(parts: Sequence[tuple[Path, Mapping[str, str]]]) -> dict[str, str]:
     """Return what the parts of a log state, each topic once: the messages of all are added up."""
-    if len(parts) == 1:
-        return dict(parts[0][1])
     said: dict[str, list[str]] = {}
     for _, details in parts:
         for key, text in details.items():

@@ -245,7 +245,7 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> L
         parts.append(as_logged(source, channels, machine_file.machine))
         details.append((path, source.details))
     whole = parts[0] if len(parts) == 1 and parts[0].name == name else joined_recordings(parts, name)
-    said = joined_details(details)
+    said = joined_details(details) if len(details) > 1 else source.details
     return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, said, source.dialect)
 
 

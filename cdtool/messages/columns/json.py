@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -18,7 +18,17 @@ import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import json_kernel as kernel
-from cdtool.messages.columns.gathered import ABSENT, DAMAGED, DECODED, OTHER_JOINTS, THERE, Gathered, IntArray, Picked
+from cdtool.messages.columns.gathered import (
+    ABSENT,
+    DAMAGED,
+    DECODED,
+    OTHER_JOINTS,
+    THERE,
+    ByteArray,
+    Gathered,
+    IntArray,
+    Picked,
+)
 from cdtool.messages.columns.json_pattern import JsonPattern, Resolved, pattern_of
 from cdtool.messages.fields import Field, FieldMissingError, header_stamp, numeric_fields
 from cdtool.recording import FloatArray
@@ -121,7 +131,7 @@ class JsonDecoder:
             self._fields.update(dict.fromkeys(names))
         return list(self._fields)
 
-    def gather(  # noqa: C901  one pass over the groups, one over the messages outside them
+    def gather(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> Gathered:
         """The wanted fields of all messages."""
@@ -130,19 +140,11 @@ class JsonDecoder:
         for group in groups:
             for each, column in zip(wanted, columns, strict=True):
                 column.add(group.rows, group.pattern.resolve(each, joints), group.of)
-        status, reason = np.full(len(batch), DECODED, dtype=np.uint8), ""
-        faults = {row: message for row, message in alone.items() if isinstance(message, str)}
-        if len(broken):
-            status[broken] = DAMAGED
-            faults[int(broken[0])] = str(_loaded(batch, int(broken[0])))
-        if faults:
-            status[list(faults)] = DAMAGED
-            reason = faults[min(faults)]
-        for row, message in alone.items():
-            if isinstance(message, str):
-                continue
-            for column in columns:
-                column.add_message(row, message)
+        status, reason = _damage(batch, alone, broken)
+        for column in columns:
+            for row, message in alone.items():
+                if not isinstance(message, str):
+                    column.add_message(row, message)
         picked = tuple(column.picked(partial(_loaded, batch)) for column in columns)
         if not stamps:
             return Gathered(picked, status, reason)
@@ -268,6 +270,17 @@ def _may_end(batch: Batch, rows: IntArray) -> npt.NDArray[np.bool_]:
 def _content(batch: Batch, row: int) -> bytes:
     begin = int(batch.start[row])
     return batch.data[begin : begin + int(batch.length[row])].tobytes()
+
+
+def _damage(batch: Batch, alone: Mapping[int, Any], broken: IntArray) -> tuple[ByteArray, str]:
+    """Return which messages are damaged, and why the first of them is: `alone` are its texts by row."""
+    status = np.full(len(batch), DECODED, dtype=np.uint8)
+    faults = {row: message for row, message in alone.items() if isinstance(message, str)}
+    if len(broken):
+        status[broken] = DAMAGED
+        faults[int(broken[0])] = str(_loaded(batch, int(broken[0])))
+    status[list(faults)] = DAMAGED
+    return status, faults[min(faults)] if faults else ""
 
 
 def _loaded(batch: Batch, row: int) -> dict[str, Any] | str:

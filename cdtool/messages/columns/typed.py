@@ -195,7 +195,7 @@ def stamp_times(found: Found, places: tuple[Place, ...]) -> tuple[IntArray, npt.
     return times, there
 
 
-def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:  # noqa: C901  one check for each kind of schema member
+def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
     """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
     layout = schema.root
     place: Place = ()
@@ -209,10 +209,7 @@ def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:  # noqa: C901  on
         if index is not None and member.array is None:
             raise FieldMissingError(f"'{name}' is not an array", [name])
         if index == WHOLE or (i == last and index is not None):
-            if index == WHOLE:
-                names = names_place(layout, parent)
-            else:
-                names = None if is_element_number(index or "") else _named_place(layout, parent)
+            names = _names_of(index or "", layout, parent)
             _require_number(field, member)
             return Plan(field, place, index, tuple(arrays), names)
         if member.array is not None and index is None:
@@ -243,6 +240,13 @@ def _require_number(field: Field, member: Member) -> None:
         raise FieldMissingError(f"'{field.text}' holds a text, not a number")
     if isinstance(member.kind, Message):
         raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
+
+
+def _names_of(index: str, layout: Layout, parent: Place) -> Place | None:
+    """Return the place of the texts that name an array's elements; None where its index needs none."""
+    if index == WHOLE:
+        return names_place(layout, parent)
+    return None if is_element_number(index) else _named_place(layout, parent)
 
 
 def _named_place(layout: Layout, parent: Place) -> Place:
