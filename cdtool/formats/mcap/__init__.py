@@ -101,7 +101,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     asked = {source.topic for source in wanted.sources}
     taker = UniformTaker(publish=wanted.time.clock == "publish")
     log = Log(path, asked.__contains__, taker=taker)
-    topics = wanted_topics(path, wanted, lambda *topic: Gathering(*topic, log.expected(topic[1])))
+    topics = wanted_topics(path, wanted, partial(Gathering, expected=log.expected))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
