@@ -70,14 +70,14 @@ class Packing:
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> Packing:
-        """By a dataset's attributes; raises ValueError for one that is no number."""
+        """By a dataset's attributes; raises ValueError for one that is not a number."""
         scale, offset = (
             _numbers(attributes, key) or (default,) for key, default in zip(_KEYS, (1.0, 0.0), strict=True)
         )
         return cls(scale[0], offset[0], tuple(value for key in _MISSING for value in _numbers(attributes, key)))
 
     def unpacked(self, raw: npt.NDArray[Any]) -> FloatArray:
-        """The numbers that are meant; NaN where there is none."""
+        """Return the numbers that are meant; NaN where one is missing."""
         values = np.array(raw, dtype=np.float64)
         if self.scale != 1.0:
             values *= self.scale
@@ -90,7 +90,7 @@ class Packing:
         return values
 
     def finding(self, column: str) -> list[Finding]:
-        """What is said of a column that is packed."""
+        """Return the note on a column that is packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
         return [Finding(f"packed (CF): times {self.scale:g}, plus {self.offset:g}", column, "note")]

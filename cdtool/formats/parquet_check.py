@@ -228,7 +228,7 @@ def _in_footer(content: mmap.mmap) -> Iterator[int]:
 def _message(content: mmap.mmap, at: int) -> tuple[_Table, int]:
     """The message at that byte, and where its body begins; raises ValueError at the end of the messages."""
     size = _read(content, "<I", at)
-    if size == _CONTINUED:  # older files lack this mark
+    if size == _CONTINUED:  # older files have no such mark
         at += 4
         size = _read(content, "<I", at)
     if not size:

@@ -33,7 +33,7 @@ from cdtool.recording import MEASURED, Finding, FloatArray
 
 
 class LoggedChannel:
-    """A channel's samples so far: cleaned and in SI, with what is odd about them.
+    """A channel's samples so far: cleaned and in SI, with their findings.
 
     `period` [s] is the median step, where it is known: then gaps are looked for, too.
     """
@@ -79,7 +79,7 @@ class LoggedChannel:
         return list(map(bool, (self._known > 1) & (self._least == self._most)))
 
     def findings(self) -> list[Finding]:
-        """What is odd, in the words of channel_assembly."""
+        """The findings, worded as in channel_assembly."""
         found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
         found += masked_findings(self._masked, self.item, self._names)
         found += self._gaps.findings() if self._gaps is not None else []
@@ -89,7 +89,7 @@ class LoggedChannel:
 
 
 class LoggedFile:
-    """A file of messages that is read once for its figures, twice where they do not stand in the order of time.
+    """A file of messages that is read once for its figures, twice where they are not in the order of time.
 
     `channels` hold the figures, `late` [s] how late any sample is at most (Lateness). Gaps are known once
     `pieces` has been run through. `log` gives the mapped fields of the file at `path`. Raises RecordingError.

@@ -31,7 +31,7 @@ from cdtool.formats.groups import PREFIX
 
 _MARK = b"# " + PREFIX.encode()
 _KEY = _MARK + b"origin_s: "
-# A long list of parts, or of what was lost, stands behind it.
+# A long list of parts, or of what was lost, may follow it.
 _HEAD = 1 << 16
 
 
@@ -145,7 +145,7 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
 
 
 def written_origin(path: Path) -> float:
-    """Return the origin [s] that stands in a text table's own head; 0 where there is none."""
+    """Return the origin [s] that a text table's own head gives; 0 where it gives no origin."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
     lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())

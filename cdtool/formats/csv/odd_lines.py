@@ -37,10 +37,10 @@ class OddLines:
     `targets` (width,) is which column goes where, as the loop over the plain ones has it: a column that is left out
     later is left out there too.
     With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
-    `unread` are these cells by column, each with its line. `dropped` are the rows of a block that are none, with their
-    lines; `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none);
-    `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold nothing,
-    `empty` those of them that are rows, `words` (row, line, text) are perhaps a footer.
+    `unread` are these cells by column, each with its line. `dropped` are the rows of a block that are not rows, with
+    their lines; `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0:
+    none); `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold
+    nothing, `empty` those of them that are rows, `words` (row, line, text) are perhaps a footer.
     """
 
     path: Path
@@ -147,7 +147,7 @@ class OddLines:
         )
 
     def end_block(self, rows: range) -> dict[int, int]:
-        """Return those of a block's rows that are dropped, with their lines; later calls know nothing of them.
+        """Return those of a block's rows that are dropped, with their lines, and forget them.
 
         Raises RecordingError where a row follows words that would be a footer.
         """

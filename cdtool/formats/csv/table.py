@@ -151,7 +151,7 @@ class _Reading:
         return numbers | self.stamped.seconds(rows)
 
     def end(self, rows: Rows, before: int = 0) -> list[Finding]:
-        """Return what was skipped, and what became of the end.
+        """Return the findings about skipped lines, and about the end of the file.
 
         `rows` are the last ones, behind `before` others; the last of them may be dropped.
         """

@@ -224,7 +224,7 @@ def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
                 )
             if not is_element_number(index):
                 plan = NamedPlan(Plan(field, place, index, tuple(arrays), _named_place(layout, parent)), i)
-                resolve(numbered(field, i, 0), schema)  # whichever element it is, what stands behind it must be there
+                resolve(numbered(field, i, 0), schema)  # whichever element it is, what follows it must be there
                 return plan
             arrays.append((place, int(index)))
             place = (*place, int(index))
@@ -259,7 +259,7 @@ def _named_place(layout: Layout, parent: Place) -> Place:
 
 
 def names_place(layout: Layout, parent: Place) -> Place | None:
-    """The place of the texts `name` beside an array; None where there are none."""
+    """The place of the texts `name` beside an array; None where it is missing."""
     member = layout.member("name")
     if member is None or member.array is None or not isinstance(member.kind, Text):
         return None

@@ -40,7 +40,7 @@ _LARGEST = 16 << 20  # chunks beyond this size are read one by one
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
 _SUBMITTED = 3  # chunks to one thread: handing them over costs as much as a tenth of one
-# Channel's id and the length of all entries stand before these; each is a time and an offset [bytes].
+# Channel's id and the length of all entries precede these; each is a time and an offset [bytes].
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
 
@@ -248,7 +248,7 @@ def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
 def foretold_messages(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
     """By a chunk's place and a channel's id the numbers of its messages among all of the channel in these chunks.
 
-    A message index has 16 bytes for each message of its channel, and where it stands in the file is in the chunk's
+    A message index has 16 bytes for each message of its channel, and its place in the file is in the chunk's
     index (section "Chunk Index").
     It ends before the first chunk whose message indexes cannot be as long as they claim.
     """

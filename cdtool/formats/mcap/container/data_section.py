@@ -272,7 +272,7 @@ def record_length(at: int, head: memoryview, size: int) -> int:
 
 
 class Resync:
-    """Where reading goes on. `proven`: all before it was given, or a CRC proved it; what lies behind may still be had.
+    """Where reading goes on. `proven`: all before it was given, or a CRC proved it; what follows may still be read.
 
     A wrong length that no CRC covers leads over whole chunks into the midst of something: these lie before the place
     where that shows. The way back is bounded, as a file could be made of such lengths.
@@ -322,7 +322,7 @@ def next_chunk(file: FileBytes, at: int) -> int | None:
 
 
 def _candidates(window: Bytes) -> list[int]:
-    """Where the opcode of a chunk stands before a length below 4 GiB."""
+    """Return where the opcode of a chunk precedes a length below 4 GiB."""
     last = len(window) - HEADER_LENGTH
     if last <= 0:
         return []

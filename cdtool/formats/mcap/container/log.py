@@ -243,7 +243,7 @@ class Log:
 
 
 def profile_of(file: FileBytes) -> str:
-    """What the header calls the file's profile, `ros2` for one; empty where there is none."""
+    """Return what the header calls the file's profile, such as `ros2`; empty where it has no header."""
     head = file.read(len(MAGIC), PREFIX)
     length = int.from_bytes(head[1:], "little")
     if len(head) < PREFIX or head[0] != Header.opcode or length > _LONGEST_HEADER:
