@@ -23,14 +23,13 @@ from cdtool.formats.csv.doubtful_marks import (
     settled_marks,
 )
 from cdtool.formats.csv.encoding import find_text
-from cdtool.formats.csv.footer import find_footer
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines, shown_lines
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
 from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.stamps import Stamped, find_layout
-from cdtool.formats.csv.text import Text
+from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
 from cdtool.recording import Finding
 
 _SCORED = 150
@@ -39,6 +38,9 @@ _CONSISTENT = 0.9
 _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
+_MOST = 12
+_LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
+_NO_VALUES = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
 
 @dataclass(frozen=True)
@@ -338,3 +340,84 @@ def _unique(cells: Sequence[str]) -> list[str]:
     # A name that is there twice can be asked for by its number only: each bears it.
     counts = Counter(cells)
     return [str(i) if not cell else f"{cell}#{i}" if counts[cell] > 1 else cell for i, cell in enumerate(cells)]
+
+
+@dataclass(frozen=True)
+class Footer:
+    """`lines` are counted from 0 at the first of them; `shown` is that one, `cut` all of the stream from there on."""
+
+    lines: tuple[int, ...]
+    shown: str
+    cut: bytes
+
+    def finding(self, first_line: int) -> Finding:
+        """What is said of a footer that begins in that line of the file."""
+        lines = shown_lines([first_line + line for line in self.lines])
+        return Finding(f"{lines} skipped: a footer ({self.shown[:40]!r}), no sample")
+
+    def without(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
+        """The text, and the sample of its stream, up to the footer."""
+        size = len(self.cut.decode().encode(text.encoding) if text.recoded else self.cut)
+        return replace(text, size=text.size - size), stream.removesuffix(self.cut)
+
+
+def find_footer(dialect: Dialect) -> Footer | None:
+    """Return the footer of a table whose first column holds numbers or times; None where it has no footer.
+
+    Its lines are no samples though they are as wide: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line begins with a
+    word where every row begins with a number or a time. A word that comes among the rows too, or again and again, or
+    that marks a missing value, does not begin a footer: the column holds words, or a row is damaged.
+    """
+    if dialect.kinds[0] not in "NT" or dialect.text.padding:  # where the power was lost nobody wrote a sum
+        return None
+    raw = _last_lines(dialect)
+    words: list[tuple[int, list[str]]] = []
+    for i in range(len(raw) - 1, -1, -1):  # mostly the last line is a row, and the others are not looked at
+        cells = _cells(dialect, raw[i])
+        if cells and not _is_words(dialect, cells):
+            break
+        if cells:
+            words.insert(0, (i, cells))
+    labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width]
+    if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_no_values(dialect)):
+        return None
+    first = words[0][0]
+    above = [cells for line in raw[:first] if len(cells := _cells(dialect, line)) == dialect.width]
+    if not above or any(kind(cells[0]) == "X" for cells in above):
+        return None
+    shown = dialect.text.decode(raw[first]).strip()
+    return Footer(tuple(i - first for i, _ in words), shown, dialect.text.line_end.join(raw[first:]))
+
+
+def _cells(dialect: Dialect, line: bytes) -> list[str]:
+    """A line's cells; none of a line that is blank, drawn, a comment or the header again."""
+    text = dialect.text.decode(line).strip()
+    if not text or is_ruler(text) or (dialect.comment and text.startswith(dialect.comment)):
+        return []
+    if text in {told.strip() for told in dialect.header_text}:
+        return []
+    return split_line(text, dialect.separator)
+
+
+def _is_words(dialect: Dialect, cells: list[str]) -> bool:
+    """True for a line that begins with a label, and is as wide as the rows or words only."""
+    return len(cells) in (1, dialect.width) and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
+
+
+def _no_values(dialect: Dialect) -> set[str]:
+    return {*_NO_VALUES, *(text.lower() for text in dialect.missing)}
+
+
+def _last_lines(dialect: Dialect) -> list[bytes]:
+    """The last whole lines of the rows, as the stream has them."""
+    text = dialect.text
+    most = SAMPLE_BYTES if text.recoded else TAIL_BYTES
+    start = text.mark if text.recoded else text.mark + dialect.offset
+    whole = text.size - start <= most
+    with text.path.open("rb") as file:
+        file.seek(start if whole else text.size - most)
+        end = file.read(text.size - start if whole else most)
+    if text.recoded:
+        end = end.decode(text.encoding, errors="replace").encode()
+        end = end[dialect.offset :] if whole else end
+    return end.split(text.line_end)[not whole :]
