@@ -1,6 +1,7 @@
-"""A clock whose stamps have more digits than float64: 1700000000123456789 ns, 1700000000.123456789 s.
+"""A clock of numbers: one in days, as Excel counts them, and one whose stamps have more digits than float64.
 
-Such stamps count from 1970. They are read a second time, as whole nanoseconds, and the first is taken off before
+45231.5417 days since 1899-12-30 are 2023-11-01 13:00. Stamps such as 1700000000123456789 ns or 1700000000.123456789 s
+count from 1970. They are read a second time, as whole nanoseconds, and the first is taken off before
 anything is rounded: float64 holds them to 0.24 us only, their differences exactly.
 """
 
@@ -17,8 +18,14 @@ from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import Integers
 from cdtool.formats.csv.stamps import NS
 from cdtool.formats.csv.text import Bytes
+from cdtool.plain_text import digits
 from cdtool.recording import BoolArray, FloatArray
 
+# Days since 1899-12-30, as Excel counts them, of 1970; and of the years 2000 to 2100.
+_DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0
+DAY_S = 86400.0
+# A log steps by less than this in days (10 s); and by less than this in seconds it samples above 20 kHz.
+_DAYS_STEP, _SECONDS_STEP = 10.0 / DAY_S, 5e-5
 # A unit's factor to s -> how many decimals it has down to 1 ns.
 _DECIMALS = {1.0: 9, 1e-3: 6, 1e-6: 3, 1e-9: 0}
 # From here on [s] float64 does not hold nanoseconds; up to here 64 bits do.
@@ -27,6 +34,32 @@ _FIRST, _LAST = 2.0**53 / NS, 2.0**63 / NS
 _WIDEST = 24
 # What may stand behind a number: blank, tab, line ends, separators.
 _AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
+
+
+def two_readings(stamps: FloatArray, factor: float) -> str:
+    """Both readings of a clock that may be in days or in the unit of `factor` [s]; empty where only that one is likely.
+
+    `stamps` (n,) are all of the column; those that are missing are passed over. The step is the mean of the middle
+    half: stamps with four decimals repeat, and one at an edge may be wild. A clock above 20 kHz that has run for so
+    long that it looks like a date of 2000 to 2100 cannot be distinguished from one in days.
+    """
+    known = stamps[np.isfinite(stamps)]
+    if len(known) < 2 or not _FIRST_DAY < np.median(known) < _LAST_DAY:
+        return ""
+    quarter = len(known) // 4
+    step = float(known[-1 - quarter] - known[quarter]) / (len(known) - 1 - 2 * quarter)
+    if not 0.0 < step < min(_DAYS_STEP, _SECONDS_STEP / factor):
+        return ""
+    start = np.datetime64(round(since_1970(float(known[0]))), "s")
+    return (
+        f"starts at {known[0]:.9g} in steps of {step:.3g}: days of Excel ({str(start).replace('T', ' ')}, "
+        f"{digits(1.0 / (step * DAY_S), 3)} Hz), or {known[0] * factor:.9g} s at {digits(1.0 / (step * factor), 3)} Hz?"
+    )
+
+
+def since_1970(days: float) -> float:
+    """Seconds since 1970 of a day as Excel counts it."""
+    return (days - _DAY_1970) * DAY_S
 
 
 def exact_differences(
