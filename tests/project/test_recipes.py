@@ -46,6 +46,8 @@ def test_a_recipe_adds_no_file_that_exists_and_tests_it_where_its_tests_belong(r
     assert f"{recipe.package.replace('.', '/')}/{recipe.name}.py" in recipe.files
     for path in recipe.files:
         assert not (ROOT / path).exists() and (ROOT / path).parent.is_dir(), path
+    for text in (text for path, text in recipe.files.items() if path.endswith(".py")):
+        assert max(map(len, text.splitlines())) <= 120
     words = [shlex.split(line) for line in recipe.commands]
     (tests,) = [line[3:] for line in words if line[:3] == ["python", "-m", "pytest"]]
     chosen = tests[-1]
@@ -95,9 +97,9 @@ def test_the_lists_of_the_docs_take_up_the_detector_and_the_format(folder, tmp_p
     script = docs_script("make_lists")
     monkeypatch.setattr(script, "DOCS", tmp_path / "docs")
     made = {path.name: text for path, text in script.files().items()}
-    assert all("[Drive power](" in made[name] for name in ("README.md", "choosing.md", "index.md"))
+    assert all("[Net force](" in made[name] for name in ("README.md", "choosing.md", "index.md"))
     assert "| `f64log` | F64 logs | `.f64` |" in made["containers.md"]
     (detector,) = [
-        item for item in json.loads(cdtool("list", "detectors", "--json").out) if item["name"] == "drive_power"
+        item for item in json.loads(cdtool("list", "detectors", "--json").out) if item["name"] == "net_force"
     ]
-    check_detector_page(detector, (folder / "docs" / "detectors" / "drive-power.md").read_text(encoding="utf-8"))
+    check_detector_page(detector, (folder / "docs" / "detectors" / "net-force.md").read_text(encoding="utf-8"))
