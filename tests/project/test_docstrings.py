@@ -21,7 +21,7 @@ import doctest
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -243,6 +243,11 @@ def test_a_missing_section_is_found():
     ]
 
 
+def examples_of(name: str, item: Any, names: Mapping[str, Any]) -> doctest.DocTest:
+    """The examples in a docstring, which may use `names`."""
+    return doctest.DocTestParser().get_doctest(inspect.getdoc(item) or "", dict(names), name, name, 0)
+
+
 def run(tests: list[doctest.DocTest]) -> str:
     """Run examples; return what is wrong, empty if all are right."""
     said: list[str] = []
@@ -264,15 +269,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("name", sorted(api()))
 def test_the_example_of_a_function_of_the_api_runs(name, folder):
-    text = inspect.getdoc(api()[name]) or ""
-    test = doctest.DocTestParser().get_doctest(text, {}, name, name, 0)
+    test = examples_of(name, api()[name], {})
+    assert test.examples
+    assert not run([test])
+
+
+@pytest.mark.parametrize("name", sorted(rules()))
+def test_the_example_of_a_detector_or_threshold_runs(name, folder):
+    rule = rules()[name]
+    test = examples_of(name, rule, vars(import_module(rule.__module__)))
     assert test.examples
     assert not run([test])
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_the_examples_of_detectors_thresholds_and_evaluation_run(room, folder):
+def test_the_other_examples_of_detectors_thresholds_and_evaluation_run(room, folder):
     modules = [name for name, text in texts().items() if room_of(name) == room and ">>>" in text]
     tests = [test for name in modules for test in doctest.DocTestFinder().find(import_module(name), name)]
+    tests = [test for test in tests if test.name not in rules()]
     assert sum(bool(test.examples) for test in tests) > 10
     assert not run(tests)
