@@ -242,4 +242,4 @@ def _why_blind(results: Results, item: Summary) -> str:
     ]
     what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
     more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""
-    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'no reason is known'}{more}"
+    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'unknown reason'}{more}"

@@ -32,7 +32,7 @@ def test_sentences_keep_to_100_columns_in_a_pipe_and_places_have_a_unit(gate_fol
 
 def test_names_are_not_cut_where_lines_end(capsys):
     name = "stiff-03-of-the-second-campaign/" + 90 * "x"
-    console.say(f"not judged in {name}: 12 %")
+    console.say(f"not assessable in {name}: 12 %")
     assert name in capsys.readouterr().out
 
 

@@ -86,7 +86,7 @@ def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
 
 def test_a_quiet_log_says_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
     done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
-    assert done.status == 0 and "no alarm, and no contact without one" in " ".join(done.out.split())
+    assert done.status == 0 and "no alarm and no missed contact" in " ".join(done.out.split())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -175,8 +175,8 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
         # The figure's folder is looked at before the log is.
         ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "make")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is watched")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is watched")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),
         ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
     ],
 )

@@ -147,7 +147,7 @@ def test_a_log_that_tells_of_no_channel_gets_a_file_with_its_clock_and_its_colum
     log, path = tmp_path / "scope.csv", tmp_path / "machine.toml"
     log.write_text("TIME,CH1,CH2\n" + "".join(f"{k * 1e-3:.3f},{k % 3},{k % 7}\n" for k in range(300)))
     done = cdtool("init", log, "-o", path)
-    assert done.status == 0 and "no name or course tells" in done.err
+    assert done.status == 0 and "torque, speed or position" in done.err
     values = tomllib.loads(path.read_text())
     assert list(values["channels"]) == ["time"] and values["channels"]["time"]["column"] == "TIME"
     assert values["machine"]["load_mass"] == 0.0

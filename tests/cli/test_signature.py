@@ -63,7 +63,7 @@ def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
 def test_runs_that_were_learned_from_are_judged_by_the_others(signature, gate_folder):
     done = check(signature, gate_folder, *logs_of(gate_folder))
     assert done.status == 0, done.err
-    assert "11 runs, each judged by a signature of the others: 0 alarms" in done.out and "advice: " in done.out
+    assert "11 runs, each checked against a signature of the others: 0 alarms" in done.out and "advice: " in done.out
     values = json.loads(check(signature, gate_folder, *logs_of(gate_folder), "--json").out)
     coverage = values["classes"][0]["coverage"]
     assert len(coverage["runs"]) == 11 and 0.0 < coverage["chance"] < 0.2
@@ -200,6 +200,6 @@ def test_hand_set_limits_leave_no_room_for_a_factor_and_need_no_runs(gate_folder
         tmp_path / "l.json",
     )
     done = cdtool(*learn)
-    assert done.status == 0 and "limit 400 N set by hand" in done.out and "less sure" not in done.err
+    assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
     refused = cdtool(*learn, "-k", 3)
     assert refused.status == 2 and "beside limits set by hand" in refused.err

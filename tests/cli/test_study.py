@@ -66,7 +66,7 @@ def test_the_table_says_what_was_assumed_and_what_limits():
         "assumed: impact.speed = 0.2 m/s",
         "assumed: drive.stiffness = 2.448e+06 N/m: the load swings at 10 Hz",
         "assumed: sensors.encoder.counts_per_turn = 4096: 12 bit",
-        "without the machine's own scatter",
+        "without the machine's own variation",
     ):
         assert words in done.out, words
     given = cdtool("study", "sensors", "-m", GATE, "--speed", 0.2, "--drive-stiffness", 2e6).out
@@ -194,7 +194,7 @@ def test_the_figures_of_the_thesis_are_drawn_anew(tmp_path):
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
         (("--study", "limit.toml"), "controller.force_limit is 5 N, steady motion takes 30 N"),
         (("--study", "negative.toml"), "negative.toml: sensors.load_cell.noise: is -1"),
-        (("-o", "ranking.txt"), "ranking.txt is no name for a figure"),
+        (("-o", "ranking.txt"), "--output is 'ranking.txt'"),
     ],
 )
 def test_what_cannot_be_used_ends_with_2_and_one_line(tmp_path, monkeypatch, arguments, message):

@@ -34,7 +34,7 @@ def test_a_benchmark_watches_the_joints_it_names_and_says_so(forearm):
     assert {item.joint for item in results.contacts if item.joint} == {"forearm"}
     done = cdtool("benchmark", forearm / "benchmark.toml")
     # The friction EKF can judge no joint at rest: that is said, and counts as left out.
-    assert done.status == 3 and "joints watched, of all: forearm" in done.out
+    assert done.status == 3 and "joints monitored, of all: forearm" in done.out
 
 
 def test_a_detector_that_can_judge_nothing_is_not_assessable_and_the_others_go_on(forearm):
