@@ -1,4 +1,4 @@
-"""Two builds against each other: what `cdtool compare` does."""
+"""Comparison of two builds: the work of `cdtool compare`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def compare(
     significance: float = SIGNIFICANT,
     relevant_change: float = RELEVANT_CHANGE,
 ) -> BuildComparison:
-    """Compare the results of two builds, given as results.json or as they are in memory.
+    """Compare the results of two builds, each given as the path of results.json or as `Results`.
 
-    Raises RecordingError where a file is no results file; else as `compare_builds`.
+    Raises RecordingError if a file is not a results file; otherwise as `compare_builds`.
     """
     return compare_builds(_results(old), _results(new), significance, relevant_change)
 

@@ -1,4 +1,4 @@
-"""How one detector runs over a log: the settings that `cdtool.detect` and `cdtool.explain` take."""
+"""Settings to run one detector over a log, used by `cdtool.detect` and `cdtool.explain`."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
 @dataclass(frozen=True)
 class DetectionOptions:
-    """The machine and the threshold, or a benchmark file that holds them and every other setting.
+    """The machine and the threshold, or a benchmark file with these and all other settings.
 
-    `signature` or `limit` (one number, or one per joint) is the threshold; `detector` is needed with a limit. With a
-    limit, `joints` are those to watch (none named: all); a signature watches those that it was learned for.
-    `operations`: whole, motion or trigger. `activation`: settings other than the signature's, or than the default's.
-    `rules`: when contacts begin, and for how long an alarm belongs to one.
+    `signature` or `limit` (one number, or one per joint) is the threshold; a limit requires `detector`. With a limit,
+    `joints` are the joints to monitor (default: all); a signature monitors the joints it was learned for.
+    `operations`: whole, motion or trigger. `activation`: settings that differ from the signature's or the default.
+    `rules`: when contacts begin, and for how long an alarm belongs to a contact.
 
-    With `benchmark` all of that comes from there; `detector` then chooses one of its detectors, and a signature file
-    takes the threshold's place.
+    With `benchmark`, all of these come from the benchmark file; `detector` then selects one of its detectors, and a
+    signature file replaces the threshold.
     """
 
     machine: str | Path | MachineFile | None = None
@@ -38,18 +38,18 @@ class DetectionOptions:
     rules: ScoringRules | None = None
 
     def prepared(self) -> PreparedBenchmark | None:
-        """Return the benchmark, read and learned, or None; raises UsageError for settings given beside it."""
+        """Return the benchmark, read and learned, or None; raises UsageError for settings combined with it."""
         if self.benchmark is None:
             return None
         by_hand = self.limit or self.joints or self.operations != "whole" or self.activation or self.rules
         if self.machine is not None or by_hand:
-            raise UsageError("settings are given together with a benchmark file", "all of them come from there")
+            raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
         if isinstance(self.benchmark, PreparedBenchmark):
             return self.benchmark
         return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
 
     def machine_file(self) -> MachineFile:
-        """Return the machine file, read; raises UsageError where none is given."""
+        """Return the machine file, read; raises UsageError if none is given."""
         if isinstance(self.benchmark, PreparedBenchmark):
             return self.benchmark.setup.machine_file
         if self.machine is None:

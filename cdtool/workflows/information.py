@@ -1,4 +1,4 @@
-"""What is in a log: channels, units, rates, gaps and all findings; and why a clock is missing or doubtful."""
+"""The content of a log: channels, units, rates, gaps and findings, and why a clock is missing or doubtful."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChannelInfo:
-    """One channel or column: how many samples, how fast, from where to where."""
+    """One channel or column: number of samples, rate and range."""
 
     name: str
     unit: str
@@ -45,9 +45,9 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class Info:
-    """A log: without a machine file its columns as they stand, with one its channels on the load side.
+    """A log: its columns as they are in the file, or with a machine file its channels on the load side.
 
-    `dialect` is how a table of text is written, as `[csv]` of a machine file; empty for other formats.
+    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats.
     """
 
     source: str
@@ -59,9 +59,9 @@ class Info:
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
-    """Survey a log, piece by piece; with a machine file map it instead, cut it and check the accelerometer.
+    """Survey a log piece by piece. With a machine file, map and cut it and check the accelerometer instead.
 
-    Then the mapped channels are held in memory. Raises RecordingError.
+    The mapped channels are then kept in memory. Raises RecordingError.
     """
     if machine is None:
         return _survey(Path(log))
@@ -87,7 +87,7 @@ def _survey(log: Path) -> Info:
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
-    """A column by its figures; those of a table are on the table's clock."""
+    """Return a column with its statistics; the columns of a table share the table's clock."""
     known, samples = figures.columns[column.name], figures.rows(column.name)
     clock = table_clock if column.time is None else figures.clocks[figures.clock_of[column.name]]
     timed = clock is not None and clock.rows > 0
@@ -155,7 +155,7 @@ def _clock_doubts(
     reread: Reread,
     clock: TableClock | None,
 ) -> list[Finding]:
-    """Of a table the columns that are named as clocks and are none, and that there is no clock; of topics coarse ones.
+    """Return doubts about clocks: unusable clock columns of a table, a missing clock, and coarse clocks of topics.
 
     `figures` are those of the columns, `clocks` those of the topics' own clocks.
     """
@@ -193,7 +193,7 @@ def _named_ones(
 
 
 def _doubt(steps: Distribution) -> str:
-    """What is odd about steps between stamps, empty where nothing is."""
+    """Return the problem with the steps between stamps, or an empty text."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
         return f"all of its {steps.count + 1} stamps are the same: the clock stands still"

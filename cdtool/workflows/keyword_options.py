@@ -1,4 +1,4 @@
-"""A workflow that takes a value of options, for those who call it with the fields of that value: the Python API."""
+"""Call a workflow that takes an options object with the fields of that object: the Python API."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def by_keywords(
 
 
 def by_keywords(options: Callable[..., Any], run: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `run` for those who call it with the fields of its options: `detect(log, machine, detector="gm")`.
+    """Return `run` as a function of the fields of its options: `detect(log, machine, detector="gm")`.
 
-    The options are the last parameter of `run`; what stands before them is handed on as it is.
+    The options are the last parameter of `run`; the parameters before it are passed on unchanged.
     """
     *others, _ = inspect.signature(run).parameters.values()
     signature = inspect.Signature([*others, *inspect.signature(options).parameters.values()])

@@ -42,7 +42,7 @@ from cdtool.workflows.signature.threshold_settings import set_by_hand
 
 @dataclass(frozen=True)
 class Benchmark:
-    """The results with their statistics, the traces kept for figures, where the time went [s], and what was read."""
+    """The results with their statistics, the selected traces, the time per step [s], and the files read."""
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
@@ -51,7 +51,7 @@ class Benchmark:
 
     @property
     def results(self) -> Results:
-        """Every verdict with raw figures and provenance."""
+        """Return all verdicts with raw numbers and provenance."""
         return self.evaluated.results
 
 
@@ -63,16 +63,16 @@ def benchmark(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Benchmark:
-    """Learn every detector's threshold, run them over all groups, match alarms with contacts.
+    """Learn the threshold of every detector, run the detectors over all groups and match alarms with contacts.
 
-    `detectors`: others than the file's; "all" alone stands for every one that is registered and can learn from these
-    logs, the others are named in `results.findings`. `false_alarm_budget`, as 1/1000op or 0.1/h, sets each detector's
-    safety factor on the runs learned from, instead of the file's.
+    `detectors`: detectors instead of the file's; a single "all" stands for every registered detector that can learn
+    from these logs, and the others are reported in `results.findings`. `false_alarm_budget`, as 1/1000op or 0.1/h,
+    sets each detector's safety factor on the runs learned from and overrides the file's.
 
-    A log that cannot be read or scored is left out and named in `results.skipped`; so is a detector that lacks a
-    channel, and none of its contacts is assessable. Raises ConfigurationError for a wrong file, SignatureError where
-    nothing can be learned, RecordingError where nothing could be scored, UsageError where the runs learned from are too
-    few for the budget.
+    A log that cannot be read or scored is left out and listed in `results.skipped`. So is a detector without a
+    required channel; none of its contacts is assessable. Raises ConfigurationError for a wrong file, SignatureError
+    if nothing can be learned, RecordingError if nothing could be scored, UsageError if there are too few runs for the
+    budget.
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
     limits = len(setup.limits)
@@ -92,7 +92,7 @@ def benchmark(
         left_out += [Skipped(name, f"left out: {fault}") for name, fault in DETECTORS.broken_plugins().items()]
         setup = with_only(setup, [detector.name for detector in used])
     if len(setup.limits) < limits:
-        words = f"{limits - len(setup.limits)} of {limits} limits are on detectors that were not run: not checked"
+        words = f"{limits - len(setup.limits)} of {limits} limits are set for detectors that were not run: not checked"
         left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
@@ -124,7 +124,7 @@ def benchmark(
 
 
 def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, np.ndarray]:
-    """The safety factors of the sweep by detector; none without an impact-free group to count false alarms in."""
+    """Return the safety factors of the sweep by detector; empty without an impact-free group."""
     if HOLDOUT not in setup.impacts:
         return {}
     return {name: items[0].safety_factor * MULTIPLES for name, items in thresholds.items() if items}

@@ -1,4 +1,4 @@
-"""Force verdicts as rows of the results: a contact's, and a test point's."""
+"""Force verdicts as rows of the results: per contact, and per test point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdtool.strict_json import finite
 def force_rows(
     recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
 ) -> list[ForceResult]:
-    """A row for each contact of a recording, by its number."""
+    """Return a row for each contact of a recording, by its number."""
     return [
         ForceResult(
             recording=recording.recording,
@@ -46,7 +46,7 @@ def force_rows(
 def point_rows(
     tests: Mapping[tuple[str, str], Sequence[ForceVerdict]], profiles: Mapping[str, ForceProfile | None]
 ) -> list[PointResult]:
-    """A row for each (group, point) that has tests; `profiles` are the groups'."""
+    """Return a row for each (group, point) with tests; `profiles` are those of the groups."""
     rows = []
     for (group, point), verdicts in tests.items():
         profile = profiles[group]

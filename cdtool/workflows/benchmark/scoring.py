@@ -1,4 +1,4 @@
-"""One log of a benchmark: read, cut, detected by every detector, matched with its contacts; the rows that it gives."""
+"""Score one log of a benchmark: read, cut, detect with every detector, match with its contacts, return the rows."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, 
 
 @dataclass
 class Scored:
-    """What one log gave."""
+    """The results of one log."""
 
     recording: RecordingResult | None = None
     judged: list[Judged] = field(default_factory=list)
