@@ -78,7 +78,7 @@ class BenchmarkFile:
 
     @property
     def scoring(self) -> dict[str, Any]:
-        """Return the settings that determine the results, for provenance: results are comparable only if all are equal."""
+        """Return the settings that determine the results, for provenance; only results with equal settings compare."""
         return {
             "onset": self.onset.described + (f"{LABEL_FILE}{Path(self.labels.source).name}" if self.labels else ""),
             "separation_s": self.onset.separation,
@@ -235,7 +235,7 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
 
 
 def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
-    """Return the force profile that a key names, None for an empty text; raises ConfigurationError naming key and file."""
+    """Return the force profile that a key names, None for an empty text; ConfigurationError names key and file."""
     if not (name := table.text(key)):
         return None
     try:

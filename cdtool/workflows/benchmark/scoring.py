@@ -42,10 +42,10 @@ class Scored:
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
     findings: list[Skipped] = field(default_factory=list)
-    # Names of logs taken as free of impacts, with what would tell and is not in them.
+    # Names of logs assumed to be free of impacts, with the ground truth that is missing from them.
     unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
-    # The recording itself, its contacts and what they were matched with, for a command that shows more than rows.
+    # The recording, its contacts and their matching, for commands that show more than rows.
     log: Recording | None = None
     truth: tuple[Contact, ...] = ()
     matched: MatchedLog | None = None
@@ -53,7 +53,7 @@ class Scored:
     detecting: float = 0.0
 
 
-# What gives the detections of each operation of a log; it names what failed in the log's `Scored`.
+# Returns the detections of each operation of a log; failures are reported in the log's `Scored`.
 Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
 
 
@@ -63,10 +63,10 @@ def detect_with(
     thresholds: Mapping[str, tuple[FittedThreshold, ...]],
     lacking: Mapping[str, str],
 ) -> Detect:
-    """Detectors with their thresholds; one that fails on a log is left out there and named.
+    """Return the detectors with their thresholds as one function; a detector that fails on a log is left out there.
 
-    Those that are `lacking` what they need, for the reason given, can judge nothing. A class of motion is held for
-    the longest matching window.
+    Detectors in `lacking` miss what they need, for the given reason; no sample of theirs is assessable. A class of
+    motion is monitored for the longest matching window.
     """
     hold = max(HOLD, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
@@ -105,11 +105,10 @@ def score_log(
     factors: Mapping[str, FloatArray],
     ranges: PlausibleRanges | None = None,
 ) -> Scored:
-    """A log's rows; `factors`: the safety factors of the sweep by detector; outside of `ranges` values are masked.
+    """Return the rows of a log; a log or detector that fails is left out and reported, and nothing is raised.
 
-    `group` is empty of a log of no group.
-
-    A log or detector that fails is left out and named, and nothing is raised.
+    `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
+    outside the plausible `ranges` are masked.
     """
     scored = Scored()
     rules = setup.rules_of(group)
@@ -150,7 +149,7 @@ def score_log(
         numbered = enumerate(contacts, 1)
         unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
         if unseen:
-            text = f"{', '.join(unseen)}: no load-cell force to hold against {profile.name}"
+            text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
     scored.judged = [_swept(item, setup, rules.window, factors) for item in matched.judged]
     scored.contacts = [row for rows in matched.contacts for row in rows]
@@ -162,7 +161,7 @@ def score_log(
 def _force_not_seen(
     recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
 ) -> list[Skipped]:
-    """The contacts that a force profile could not judge because load-cell samples are missing: a loss of data."""
+    """Return the contacts not assessable by a force profile because load-cell samples are missing: a data loss."""
     lost = [
         f"contact {number} is not assessable by {profile}: {verdict.reason}"
         for number, verdict in verdicts.items()

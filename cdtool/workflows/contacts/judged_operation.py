@@ -1,4 +1,4 @@
-"""One operation with every detector's detection, its alarms held against the contacts, and the rows that it gives."""
+"""One operation with the detection of every detector, its alarms matched with the contacts, and the resulting rows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cdtool.strict_json import finite
 
 @dataclass(frozen=True)
 class Judged:
-    """One operation with every detector's detection and its alarms held against the contacts."""
+    """One operation with every detector's detection and its alarms matched with the contacts."""
 
     group: str
     operation: Operation
@@ -32,7 +32,7 @@ class Judged:
 
 
 def not_assessable(operation: Operation, detector: str, unit: str, reason: str, watched: Sequence[str]) -> Detection:
-    """A detector that cannot be used on an operation: no sample of it could be judged, for that reason."""
+    """Return the detection of a detector that cannot be used on an operation: not assessable, with the reason."""
     recording = operation.recording
     time = next((recording[name].time for name in MEASURED if name in recording), np.empty(0))
     nothing = np.full((len(time), len(recording.joints)), np.nan)
@@ -49,7 +49,7 @@ def contact_rows(
     courses: Mapping[int, ForceCourse],
     synchronisation: float,
 ) -> list[ContactResult]:
-    """A row for each contact and detector; `synchronisation` [s]: how far the load cell's clock may be off."""
+    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock."""
     numbers = {contact: number for number, contact in enumerate(contacts, 1)}
     rows = []
     for detection, matching in zip(judged.detections, judged.matchings, strict=True):
@@ -62,7 +62,7 @@ def contact_rows(
 
 
 def _resolution_of_onset(recording: Recording, contact: Contact) -> float:
-    """How finely the onset is known [s]: of a label file's, no finer than it says and than the cell."""
+    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell."""
     if np.isfinite(contact.resolution):
         return contact.resolution
     cell = recording["force"].period if "force" in recording else 0.0
@@ -80,7 +80,7 @@ def _contact_row(
 ) -> ContactResult:
     contact, alarm = found.contact, found.alarm
     peak = course.peak if course else contact.peak_force
-    # Before its first sample a contact that began where samples are missing had a force that nobody measured.
+    # If samples are missing where a contact began, its force before its first sample was not measured.
     seen = course is not None and alarm is not None and not (contact.hole and found.clipped)
     hole = course.longest_hole(contact.end - contact.start) if course else contact.hole
     return ContactResult(
@@ -111,7 +111,7 @@ def _contact_row(
 
 
 def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
-    """A row for each alarm without a contact."""
+    """Return a row for each alarm without a contact."""
     return [
         FalseAlarmResult(
             recording=judged.operation.name,
@@ -127,7 +127,7 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
 
 
 def _crossing(detection: Detection, alarm: Alarm | None) -> dict[str, Any]:
-    """Which limit an alarm crossed and with which value; nothing where no threshold raised it, as with triggers."""
+    """Return the limit that an alarm crossed and the value; empty if no threshold raised it, as with triggers."""
     known = alarm if detection.threshold is not None else None
     return {
         "side": known.side if known else None,

@@ -1,4 +1,4 @@
-"""`cdtool convert`: a log's channels, or all its columns, into another container, to the bit and with provenance."""
+"""`cdtool convert`: write a log's channels or all its columns to another file format, bit for bit, with provenance."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _ONE_CLOCK = (".csv",)
 
 @dataclass(frozen=True)
 class Converted:
-    """The files that were written, the machine files that read them, how much there is, and what is odd."""
+    """The files written, the machine files for them, the amount of data, and the findings."""
 
     source: str
     files: tuple[str, ...]
@@ -58,12 +58,12 @@ def convert(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Converted:
-    """Write a log's mapped channels (as logged, SI), or without a machine file all its numeric columns, to `output`.
+    """Write a log's mapped channels (as logged, SI), or without a machine file all numeric columns, to `output`.
 
-    A folder of parts, as rosbag2 makes it, is one log. Nothing is resampled: each channel keeps its own clock. A CSV
-    table has but one: of several clocks each gets a file of its own, `output` with `.1`, `.2` before the suffix. Values
-    are float64 to the bit. With a machine file another one is written beside each file, which reads it. Raises
-    UsageError for an unknown suffix and where a file is there.
+    A folder of parts, as written by rosbag2, is one log. Nothing is resampled: each channel keeps its own clock. A CSV
+    table has only one clock: with several, each is written to a separate file, `output` with `.1`, `.2` before the
+    suffix. Values are float64, bit for bit. With a machine file, a machine file for the converted log is written next
+    to each file. Raises UsageError for an unknown suffix and if a file already exists.
     """
     log, target = Path(source), Path(output)
     writer = _writer(target)
@@ -74,14 +74,14 @@ def convert(
     )
     rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
     if not rows.groups:
-        raise RecordingError(f"{log}: holds none of the mapped channels", "see cdtool info for what it holds")
+        raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     _check_free([*names, *companions], parts, force)
     provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
     course = _Course(log, sum(group.rows for group in rows.groups), progress)
-    with replaced(*names, *companions) as temporary:  # all of them or none
+    with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
             written = writer(temporary[i], part, course.of(rows.parts(part)), provenance)
             if machine_file is not None:
@@ -94,7 +94,7 @@ def convert(
 
 @dataclass
 class _Course:
-    """The rows of a log on their way to the writer, counted: `rows` of them in all."""
+    """The rows of a log on their way to the writer; `rows` counts them."""
 
     log: Path
     rows: int
@@ -102,7 +102,7 @@ class _Course:
     _done: int = 0
 
     def of(self, parts: Parts) -> Parts:
-        """The parts as they come; what goes wrong as they are read is no fault of the file that is written."""
+        """Yield the parts; a read error is reported for the source, not for the file being written."""
         try:
             for ready in parts:
                 yield ready
@@ -111,7 +111,7 @@ class _Course:
                     self.progress(self._done, self.rows)
         except OSError as fault:
             text = f"{self.log}: cannot be read: {fault.strerror or fault}"
-            raise RecordingError(text, "check the disk it is on") from fault
+            raise RecordingError(text, "check its disk") from fault
 
 
 def _writer(target: Path) -> Writer:
@@ -124,7 +124,7 @@ def _writer(target: Path) -> Writer:
 
 
 def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
-    """A file of the parts' kind in their folder would be one of them from then on."""
+    """Raise UsageError if the new file would become a part of the log."""
     alike = target.suffix.lower() == parts[0].suffix.lower()
     if log.is_dir() and alike and target.parent.is_dir() and target.parent.samefile(log):
         raise UsageError(f"{target}: would be a part of the log", "write it to another folder")
@@ -139,7 +139,7 @@ def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> No
 
 
 def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[Group]]]:
-    """Which groups go into which file."""
+    """Return which groups are written to which file."""
     if target.suffix.lower() in _ONE_CLOCK and len(groups) > 1:
         names = [target.with_name(f"{target.stem}.{i}{target.suffix}") for i in range(1, len(groups) + 1)]
         return [(name, [group]) for name, group in zip(names, groups, strict=True)]
@@ -149,9 +149,9 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 def _provenance(
     log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
 ) -> Mapping[str, str]:
-    """Of a log in parts each part's name and SHA-256, too; `sha256` is then that of these digests."""
+    """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
-        parts = FoundParts.of(log).every  # in the order of time
+        parts = FoundParts.of(log).every  # in order of time
     digests = {part.name: file_digest(part) for part in parts}
     told = {
         "source": log.name or log.resolve().name,

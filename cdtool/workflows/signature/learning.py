@@ -1,4 +1,4 @@
-"""Learning a threshold from impact-free logs for a signature file."""
+"""Learn a threshold from impact-free logs for a signature file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cdtool.workflows.signature.threshold_settings import set_by_hand
 
 @dataclass(frozen=True)
 class Learned:
-    """A signature file's content, how many runs each class gave (None: all classes together), and what was left out."""
+    """The content of a signature file, the number of runs per class (None: all classes), and what was left out."""
 
     signature: SignatureFile
     runs: tuple[tuple[MotionClass | None, int], ...]
@@ -39,10 +39,10 @@ class Learned:
 class LearningOptions:
     """The machine, the detector and how its threshold is learned.
 
-    `rule` is any threshold's with its settings (safety factor, sides, alignment, force ...), a signature's where it is
-    None; `joints` are those to watch, all where none is named; `operations`: whole, motion or trigger; `activation` are
-    settings other than the default's. `false_alarm_budget`, as 1/300op or 0.1/h, sets the safety factor on these runs
-    by cross-validation. A run in which the load cell shows a contact by the `onset` rule is left out.
+    `rule` is any threshold rule with its settings (safety factor, sides, alignment, force ...); None: a signature.
+    `joints` are the joints to monitor (default: all); `operations`: whole, motion or trigger; `activation` are settings
+    that differ from the default. `false_alarm_budget`, as 1/300op or 0.1/h, sets the safety factor on these runs by
+    cross-validation. A run in which the load cell shows a contact by the `onset` rule is left out.
     """
 
     machine: str | Path | MachineFile
@@ -61,13 +61,12 @@ class LearningOptions:
 def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     """Learn one detector's threshold from impact-free logs: a signature for each class of motion, or another rule.
 
-    The options are those of `LearningOptions`. Raises SignatureError where runs are too few, UsageError where they are
-    too few for the budget, CdtoolError where nothing can be read. Write the result with
-    `cdtool.signature_store.write_signature`.
+    The options are those of `LearningOptions`. Raises SignatureError for too few runs, UsageError for too few for the
+    budget, CdtoolError if nothing can be read. Write the result with `cdtool.signature_store.write_signature`.
     """
     machine, joints, operations = options.machine, options.joints, options.operations
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before anything is read
+    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before reading
     budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
     wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
@@ -110,11 +109,11 @@ learn_signature = by_keywords(LearningOptions, learn)
 def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:
     if budget and set_by_hand(rule):
         raise UsageError(
-            f"a safety factor or limits set by hand, and a false-alarm budget {budget} that would set them",
+            f"a safety factor or limits set by hand cannot be combined with a false-alarm budget {budget}",
             "give one of the two",
         )
 
 
 def learned_run(operation: Operation) -> LearnedRun:
-    """How a signature file notes an operation that it was learned from."""
+    """Return the entry of an operation in the list of runs of a signature file."""
     return LearnedRun(operation.name, operation.recording.digest, operation.number)

@@ -1,4 +1,4 @@
-"""Keeping a signature: do its runs suffice, has the machine drifted since, and adding runs without learning a fault."""
+"""Check the coverage and drift of a signature, and add runs to it without learning a fault."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
 
-# The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
+# False-alarm probability per operation that the runs must demonstrate, and the smallest one that can be required.
 TARGET, LEAST_TARGET = 1e-3, 1e-9
 
 
 @dataclass(frozen=True)
 class CheckedClass:
-    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given.
+    """One class of motion: coverage by the runs learned from, drift in later runs; None without such runs.
 
-    `signature` is what counts, `first` what was first learned.
+    `signature` is the current one, `first` the one first learned.
     """
 
     signature: FittedSignature
@@ -50,13 +50,13 @@ class CheckedClass:
 
     @property
     def advice(self) -> str:
-        """What to do, in a line."""
+        """Return what to do, in one line."""
         return advice(self.coverage, self.drift)
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What a check of a signature found, class by class, and what was left out."""
+    """The result of checking a signature, per class, and what was left out."""
 
     file: SignatureFile
     classes: tuple[CheckedClass, ...]
@@ -75,17 +75,17 @@ class Updated:
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:
-    """The current and the first signature of each class; raises SignatureError where the file holds another threshold.
+    """Return the current and the first signature of each class; SignatureError if the file has another threshold.
 
-    What is learned afresh has no curve along the stroke that could be held against a season's runs.
+    A threshold without a curve along the stroke cannot be compared with the runs of a season.
     """
     pairs: list[tuple[FittedSignature, FittedSignature]] = []
     for current, first in zip(file.current, file.first, strict=True):
         ours = isinstance(file.rule, Signature)
         if not ours or not isinstance(current, FittedSignature) or not isinstance(first, FittedSignature):
             raise SignatureError(
-                f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
-                "such a threshold is not updated run by run: learn it again with learn-signature",
+                f"{file.source or 'file'}: contains the threshold {file.threshold}, not a signature",
+                "relearn it with learn-signature: such a threshold cannot be updated run by run",
             )
         pairs.append((current, first))
     return tuple(pairs)
@@ -95,8 +95,8 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
 class SeasonOptions:
     """Impact-free logs of a machine, and how they are read.
 
-    `operations`: how logs are cut; as for learning where None. A run in which the load cell shows a contact by the
-    `onset` rule is left out.
+    `operations`: how logs are cut; None: as for learning. A run in which the load cell shows a contact by the `onset`
+    rule is left out.
     """
 
     logs: Sequence[str | Path]
@@ -112,7 +112,7 @@ class SeasonOptions:
         return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
 
     def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
-        """Read the logs for a signature file; raises SignatureError where they are cut otherwise than for learning."""
+        """Read the logs for a signature file; SignatureError if they are cut differently than for learning."""
         operations = _cut(file, self.operations)
         reading = RunReading(operations, onset=self.onset, jobs=self.jobs, progress=self.progress)
         return load_runs([Path(log) for log in self.logs], machine_file, reading, file.plausible)
@@ -120,17 +120,17 @@ class SeasonOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions(SeasonOptions):
-    """`target`: the chance of a false alarm in an operation that the runs have to show."""
+    """`target`: the false-alarm probability per operation that the runs must demonstrate."""
 
     target: float = TARGET
 
 
 @dataclass(frozen=True, kw_only=True)
 class UpdateOptions(SeasonOptions):
-    """`forget`: effective number of runs; None: all count alike.
+    """`forget`: effective number of runs; None: all have equal weight.
 
-    A run's deviation counts up to `cap` spreads; none may bring a limit further than `reserve` spreads from where it
-    was first learned.
+    The deviation of a run is limited to `cap` spreads; no run may move a limit more than `reserve` spreads from its
+    first learned value.
     """
 
     forget: float | None = None
@@ -139,16 +139,16 @@ class UpdateOptions(SeasonOptions):
 
 
 def check_by(path: str | Path, options: CheckOptions) -> Checked:
-    """Hold a signature against impact-free logs: those that it was learned from, and those of a season since.
+    """Check a signature with impact-free logs: those it was learned from, and those of a later season.
 
-    Of the first it is asked whether they suffice: each is judged by a signature of all the others, and `target` is what
-    they have to show. In the second, taken in the order given, drift is looked for. Which log is which is known by its
-    bytes. The options are those of `CheckOptions` and `SeasonOptions`. Raises SignatureError where the file does not
-    belong or holds no signature, or logs are cut otherwise; CdtoolError where nothing can be read.
+    Each run learned from is checked against a signature of all the others; `target` is what these runs must
+    demonstrate. Later runs, in the given order, are checked for drift. Logs are identified by their content. The
+    options are those of `CheckOptions` and `SeasonOptions`. Raises SignatureError if the file does not belong or
+    contains no signature, or logs are cut differently; CdtoolError if nothing can be read.
     """
     target = options.target
     if not LEAST_TARGET <= target < 1.0:
-        raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
+        raise UsageError(f"target is {target:g}", f"give a probability from {LEAST_TARGET:g} to below 1")
     machine_file = options.machine_file()
     file = read_signature(path)
     signatures = signatures_in(file)
@@ -160,8 +160,8 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
     known = {(run.sha256, run.operation) for run in file.runs}
     learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
     if 0 < sum(learned) < len(file.runs):
-        some = f"given: only {sum(learned)} of the {counted(len(file.runs), 'run')} that it was learned from"
-        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these alone"))
+        some = f"only {sum(learned)} of the {counted(len(file.runs), 'run')} learned from are given"
+        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these runs only"))
     classes, served = [], set()
     for current, first in signatures:
         own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
@@ -192,12 +192,12 @@ check_signature = by_keywords(CheckOptions, check_by)
 
 
 def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
-    """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
+    """Return the rule as used by the file: with the safety factor set by a budget, and for any number of runs."""
     return replace(cast(Signature, file.rule), safety_factor=current.safety_factor, force=True)
 
 
 def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
-    """What the work gives; None without runs, or where they are too few, which is named."""
+    """Return the result of the work; None without runs, or if there are too few, which is reported."""
     if not pairs:
         return None
     try:
@@ -208,18 +208,18 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
 
 
 def update_by(path: str | Path, options: UpdateOptions) -> Updated:
-    """Add impact-free runs to a signature file, by Welford or by forgetting.
+    """Add impact-free runs to a signature file, by Welford's method or with forgetting.
 
-    Refused are a run that brings a limit too far, one with an alarm, one in which the load cell shows a contact, one
-    that is in the signature already, one that ends early, and one that cannot be assessed. The options are those of
-    `UpdateOptions` and `SeasonOptions`. Raises SignatureError where the file does not belong.
+    A run is refused if it moves a limit too far, has an alarm, shows a contact on the load cell, is in the signature
+    already, ends early, or is not assessable. The options are those of `UpdateOptions` and `SeasonOptions`. Raises
+    SignatureError if the file does not belong.
     """
     forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
-        raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
+        raise UsageError(f"forget is {forget:g}", "give an effective number of runs above 1, e.g. 20 to 50")
     for name, value in (("cap", cap), ("reserve", reserve)):
         if not value > 0.0:
-            raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
+            raise UsageError(f"{name} is {value:g}", "give a number of spreads above 0")
     machine_file = options.machine_file()
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
@@ -245,11 +245,11 @@ update_with_runs = by_keywords(UpdateOptions, update_by)
 
 
 def _cut(file: SignatureFile, operations: str | None) -> str:
-    """How logs are cut: as for learning, since a stroke cut otherwise would be taken for another one."""
+    """Return how logs are cut: as for learning, since strokes cut differently are not comparable."""
     if operations not in (None, file.operations):
         raise SignatureError(
             f"{file.source}: learned from logs cut by '{file.operations}', not by '{operations}'",
-            "leave --operations out, or learn another signature",
+            "omit --operations, or learn another signature",
         )
     return file.operations
 
@@ -259,7 +259,7 @@ def _with_operation(
 ) -> SignatureFile:
     run = learned_run(operation)
     if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in file.runs):
-        raise SignatureError("this run is in the signature already")
+        raise SignatureError("this run is already in the signature")
     detection = detect_operation(operation, machine, detector, file.current, file.activation, file.joints)
     if detection.verdict.outcome == "alarm":
         raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")

@@ -1,4 +1,4 @@
-"""Which sensor sees an impact first, before a machine is built: what `cdtool study` does."""
+"""Rank the sensors by when they detect an impact, before a machine is built: the work of `cdtool study`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from cdtool.workflows.study.study_file import read_study
 
 @dataclass(frozen=True)
 class SensorStudy:
-    """The ranking for one joint of a machine, and in words what was assumed because neither file nor option gave it.
+    """The ranking for one joint of a machine, and the assumptions made for values that were not given.
 
-    `waves` says whether the load counts as rigid in this impact (thesis 3.1.4); None where its first natural frequency
-    is not given.
+    `waves` states whether the load counts as rigid in this impact (thesis 3.1.4); None without its first natural
+    frequency.
     """
 
     machine: str
@@ -35,12 +35,12 @@ def study_sensors(
     factor: float = 5.0,
     options: Mapping[str, float] | None = None,
 ) -> SensorStudy:
-    """Rank the sensors of a machine by how early they see an impact (thesis figure 4.10).
+    """Rank the sensors of a machine by how early they detect an impact (thesis figure 4.10).
 
     `study` is a TOML file with the tables [impact], [drive], [controller], [sensors.NAME]; `options` by their keys,
-    such as {"impact.speed": 0.2}, win over it. `factor` is the k of k sigma. Of an arm or a robot one joint is studied
-    while the others stand. Raises ConfigurationError, UsageError: where the machine has no inertias of load and motor,
-    or a value has no meaning.
+    such as {"impact.speed": 0.2}, override it. `factor` is the k of k sigma. For an arm or a robot, one joint is
+    studied while the others are at rest. Raises ConfigurationError or UsageError for missing inertias of load and
+    motor, and for meaningless values.
     """
     file = read_machine_file(machine)
     found = read_study(file, study, joint, options)
