@@ -36,7 +36,7 @@ def read(gate_folder: Path, tmp_path: Path):
 @pytest.mark.parametrize("row", ["stiff/1.csv,5.0,5.2\n", "free/01.csv,,\n"])
 def test_a_label_that_fits_no_scored_recording_is_refused_with_its_line(read, row):
     name = row.split(",")[0]
-    with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is none of the recordings .* scored"):
+    with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is not a scored recording"):
         read(LEARN, STIFF, ONSET, labels=f"02.csv,5.0,5.2\n{row}")
 
 
@@ -58,7 +58,7 @@ def test_a_recording_labelled_without_a_contact_is_told_where_to_write_one(read)
     (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
     done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
     (line,) = [line for line in done.err.splitlines() if "no contact found" in line]
-    assert "labels.csv line 2 names none" in line and "start_s" in line and "above_n" not in line
+    assert "labels.csv line 2 does not list one" in line and "start_s" in line and "above_n" not in line
 
 
 @pytest.mark.parametrize("table", ["points", "campaigns"])
@@ -71,16 +71,16 @@ def test_another_spelling_of_a_path_is_the_same_log(read, table):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[points.a]\nlogs = ["soft/*.csv"]\n', r"points\.a: names .*soft/01\.csv, which no group of \[impacts\]"),
+        ('[points.a]\nlogs = ["soft/*.csv"]\n', r"points\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]"),
         (
             '[campaigns.a]\nlogs = ["soft/*.csv"]\n',
-            r"campaigns\.a: names .*soft/01\.csv, which no group of \[impacts\]",
+            r"campaigns\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]",
         ),
         ('[points.""]\nlogs = ["stiff/*.csv"]\n', r"points\.: has no name"),
         ('[campaigns." "]\nlogs = ["stiff/*.csv"]\n', r"campaigns\. : has no name"),
-        ('[impacts.""]\nlogs = ["soft/*.csv"]\n', r"impacts\.: is no name of a group"),
-        ('[impacts." "]\nlogs = ["soft/*.csv"]\n', r"impacts\. : is no name of a group"),
-        ('[impacts."*"]\nlogs = ["soft/*.csv"]\n', r"impacts\.\*: is no name of a group"),
+        ('[impacts.""]\nlogs = ["soft/*.csv"]\n', r"impacts\.: is not a valid group name"),
+        ('[impacts." "]\nlogs = ["soft/*.csv"]\n', r"impacts\. : is not a valid group name"),
+        ('[impacts."*"]\nlogs = ["soft/*.csv"]\n', r"impacts\.\*: is not a valid group name"),
         ('[impacts.again]\nlogs = ["soft/*.csv", "stiff/01.csv"]\n', r"stiff/01\.csv is scored in stiff and in again"),
         ('[impacts.again]\nlogs = ["soft/*.csv", "free/../soft/01.csv"]\n', r"soft/01\.csv is scored twice in again"),
         ('[holdout]\nlogs = ["stiff/*.csv"]\n', r"stiff/01\.csv is scored in stiff and in holdout"),
@@ -94,7 +94,7 @@ def test_a_log_or_name_that_would_do_nothing_or_count_twice_is_refused(read, tex
 def test_a_campaign_may_name_logs_of_the_hold_out_and_a_point_may_not(read):
     setup = read(PROFILE, LEARN, STIFF, HOLDOUT, '[campaigns.a]\nlogs = ["holdout/*.csv"]\n')
     assert len(setup.campaigns) == 2
-    with pytest.raises(ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which no group of \[impacts\]"):
+    with pytest.raises(ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which is not in a group of \[impacts\]"):
         read(PROFILE, LEARN, STIFF, HOLDOUT, '[points.a]\nlogs = ["holdout/*.csv"]\n')
 
 

@@ -165,7 +165,7 @@ def test_an_arm_is_explained_joint_by_joint():
 @pytest.mark.parametrize(
     ("log", "arguments", "words"),
     [
-        ("stiff/01.csv", ("--limit", "250"), ("a limit belongs to a detector",)),
+        ("stiff/01.csv", ("--limit", "250"), ("a limit requires a detector",)),
         ("stiff/01.csv", ("-d", "gm"), ("a signature or a limit",)),
         ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
         ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),

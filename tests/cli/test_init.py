@@ -160,7 +160,7 @@ def test_a_log_that_tells_of_no_channel_gets_a_file_with_its_clock_and_its_colum
 def test_a_log_of_a_clock_alone_is_one_line(tmp_path):
     log = tmp_path / "clock.csv"
     log.write_text("t\n" + "".join(f"{k}\n" for k in range(30)))
-    with pytest.raises(RecordingError, match="no column of numbers beside a clock"):
+    with pytest.raises(RecordingError, match="no column of numbers apart from a clock"):
         init(log, tmp_path / "machine.toml")
     assert not (tmp_path / "machine.toml").exists()
 

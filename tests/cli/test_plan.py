@@ -55,21 +55,21 @@ def source(tmp_path: Path) -> Path:
         (
             ("--false-alarms-at-most", "1/1000op"),
             "a budget of 1/1000op false alarms: to set a safety factor for it, 1000 impact-free operations to learn "
-            "from; to show that it is kept, 2996 others without a false alarm; 4744 with one false alarm allowed",
+            "from; to show that it is met, 2996 others without a false alarm; 4744 with one false alarm allowed",
         ),
         (
             ("--false-alarms-at-most", "0.1/h", "--allowed", "0"),
             "a budget of 1/10h false alarms: to set a safety factor for it, 10 impact-free hours to learn from; "
-            "to show that it is kept, 30 others without a false alarm",
+            "to show that it is met, 30 others without a false alarm",
         ),
         (
             ("--difference-ms", "5", "--std-ms", "8"),
-            "to see a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
-            "each judged by both",
+            "to detect a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
+            "each scored for both",
         ),
         (
             ("--difference-ms", "5", "--std-ms", "8", "--unpaired", "--power", "0.9"),
-            "to see a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
+            "to detect a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
             "each of two sets",
         ),
     ],
@@ -110,9 +110,9 @@ def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
     done = cdtool("plan", "--difference-ms", 1, "--from", source, "--detectors", "gm,pt", "--group", "stiff")
     std = float(np.std(np.subtract(FIRST, SECOND), ddof=1))
     assert done.out == (
-        f"to see a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, measured: "
+        f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, measured: "
         f"momentum less pure_torque in stiff, 30 contacts, one a recording): {impacts_for_difference(1.0, std)} "
-        "impacts, each judged by both\n"
+        "impacts, each scored for both\n"
     )
 
 
@@ -143,13 +143,13 @@ def test_contacts_of_one_campaign_count_as_one():
     (answer,) = api.plan(difference_ms=5.0, std_ms=found).answers
     assert answer.needs[0].unit == "recordings or campaigns"
     assert answer.needs[0].amount == impacts_for_difference(5.0, found.std)
-    assert answer.words.endswith("each judged by both, with as many contacts in each as measured")
+    assert answer.words.endswith("each scored for both, with as many contacts in each as measured")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "nothing is asked (ask with --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
+        ((), "there is no question (give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
         (("--difference-ms", 5), "a difference of 5 ms without a standard deviation"),
         (("--difference-ms", 0, "--std-ms", 8), "difference is 0"),
         (("--difference-ms", 5, "--std-ms", 8, "--power", 1), "power is 1"),
@@ -161,18 +161,18 @@ def test_contacts_of_one_campaign_count_as_one():
         (("--missed-at-most", "5%", "--detectors", "gm"), "--detectors has no effect"),
         (("--missed-at-most", "5%", "--from", "r.json"), "--from has no effect"),
         (("--difference-ms", 5, "--std-ms", 8, "--allowed", 2), "--allowed has no effect"),
-        (("--missed-at-most", "5"), "missed share is '5' (write 5% or 0.05"),
+        (("--missed-at-most", "5"), "missed share is '5' (give 5% or 0.05"),
         (("--missed-at-most", "five"), "missed share is 'five'"),
         (("--missed-at-most", "5%x"), "missed share is '5%x'"),
         (("--false-alarms-at-most", "often"), "false-alarm budget is 'often'"),
         (("--difference-ms", 5, "--from", "absent.json"), "absent.json: no such file"),
-        (("--difference-ms", 5, "--from", "results.json"), "0 detectors are named (name two detectors of momentum"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are named"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are named"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"), "no detector 'ptt'"),
+        (("--difference-ms", 5, "--from", "results.json"), "0 detectors are given (give two detectors of momentum"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are given"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are given"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"), "detector 'ptt' is not in the results"),
         (
             ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,pt", "--group", "stif"),
-            "no contacts in a group 'stif' (did you mean stiff?",
+            "group 'stif' has no contacts (did you mean stiff?",
         ),
     ],
 )
@@ -184,13 +184,13 @@ def test_what_is_not_complete_ends_with_2_and_names_the_option(source, monkeypat
 
 def test_a_spread_needs_two_recordings():
     for outcomes in ([40.0], [MISSED] * 5):
-        with pytest.raises(UsageError, match="a standard deviation needs at least 2"):
+        with pytest.raises(UsageError, match="at least 2 are required"):
             measured_std(earlier(outcomes, outcomes), ["gm", "pt"])
 
 
 def test_a_group_has_to_be_named_where_there_are_several():
     results = build({(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")})
-    with pytest.raises(UsageError, match=r"no group is named \(known: soft, stiff\)"):
+    with pytest.raises(UsageError, match=r"no group is given \(known: soft, stiff\)"):
         measured_std(results, ["gm", "pt"])
 
 

@@ -108,7 +108,7 @@ def test_a_late_alarm_and_none_are_missed_contacts_at_the_end_of_the_window(logs
     assert outcomes["stiff/01.csv"] == outcomes["stiff/02.csv"] == outcomes["soft/02.csv"] == ("missed", None)
     assert outcomes["soft/01.csv"] == ("detected", pytest.approx(200.0))
     assert all(row["watched_ms"] == pytest.approx(1000.0, abs=300.0) for row in values["contacts"])
-    assert "plc: 1 of 6 recordings without a row: taken as watched without an alarm; first soft/02.csv" in err
+    assert "plc: 1 of 6 recordings without a row: counted as monitored without an alarm; first soft/02.csv" in err
 
 
 def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_exposure(logs, measured):
@@ -128,7 +128,7 @@ def test_a_recording_that_is_blind_all_over_is_not_assessable_with_a_reason(logs
     rows = "stiff/01.csv,0,plc,100\nstiff/02.csv,0,plc,100\n"
     values, _ = scored(logs, rows, "--listed-only", status=3)
     assert {row["outcome"] for row in values["contacts"]} == {"not_assessable"}
-    assert {row["reason"] for row in values["contacts"]} == {"the trigger file says so"}
+    assert {row["reason"] for row in values["contacts"]} == {"stated in the trigger file"}
 
 
 def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
@@ -170,14 +170,14 @@ def test_triggers_on_the_source_clock_are_moved_and_on_the_wrong_clock_are_told(
     assert values["provenance"]["trigger_clock"] == "source"
     wrong, err = scored(tmp_path, rows, status=3)
     assert {row["outcome"] for row in wrong["contacts"]} == {"missed"}
-    assert "1 of 1 row in no operation" in err and "try --clock source" in err
+    assert "1 of 1 row outside all operations" in err and "try --clock source" in err
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
 def test_rows_of_recordings_that_are_not_scored_are_named_and_the_status_is_3(logs, measured):
     done = score(logs, after(measured, 0.05) + "stiff/99.csv,1.0,plc,\nfree/01.csv,2.0,plc,\n")
     assert done.status == 3
-    assert "left out: stiff/99.csv: the benchmark file does not score it" in done.err
+    assert "left out: stiff/99.csv: not scored by the benchmark file" in done.err
     assert "left out: free/01.csv" in done.err and "2 items were left out" in done.err
 
 

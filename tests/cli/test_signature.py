@@ -57,7 +57,7 @@ def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
     done = cdtool("signature", "show", path)
     assert done.status == 0 and "threshold: cusum, safety factor 15 by default" in done.out
     refused = cdtool("signature", "update", path, *free, "-m", gate_folder / "machine.toml")
-    assert refused.status == 2 and "holds the threshold cusum, no signature" in refused.err
+    assert refused.status == 2 and "contains the threshold cusum, not a signature" in refused.err
 
 
 def test_runs_that_were_learned_from_are_judged_by_the_others(signature, gate_folder):
@@ -94,7 +94,7 @@ def test_an_update_adds_what_is_free_and_refuses_impacts_and_repeats(signature, 
     logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
     done = cdtool("signature", "update", signature, *logs, "-m", gate_folder / "machine.toml")
     assert done.status == 3 and "1 run added" in done.out
-    assert "not an impact-free run" in done.err and "in the signature already" in done.err
+    assert "not an impact-free run" in done.err and "already in the signature" in done.err
     before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
     assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
 
@@ -142,7 +142,7 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
     twin = tmp_path / "twin.csv"
     twin.write_bytes(free[2].read_bytes())
     done = cdtool("learn-signature", *free, twin, *machine, "-d", "gm", "-o", tmp_path / "s2.json")
-    assert done.status == 3 and "twin.csv: holds the same bytes as" in done.err
+    assert done.status == 3 and "twin.csv: has the same content as" in done.err
     assert len(json.loads((tmp_path / "s2.json").read_text())["runs"]) == len(free)
     once, twice = (
         json.loads(check(signature, gate_folder, *logs, "--json").out)["classes"][0]["coverage"]
@@ -153,7 +153,7 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
 
 def test_some_of_the_runs_learned_from_are_no_verdict_on_all(gate_folder, signature):
     done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
-    assert done.status == 3 and "given: only 4 of the 11 runs that it was learned from" in done.err
+    assert done.status == 3 and "only 4 of the 11 runs learned from are given" in done.err
     done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
     assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing was assessable" in done.out
 
@@ -163,7 +163,7 @@ def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
     learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--operations", "motion", "-o", path)
     assert cdtool(*learn).status == 0
     again = cdtool("signature", "update", path, *logs_of(gate_folder), *machine)
-    assert again.status == 2 and "in the signature already" in again.err
+    assert again.status == 2 and "already in the signature" in again.err
     other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--operations", "whole")
     assert other.status == 2 and "learned from logs cut by 'motion', not by 'whole'" in other.err
 
@@ -174,9 +174,9 @@ def test_what_a_budget_was_set_on_is_not_claimed_for_something_else(gate_folder,
     done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--debounce", 5)
     assert done.status == 0 and "set for 1/5op on 11 operations" in done.out, done.err
     log = gate_folder / "holdout" / "01.csv"
-    assert "another activation" not in cdtool("detect", log, *machine, "-s", path).out
+    assert "with an activation different" not in cdtool("detect", log, *machine, "-s", path).out
     assert (
-        "with another activation than that of the file"
+        "with an activation different from the file's"
         in cdtool("detect", log, *machine, "-s", path, "--debounce", 1).out
     )
     updated = cdtool("signature", "update", path, log, *machine)
@@ -202,4 +202,4 @@ def test_hand_set_limits_leave_no_room_for_a_factor_and_need_no_runs(gate_folder
     done = cdtool(*learn)
     assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
     refused = cdtool(*learn, "-k", 3)
-    assert refused.status == 2 and "beside limits set by hand" in refused.err
+    assert refused.status == 2 and "cannot be combined with limits set by hand" in refused.err

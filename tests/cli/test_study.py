@@ -64,7 +64,7 @@ def test_the_table_says_what_was_assumed_and_what_limits():
         "limited by",
         "half the noise:",
         "assumed: impact.speed = 0.2 m/s",
-        "assumed: drive.stiffness = 2.448e+06 N/m: the load swings at 10 Hz",
+        "assumed: drive.stiffness = 2.448e+06 N/m: the load oscillates at 10 Hz",
         "assumed: sensors.encoder.counts_per_turn = 4096: 12 bit",
         "without the machine's own variation",
     ):
@@ -124,7 +124,7 @@ def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
     # The forearm of the simulated arm: M22 without its motor, hit 0.3 m from the elbow, is that rotary axis.
     done = cdtool("study", "sensors", "-m", ARM, "--joint", "forearm", "--lever", 0.3)
     assert done.status == 0
-    assert "the other joints stand: 0.06984 kg m2 at forearm, without its motor" in done.out
+    assert "the other joints are at rest: 0.06984 kg m2 at forearm, without its motor" in done.out
     alone = tmp_path / "forearm.toml"
     alone.write_text(
         '[machine]\ntype = "rotary_axis"\nmotor_inertia = 1.5e-5\nload_inertia = 0.06984\n'
@@ -192,7 +192,7 @@ def test_the_figures_of_the_thesis_are_drawn_anew(tmp_path):
         (("--study", "absent.toml"), "absent.toml: no such file"),
         (("--study", "wrong.toml"), "wrong.toml: sensors.encoder.counts: unknown key (did you mean counts_per_turn?"),
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
-        (("--study", "limit.toml"), "controller.force_limit is 5 N, steady motion takes 30 N"),
+        (("--study", "limit.toml"), "controller.force_limit is 5 N, but steady motion requires 30 N"),
         (("--study", "negative.toml"), "negative.toml: sensors.load_cell.noise: is -1"),
         (("-o", "ranking.txt"), "--output is 'ranking.txt'"),
     ],
@@ -216,9 +216,9 @@ def test_a_machine_without_what_a_study_needs_is_refused(tmp_path):
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--joint", "elbow")
     assert done.status == 2 and "coordinates = 'motor' with motor_inertia" in done.err
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "scara.toml")
-    assert done.status == 2 and "have to turn all or slide all" in done.err
+    assert done.status == 2 and "must all rotate or all slide" in done.err
     done = cdtool("study", "sensors", "-m", ARM)
-    assert done.status == 2 and "2 joints (name one with --joint: arm, forearm)" in done.err
+    assert done.status == 2 and "2 joints (select one with --joint: arm, forearm)" in done.err
     done = cdtool("study", "sensors", "-m", ARM, "--joint", "arm")
     assert done.status == 2 and "no lever is given" in done.err
 
@@ -231,7 +231,7 @@ def test_one_of_several_joints_has_to_be_named(tmp_path):
         encoding="utf-8",
     )
     done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (name one with --joint: x, y)" in done.err
+    assert done.status == 2 and "2 joints (select one with --joint: x, y)" in done.err
     assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
 
 

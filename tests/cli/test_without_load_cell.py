@@ -51,7 +51,7 @@ def test_a_signature_is_learned_and_a_line_says_that_nothing_tells_of_contacts(b
     )
     assert done.status == 0, done.err
     told = [line for line in done.err.splitlines() if CELL in line]
-    assert len(told) == 1 and "3 logs" in told[0] and f"no column '{CELL}': taken as free of impacts" in told[0]
+    assert len(told) == 1 and "3 logs" in told[0] and f"no column '{CELL}': assumed to be free of impacts" in told[0]
     checked = cdtool("signature", "check", tmp_path / "s.json", *logs, "-m", gate_folder / "machine.toml")
     assert checked.status == 0 and "3 logs" in checked.err
 
@@ -60,7 +60,7 @@ def test_a_benchmark_learns_from_them_and_counts_false_alarms_in_them(bare, gate
     found = api.benchmark(benchmark_of(bare, gate_folder, gate_folder / "stiff" / "01.csv"))
     assert not found.results.skipped
     assert {(item.group, item.operations) for item in found.results.exposure} == {("stiff", 1), ("holdout", 1)}
-    assert sum("taken as free of impacts" in item.reason for item in found.results.findings) == 2
+    assert sum("assumed to be free of impacts" in item.reason for item in found.results.findings) == 2
     assert found.results.contacts[0].outcome == "detected"
 
 

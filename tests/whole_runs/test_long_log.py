@@ -165,7 +165,7 @@ def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
     np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
     (folder / "rest.toml").write_text(BENCHMARK.replace("hits.csv", "rest.csv"))
     results = cdtool.benchmark(folder / "rest.toml").results
-    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s lies in no operation (cut by motion)"]
+    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s is outside all operations (cut by motion)"]
     assert len(results.contacts) == 2
 
 

@@ -135,7 +135,7 @@ def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
     (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").stdout)
     assert one["detector"] == "torque_rate"
     only = command("benchmark", "benchmark.toml", "--detectors", "tr")
-    assert only.returncode == 0 and "1 of 1 limits are on detectors that were not run" in only.stderr
+    assert only.returncode == 0 and "1 of 1 limits are set for detectors that were not run" in only.stderr
 
 
 def test_the_contract_tests_run_over_the_plugins(site):

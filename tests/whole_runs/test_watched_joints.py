@@ -63,7 +63,7 @@ def test_a_signature_watches_the_joints_that_it_was_learned_for(forearm, tmp_pat
     alarms = json.loads(done.out)[0]["alarms"]
     assert alarms and {alarm["joint"] for alarm in alarms} == {"forearm"}
     refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--joints", "arm")
-    assert refused.status == 2 and "joints belong to a limit" in refused.err
+    assert refused.status == 2 and "joints require a limit" in refused.err
     more = forearm / "holdout" / "01.csv"
     added = cdtool("signature", "update", signature, more, "-m", forearm / "machine.toml", "--json")
     assert added.status == 0 and len(json.loads(added.out)["added"]) == 1
@@ -130,5 +130,5 @@ def test_a_benchmark_runs_other_detectors_when_asked_and_all_that_the_logs_allow
     left = {item.recording for item in fewer.findings if "needs the channel 'acceleration'" in item.reason}
     assert left == {name for name in DETECTORS.names() if "acceleration" in DETECTORS.load(name).needs}
     assert list(fewer.detectors) == [name for name in DETECTORS.names() if name not in left]
-    with pytest.raises(UsageError, match="name one twice"):
+    with pytest.raises(UsageError, match="contain a repetition"):
         api.benchmark(forearm / "benchmark.toml", detectors=("gm", "momentum"))

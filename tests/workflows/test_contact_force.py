@@ -70,14 +70,14 @@ def test_samples_that_cannot_be_judged_have_no_force(arm):
 
 def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated):
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
-    with pytest.raises(UsageError, match="energy of whole machine is no contact torque"):
+    with pytest.raises(UsageError, match="energy of whole machine is not the contact torque"):
         contact_force(detected(arm, recording, Energy()), arm, POINT)
-    with pytest.raises(UsageError, match="is no contact torque") as refused:
+    with pytest.raises(UsageError, match="is not the contact torque") as refused:
         contact_force(detected(arm, recording, PureTorque()), arm, POINT)
     assert "direct, desired_dynamics, velocity or kalman_momentum" in str(refused.value)
     operation = operations_of(recording)[0]
     one = detect_operation(operation, arm, Momentum(), (Limit.given([1.0]),), Activation(5), watched=("arm",))
-    with pytest.raises(UsageError, match="momentum of arm is no contact torque of all joints"):
+    with pytest.raises(UsageError, match="momentum of arm is not the contact torque of all joints"):
         contact_force(one, arm, POINT)
     with pytest.raises(UsageError, match="no links"):
         contact_force(detected(gate, simulated("stiff", 1), Momentum()), gate, POINT)

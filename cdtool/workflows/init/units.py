@@ -81,9 +81,9 @@ class Evidence:
 
     def _named(self, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
         if si in _RAW:
-            return _raw(unit, accepted[0], self.channels.joints, "read off its name")
+            return _raw(unit, accepted[0], self.channels.joints, "from its name")
         check = "" if si in accepted else f"with this type and these coordinates it is {accepted[0]}"
-        return Logged(unit, "read off its name", check=check or "known only from its name")
+        return Logged(unit, "from its name", check=check or "known only from its name")
 
     def _of_motion(self, channel: str) -> Logged:
         quantity = channel.removeprefix("reference_")
@@ -91,7 +91,7 @@ class Evidence:
         told = stated(channel, stream)
         if channel == quantity and self.side.gear is not None:
             unit = self.side.gear.position if quantity == "position" else self.side.gear.speed
-            why = "read off its name" if told.unit else "" if quantity == "position" else "its name"
+            why = "from its name" if told.unit else "" if quantity == "position" else "its name"
             return Logged(unit, why, check=f"not certain: {others(unit)}? The transmission ratio depends on it")
         if channel == quantity and self.ratio is not None and self.ratio.fitting and told.si not in _RAW:
             return self._fitting(quantity)

@@ -68,7 +68,7 @@ def test_limits_on_detectors_that_are_not_run_are_told_and_not_checked(gate):
     assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("violated") == 1
     done = run(gate, HEAD, LEARN, ONSET, STIFF, limits, detectors=["gm"])
     assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "met")]
-    assert any("1 of 2 limits are on detectors that were not run" in item.reason for item in done.results.findings)
+    assert any("1 of 2 limits are set for detectors that were not run" in item.reason for item in done.results.findings)
 
 
 def test_force_profile_points_and_campaigns_become_rows(gate):
@@ -144,7 +144,7 @@ def test_limits_become_rows(gate):
 
 def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
     shutil.copy(gate / "free" / "03.csv", gate / "copy.csv")
-    with pytest.raises(ConfigurationError, match=r"copy\.csv holds the same bytes as free/03\.csv"):
+    with pytest.raises(ConfigurationError, match=r"copy\.csv has the same content as free/03\.csv"):
         run(gate, HEAD, LEARN, ONSET, STIFF, '[holdout]\nlogs = ["copy.csv"]\n')
 
 
@@ -154,11 +154,11 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofile = "en_12453"\n', "force.profile: unknown force profile 'en_12453'.*en_12453_reducing_gap"),
         (
             '[impacts.x]\nlogs = ["holdout/*.csv"]\nforce_profile = "yard"\n',
-            "x.force_profile: .*'yard': .force. limits names no",
+            "x.force_profile: .*'yard': .force. limits does not name",
         ),
         ('[force]\nprofile = "yard"\nfile = "yard.toml"\n', "force.file: unknown key"),
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
-        ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*'a' does too"),
+        ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*also in 'a'"),
         ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown figure"),
     ],
 )
@@ -213,7 +213,7 @@ def test_a_budget_does_not_depend_on_the_order_of_the_files(gate):
 
 def test_the_same_bytes_under_two_names_are_not_scored_twice(gate):
     shutil.copy(gate / "stiff" / "01.csv", gate / "twice.csv")
-    with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv hold the same bytes"):
+    with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv have identical content"):
         run(gate, HEAD, LEARN, ONSET, STIFF, '[impacts.again]\nlogs = ["twice.csv"]\n')
 
 

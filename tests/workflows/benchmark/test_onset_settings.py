@@ -23,7 +23,7 @@ def test_the_default_is_three_milliseconds_and_is_stated_in_time():
 def test_samples_mean_those_of_a_load_cell_of_1_khz_and_say_what_to_write(samples):
     table = Table({"samples": samples}, "b.toml", "onset.")
     (words,) = migrated_onset(table)
-    assert words == f"b.toml: onset.samples: read as hold_s = {samples / 1000:g} (samples of 1 kHz): write that instead"
+    assert words == f"b.toml: onset.samples: read as hold_s = {samples / 1000:g} (samples at 1 kHz): use hold_s instead"
     assert read_onset(table).hold == pytest.approx(samples * 1e-3)
     assert migrated_onset(Table({"hold_s": 0.003}, "b.toml", "onset.")) == ()
 
@@ -31,8 +31,8 @@ def test_samples_mean_those_of_a_load_cell_of_1_khz_and_say_what_to_write(sample
 def test_what_cannot_be_read_is_refused_with_the_way_to_migrate():
     with pytest.raises(ConfigurationError, match=r"onset\.samples: is 200: the onset rule counts in seconds") as found:
         read(samples=200)
-    assert found.value.hint == "write hold_s, at most 0.1"
-    with pytest.raises(ConfigurationError, match=r"onset\.samples: is given together with hold_s"):
+    assert found.value.hint == "set hold_s, at most 0.1"
+    with pytest.raises(ConfigurationError, match=r"onset\.samples: cannot be combined with hold_s"):
         read(samples=3, hold_s=0.003)
     with pytest.raises(ConfigurationError, match=r"onset\.hold_s: is 0.5"):
         read(hold_s=0.5)

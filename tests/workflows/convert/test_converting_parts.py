@@ -146,7 +146,7 @@ def test_a_log_without_any_mapped_channel_is_one_line(tmp_path):
     known.write_text(MACHINE.replace('speed = { topic = "/speed", field = "data" }\n', ""))
     log = write_part(tmp_path / "log.mcap", 0.0, ("speed",))
     done = command("convert", log, tmp_path / "out.csv", "-m", known)
-    assert done.status == 2 and "holds none of the mapped channels" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and "contains none of the mapped channels" in done.err and done.err.count("\n") == 1
 
 
 def test_no_part_is_overwritten_and_none_is_added(tmp_path):

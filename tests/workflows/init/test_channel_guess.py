@@ -58,7 +58,7 @@ def test_of_two_columns_of_one_name_the_smoother_is_the_set_value_and_both_are_m
     noise = np.random.default_rng(3).normal(0.0, 0.005, len(run.time))
     draft = drafted_columns(tmp_path, {"t": run.time, "speed a": run.speed, "speed b": run.speed + noise})
     assert column(draft, "speed") == "speed b" and column(draft, "reference_speed") == "speed a"
-    assert "course alone" in draft.said("speed") and "course alone" in draft.said("reference_speed")
+    assert "values only" in draft.said("speed") and "values only" in draft.said("reference_speed")
 
 
 @pytest.mark.parametrize("cell", ["loadcell_N", "load cell", "Kraftmessdose", "Waegezelle", "F_cell", "Kraft", "F"])
@@ -108,4 +108,4 @@ def test_a_header_unit_keeps_a_column_from_what_it_cannot_measure(tmp_path):
 def test_the_shaker_of_a_bench_is_no_speed_of_rotation(tmp_path):
     draft = drafted(data("emps/DATA_EMPS_PULSES.mat"), tmp_path)
     assert "speed" not in draft.channels and column(draft, "position") == "qm" and draft.checked("position")
-    assert "course alone" in draft.said("torque")
+    assert "values only" in draft.said("torque")

@@ -81,7 +81,7 @@ def test_a_known_type_needs_neither_unit_nor_mark(tmp_path):
 
 def test_a_known_type_whose_numbers_are_not_in_si_units_is_marked(tmp_path):
     draft = drafted(joint_states(tmp_path, RPM), tmp_path)
-    assert "in SI units it were 1" in draft.said("position") and draft.checked("speed")
+    assert "must be 1 in SI units" in draft.said("position") and draft.checked("speed")
 
 
 def test_a_sensor_of_forces_never_gives_the_torque(tmp_path):

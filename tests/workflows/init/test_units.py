@@ -160,7 +160,7 @@ def test_units_in_names_that_fit_the_ratio_are_not_marked(tmp_path):
     columns = {"time_s": run.time, "velocity_mps": run.speed, "position_m": run.travel, "force_kg": run.force}
     draft = drafted_columns(tmp_path, columns)
     assert not draft.checked("position") and not draft.checked("speed")
-    assert draft.unit("force") == "kgf" and "only its name" in draft.said("force")
+    assert draft.unit("force") == "kgf" and "only from its name" in draft.said("force")
 
 
 @needs_data("ur3e/L1L2.csv")

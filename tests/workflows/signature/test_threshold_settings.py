@@ -131,7 +131,7 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ("[activation]\nlatched = true\n", "activation.latched: unknown key"),
         ("[activation]\nhysteresis = 1\n", "activation.hysteresis: is 1.*below 1"),
         ("[activation]\nrearm_s = -1\n", "activation.rearm_s: is -1"),
-        ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs to another table.*\[activation\]"),
+        ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs in another table.*\[activation\]"),
         ('[threshold]\nname = "combined"\nmembers = ["limit"]\n', "two or more"),
     ],
 )
@@ -144,11 +144,11 @@ def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):
     hand = '[threshold]\nname = "limit"\nlimits = 50\n'
     file = written(door, hand)
     file.write_text(file.read_text(encoding="utf-8").replace('["gm"]', '["gm", "pt"]'), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="set by hand beside 2 detectors"):
+    with pytest.raises(ConfigurationError, match="set by hand together with 2 detectors"):
         read_benchmark_file(file)
     file = written(door, hand)
     file.write_text('false_alarm_budget = "1/8op"\n' + file.read_text(encoding="utf-8"), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="set by hand beside a false-alarm budget"):
+    with pytest.raises(ConfigurationError, match="set by hand together with a false-alarm budget"):
         read_benchmark_file(file)
     with pytest.raises(ConfigurationError, match="set by hand"):
         cdtool.benchmark(written(door, hand), false_alarm_budget="1/8op")
@@ -176,7 +176,7 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
 
 def test_a_factor_set_by_hand_is_refused_beside_a_budget_and_told_without_one(door):
     machine, logs = door / "machine.toml", [door / "free.csv"]
-    with pytest.raises(UsageError, match="set by hand, and a false-alarm budget 1/8op"):
+    with pytest.raises(UsageError, match="set by hand cannot be combined with a false-alarm budget 1/8op"):
         cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion", false_alarm_budget="1/8op")
     by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion").signature
     assert by_hand.described == "limit, safety factor 9 set by hand"
