@@ -1,4 +1,4 @@
-"""A log's channels before they are referred to the load side: what plausible ranges are learned from."""
+"""A log's channels before conversion to the load side, from which plausible ranges are learned."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class LoggedRecording:
-    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers."""
+    """A log's channels as logged, in SI, not yet on the load side; `factors` converted the logged numbers to SI."""
 
     recording: Recording
     factors: Mapping[str, tuple[float, ...]]
@@ -21,7 +21,7 @@ class LoggedRecording:
     def on_load_side(
         self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
     ) -> Recording:
-        """The recording on the load side, made without the values that are outside of the plausible ranges."""
+        """Return the recording on the load side, without values outside the plausible ranges."""
         plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
         recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
         return recording
