@@ -104,7 +104,7 @@ class Activation:
     def alarms(
         self, statistic: Signal, band: Band, inner: Band | None = None, begins: Sequence[float] = ()
     ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Return alarms and all crossings (debounced exits from the band, armed or not) of all joints, in order of time.
+        """Return alarms and all crossings (debounced exits from the band, armed or not) of all joints, in time order.
 
         `inner`: the band within which an alarm is re-armed, with hysteresis; `begins` [s]: start of operations, at
         which every alarm is re-armed.

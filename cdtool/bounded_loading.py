@@ -138,7 +138,7 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as fault:
-        raise ContentError("is not UTF-8 text") from fault
+        raise ContentError("not UTF-8 text") from fault
     if not text.strip():
         raise ContentError("it is empty")
     try:

@@ -148,7 +148,7 @@ class LinkedMachine(Machine, Protocol):
     def contact_torque(
         self, position: FloatArray, force: FloatArray, link: str, point: tuple[float, float, float]
     ) -> FloatArray:
-        """Return J_c' F (n, J) for the force and moment (n, 6) that the machine exerts on a link's point (thesis 2.5)."""
+        """Return J_c' F (n, J) for the force and moment (n, 6) that the machine exerts on a link (thesis 2.5)."""
         ...
 
     def contact_force(

@@ -53,7 +53,9 @@ def refuse_other_kind(target: Path, kind: Kind, *, force: bool | None = None) ->
     if force or not target.is_file() or kind.is_kind_of(target):
         return
     way_out = "remove it first" if force is None else "overwrite it with --force"
-    raise UsageError(f"{plain(target)}: already exists and is not a {kind.words}", f"choose another name, or {way_out}")
+    raise UsageError(
+        f"{plain(target)}: already exists and contains no {kind.words}", f"choose another name, or {way_out}"
+    )
 
 
 def refuse_foreign_figure(target: Path, *, force: bool) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 
-# float64 holds every integer up to this value; above the second one there are no 64-bit integers.
+# float64 represents every integer up to the first value; 64-bit integers are below the second.
 _EXACT, _WIDEST = 2.0**53, 2.0**64
 
 

@@ -191,7 +191,7 @@ def test_one_writer_of_a_file_at_a_time(tmp_path, monkeypatch):
         thread = threading.Thread(target=other)
         thread.start()
         thread.join(30)
-        assert "a.json: another process is writing it" in str(told[0])
+        assert "a.json: is being written by another process" in str(told[0])
         write_text(tmp_path / "b.json", "another file is free")
     assert (tmp_path / "a.json").read_text() == "mine" and names(tmp_path) == {"a.json", "b.json"}
 

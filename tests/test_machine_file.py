@@ -113,7 +113,7 @@ def test_many_joints_take_one_value_or_one_each(tmp_path):
     file = read(tmp_path, text + '[channels]\ntime = { rate_hz = 1000 }\nspeed = { columns = [1, 2], unit = "rpm" }\n')
     assert file.machine.nominal_inertia == pytest.approx([1154.4, 564.4], abs=0.2)
     assert file.columns.time.rate == 1000.0
-    with pytest.raises(ConfigurationError, match="one a joint"):
+    with pytest.raises(ConfigurationError, match="one per joint"):
         read(tmp_path, text.replace("[620.0, 30.0]", "[620.0, 30.0, 1.0]"))
 
 

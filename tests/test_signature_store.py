@@ -92,7 +92,7 @@ def test_normal_motions_that_are_none_are_a_damaged_file(tmp_path, learned):
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
     learned.check(gate, Momentum())
-    with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, the machine file has 12\.0"):
+    with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, but the machine file has 12\.0"):
         learned.check(gate, Momentum(12.0))
     with pytest.raises(SignatureError, match="another machine"):
         learned.check(replace(gate, load_inertia=(621.0,)), Momentum())

@@ -70,7 +70,7 @@ def test_joints_of_the_urdf_that_are_not_logged_must_be_locked(log, tmp_path):
 
 def test_a_wrong_number_of_columns_names_the_key(log, tmp_path):
     told = refused(log, described(tmp_path, torque='"f0", "f1", "f2"'))
-    assert "channels.torque.columns: names 3 columns (6 are needed: one a joint)" in told
+    assert "channels.torque.columns: names 3 columns (give 6: one per joint)" in told
 
 
 def test_a_negative_mass_names_the_link(log, tmp_path):

@@ -71,7 +71,10 @@ def test_another_spelling_of_a_path_is_the_same_log(read, table):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[points.a]\nlogs = ["soft/*.csv"]\n', r"points\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]"),
+        (
+            '[points.a]\nlogs = ["soft/*.csv"]\n',
+            r"points\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]",
+        ),
         (
             '[campaigns.a]\nlogs = ["soft/*.csv"]\n',
             r"campaigns\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]",
@@ -94,7 +97,9 @@ def test_a_log_or_name_that_would_do_nothing_or_count_twice_is_refused(read, tex
 def test_a_campaign_may_name_logs_of_the_hold_out_and_a_point_may_not(read):
     setup = read(PROFILE, LEARN, STIFF, HOLDOUT, '[campaigns.a]\nlogs = ["holdout/*.csv"]\n')
     assert len(setup.campaigns) == 2
-    with pytest.raises(ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which is not in a group of \[impacts\]"):
+    with pytest.raises(
+        ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which is not in a group of \[impacts\]"
+    ):
         read(PROFILE, LEARN, STIFF, HOLDOUT, '[points.a]\nlogs = ["holdout/*.csv"]\n')
 
 

@@ -124,7 +124,7 @@ def test_a_signature_file_of_before_says_how_to_learn_what_is_normal(explain, fe
     old.write_text(json.dumps({**values, "schema_version": 3}))
     told = " ".join(explain("stiff/01.csv", "-s", old).out.split())
     assert "Nothing to compare with: the signature file holds no normal motion" in told
-    assert "learn it again with cdtool learn-signature" in told
+    assert "relearn it with cdtool learn-signature" in told
     assert "usual range" not in told
 
 

@@ -119,10 +119,10 @@ TOML_BOMBS = {
     "a table of 20000 parts": ("[" + ".".join("a" * 20_000) + "]", ("a key of more than 32 parts",)),
     "300000 keys": ("\n".join(f"a{i}.b = 1" for i in range(300_000)), ("more than 50000 keys",)),
     "400000 arrays": ("\n".join("[[a]]" for _ in range(400_000)), ("more than",)),
-    "a text that does not end": ('a = """' + '\\"""' * 900_000, ("a text begins at line 1 and does not end",)),
+    "a text that does not end": ('a = """' + '\\"""' * 900_000, ("a text that begins at line 1 is not terminated",)),
     "half a million escapes": ('a = "' + '\\"' * 500_000 + '"', ("more than",)),
-    "5 MiB": ("#" * 5 * 2**20, ("has 5 MiB, at most 4 are read",)),
-    "no UTF-8": (b"\xff\xfe\x00", ("no UTF-8 text",)),
+    "5 MiB": ("#" * 5 * 2**20, ("has 5 MiB; at most 4 are read",)),
+    "no UTF-8": (b"\xff\xfe\x00", ("not UTF-8 text",)),
 }
 
 
@@ -171,8 +171,8 @@ def json_bombs() -> dict[str, tuple[bytes, tuple[str, ...]]]:
         "100000 objects": (b'{"a":' * 100_000, ("nested more than 64 deep",)),
         "an integer of 5000 digits": (b'{"schema_version": ' + b"7" * 5000 + b"}", ("5000 digits",)),
         "a number beyond the largest": (b'{"schema_version": 1e999}', ("1e999",)),
-        "NaN": (b'{"schema_version": NaN}', ("NaN is no number of JSON",)),
-        "no UTF-8": (b'{"a": "\xff"}', ("no UTF-8 text",)),
+        "NaN": (b'{"schema_version": NaN}', ("NaN is not a JSON number",)),
+        "no UTF-8": (b'{"a": "\xff"}', ("not UTF-8 text",)),
         "a text of a million quotes": (b'"' + b'\\"' * 1_000_000, ("damaged at line 1",)),
         "15 million lists": (b"[" + b"[]," * 15_000_000 + b"[]]", ("MiB of memory", "refused")),
         "no object": (b"[]", ()),

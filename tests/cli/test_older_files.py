@@ -40,7 +40,7 @@ def test_every_command_says_once_what_an_older_signature_file_has_not(command, g
     done = cdtool(*arguments)
     assert done.status == 0, done.err
     (line,) = [line for line in done.err.splitlines() if SAID in line]
-    assert line.startswith(f"note: {signature}: ") and "learn it again with cdtool learn-signature" in line
+    assert line.startswith(f"note: {signature}: ") and "relearn it with cdtool learn-signature" in line
     assert (done.out + done.err).count(SAID) == 1
 
 

@@ -49,7 +49,7 @@ def test_a_link_in_json_to_a_recording_is_no_way_round(folder, way):
     getattr(link, way)(folder / "free" / "01.csv")
     before = bytes_of(folder)
     done = learn(folder, link)
-    assert done.status == 2 and "link.json: already exists and holds no signature" in done.err
+    assert done.status == 2 and "link.json: already exists and contains no signature" in done.err
     assert bytes_of(folder) == before
 
 
@@ -130,7 +130,7 @@ def test_a_figure_or_traces_of_another_program_are_not_replaced_without_force(fo
     target = folder / (name if "traces" not in name else "r.json")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", target)
-    assert done.status == 2 and f"{name}: already exists and holds no" in done.err and "--force" in done.err
+    assert done.status == 2 and f"{name}: already exists and contains no" in done.err and "--force" in done.err
     assert bytes_of(folder) == before
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", target, "--force")
     assert done.status == 0, done.err
@@ -151,7 +151,7 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
     for words in commands:
         plot.write_text(TEXT, encoding="utf-8")
         done = cdtool(*words)
-        assert done.status == 2 and "p.png: already exists and holds no figure of cdtool" in done.err, words
+        assert done.status == 2 and "p.png: already exists and contains no figure of cdtool" in done.err, words
         assert plot.read_text(encoding="utf-8") == TEXT
         assert [cdtool(*words, "--force").status, cdtool(*words).status] == [0, 0], words
 

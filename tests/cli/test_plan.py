@@ -169,7 +169,10 @@ def test_contacts_of_one_campaign_count_as_one():
         (("--difference-ms", 5, "--from", "results.json"), "0 detectors are given (give two detectors of momentum"),
         (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are given"),
         (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are given"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"), "detector 'ptt' is not in the results"),
+        (
+            ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"),
+            "detector 'ptt' is not in the results",
+        ),
         (
             ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,pt", "--group", "stif"),
             "group 'stif' has no contacts (did you mean stiff?",

@@ -174,7 +174,9 @@ def test_a_setting_beside_the_benchmark_file_is_refused(command, option):
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
     assert done.status == 2
-    assert done.err.startswith(f"error: {'--latch' if option[0] == '--no-latch' else option[0]} cannot be combined with")
+    assert done.err.startswith(
+        f"error: {'--latch' if option[0] == '--no-latch' else option[0]} cannot be combined with"
+    )
 
 
 def test_a_detector_has_to_be_named_where_the_file_names_several():

@@ -46,7 +46,7 @@ def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_b
 def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
     for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
         path.write_bytes(b"written by hand")
-        with pytest.raises(UsageError, match="already exists and holds no"):
+        with pytest.raises(UsageError, match="already exists and contains no"):
             check_outputs([tmp_path / f"report{suffix}"])
         check_outputs([tmp_path / f"report{suffix}"], force=True)
         path.unlink()

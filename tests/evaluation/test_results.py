@@ -118,8 +118,8 @@ def test_a_wrong_field_is_named(tmp_path, old, new, words):
     [
         (None, r"results\.json: no such file$"),
         ("", r"results\.json: not a results file: it is empty$"),
-        ('{"schema_version": 2, "detec', r"results\.json: not a results file: cut off or damaged at line 1$"),
-        (b"\xff\xfe\x00", r"results\.json: not a results file: no UTF-8 text$"),
+        ('{"schema_version": 2, "detec', r"results\.json: not a results file: truncated or damaged at line 1$"),
+        (b"\xff\xfe\x00", r"results\.json: not a results file: not UTF-8 text$"),
         (
             '{"schema_version": 2}',
             r"results: provenance, detectors, groups, contacts, false_alarms, exposure missing$",

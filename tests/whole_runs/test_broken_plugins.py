@@ -77,22 +77,30 @@ def test_the_detector_that_the_others_are_made_from_is_fine(install):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (DETECTOR, "import no_such_module", "does not load: ModuleNotFoundError"),
-        (DETECTOR, "def (", "does not load: SyntaxError"),
-        (DETECTOR, "x = 1", "does not load: AttributeError"),
+        (DETECTOR, "import no_such_module", "cannot be loaded: ModuleNotFoundError"),
+        (DETECTOR, "def (", "cannot be loaded: SyntaxError"),
+        (DETECTOR, "x = 1", "cannot be loaded: AttributeError"),
         ('"odd"', '"even"', "is named 'even' in its class"),
-        ("    signed: ClassVar[bool] = True\n", "", "lacks the attribute 'signed'"),
-        ("def signal", "def signals", "lacks the attribute 'signal'"),
+        ("    signed: ClassVar[bool] = True\n", "", "has no attribute 'signed'"),
+        ("def signal", "def signals", "has no attribute 'signal'"),
         ('"od"', '"gm"', "has the short name 'gm', which belongs to momentum"),
-        ("(frozen=True)", "", "is no frozen dataclass"),
-        ('gain(1.0, "1", "a factor")', "1.0", "gives no unit and no meaning for 'factor'"),
+        ("(frozen=True)", "", "is not a frozen dataclass"),
+        ('gain(1.0, "1", "a factor")', "1.0", "has no unit and no meaning for 'factor'"),
         (' = gain(1.0, "1", "a factor")', "", "has no default for 'factor'"),
-        ("    signed", "    look: ClassVar[str] = 'red'\n    signed", "has an attribute 'look' that is no Look"),
-        ("    signed", "    look = Look('red', 'o')\n    signed", 'does not load: ConfigurationError("the colour of a'),
+        (
+            "    signed",
+            "    look: ClassVar[str] = 'red'\n    signed",
+            "has an attribute 'look' that is not of type Look",
+        ),
+        (
+            "    signed",
+            "    look = Look('red', 'o')\n    signed",
+            'cannot be loaded: ConfigurationError("the colour of a',
+        ),
         (
             "    signed",
             "    look = Look('#ff0000', '*')\n    signed",
-            'does not load: ConfigurationError("the marker of',
+            'cannot be loaded: ConfigurationError("the marker of',
         ),
     ],
 )
@@ -129,7 +137,7 @@ def test_a_name_of_cdtool_itself_is_refused_and_cdtools_own_is_used(install):
     install(DETECTOR.replace('"odd"', '"momentum"'), "momentum")
     listed = cdtool("list", "detectors")
     assert listed.status == 3 and listed.out.count("momentum (gm): Generalized momentum observer") == 1
-    assert "'momentum' of package 'odd-things' bears the name of a detector of cdtool itself" in listed.err
+    assert "'momentum' of package 'odd-things' has the name of a detector of cdtool itself" in listed.err
     assert detect("momentum").status == 0
 
 
@@ -137,14 +145,14 @@ def test_two_packages_with_one_name_are_both_named(install):
     install(DETECTOR, package="one")
     install(DETECTOR, package="two")
     done = detect("odd")
-    assert done.status == 2 and "the packages one and two both bring a detector 'odd'" in done.err
+    assert done.status == 2 and "the packages one and two both provide a detector 'odd'" in done.err
 
 
 def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_go_on(install):
     install(DETECTOR, package="one")
     install(DETECTOR.replace('"odd"', '"even"'), "even", package="two")
     done = detect("od")
-    assert done.status == 2 and "the short name 'od' belongs to even and odd (write the full name)" in done.err
+    assert done.status == 2 and "the short name 'od' belongs to even and odd (give the full name)" in done.err
     assert detect("odd").status == detect("even").status == 0
 
 
@@ -154,7 +162,7 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
         group="thresholds",
     )
     done = cdtool("list", "thresholds")
-    assert done.status == 3 and "'odd' of package 'odd-things' lacks the attribute 'safety_factor'" in done.err
+    assert done.status == 3 and "'odd' of package 'odd-things' has no attribute 'safety_factor'" in done.err
 
 
 @pytest.mark.parametrize(
@@ -324,9 +332,9 @@ def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('(".txt",)', '("txt",)', "does not load: ConfigurationError"),
-        ('{".txt"', '{".text"', "does not load: ConfigurationError"),
-        ("(Writer)", "", "lacks the attribute 'in_folder'"),
+        ('(".txt",)', '("txt",)', "cannot be loaded: ConfigurationError"),
+        ('{".txt"', '{".text"', "cannot be loaded: ConfigurationError"),
+        ("(Writer)", "", "has no attribute 'in_folder'"),
     ],
 )
 def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, words):

@@ -149,7 +149,9 @@ def test_what_could_not_be_judged_is_told_with_its_share(folder):
     )
     assert done.status == 0
     told = " ".join(done.out.split())  # lines end where the terminal does
-    assert re.search(r"not assessable in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told)
+    assert re.search(
+        r"not assessable in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told
+    )
 
 
 def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
@@ -165,7 +167,9 @@ def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
     np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
     (folder / "rest.toml").write_text(BENCHMARK.replace("hits.csv", "rest.csv"))
     results = cdtool.benchmark(folder / "rest.toml").results
-    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s is outside all operations (cut by motion)"]
+    assert [item.reason for item in results.skipped] == [
+        "the contact at 26.500 s is outside all operations (cut by motion)"
+    ]
     assert len(results.contacts) == 2
 
 
