@@ -131,7 +131,7 @@ def measured_std(
         words = f"the latencies of {' and '.join(names)}"
     else:
         samples = [[(a.recording, _difference_of(a, rows[1][key])) for key, a in rows[0].items() if key in rows[1]]]
-        words = f"{' less '.join(names)}"
+        words = f"{' minus '.join(names)}"
     spreads = tuple(_spread(known, sample, words, chosen) for sample in samples)
     std = math.sqrt(sum(item.std**2 for item in spreads) / len(spreads))
     cluster = "campaign" if any(item.campaign for item in known.recordings if item.group == chosen) else "recording"
@@ -246,7 +246,7 @@ def _spread(results: Results, sample: Sequence[tuple[str, float | None]], what: 
 
 def _counted(spread: Spread, of: int, cluster: str) -> str:
     """Describe how the contacts are clustered, and how many are left out."""
-    clusters = f"one a {cluster}" if spread.n == spread.clusters else f"in {spread.clusters} {cluster}s"
+    clusters = f"one per {cluster}" if spread.n == spread.clusters else f"in {spread.clusters} {cluster}s"
     without = f", {of - spread.n} missed or not assessable left out" if of > spread.n else ""
     return f"{spread.n} contacts, {clusters}{without}"
 

@@ -51,5 +51,5 @@ def test_a_file_compared_with_itself_or_a_copy_is_called_so(results, tmp_path, c
         other.write_bytes(old.read_bytes())
     done = cdtool("compare", old, other)
     assert done.status == 0
-    assert done.out.splitlines()[-1].endswith(": both files hold the same results")
+    assert done.out.splitlines()[-1].endswith(": both files contain the same results")
     assert "too few" not in done.out and "would have been" not in done.out

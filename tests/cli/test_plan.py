@@ -110,8 +110,8 @@ def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
     done = cdtool("plan", "--difference-ms", 1, "--from", source, "--detectors", "gm,pt", "--group", "stiff")
     std = float(np.std(np.subtract(FIRST, SECOND), ddof=1))
     assert done.out == (
-        f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, measured: "
-        f"momentum less pure_torque in stiff, 30 contacts, one a recording): {impacts_for_difference(1.0, std)} "
+        f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, "
+        f"measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): {impacts_for_difference(1.0, std)} "
         "impacts, each scored for both\n"
     )
 
@@ -131,7 +131,7 @@ def test_unpaired_the_spread_is_that_of_the_latencies(source):
 def test_contacts_that_one_missed_are_left_out_and_counted():
     found = measured_std(earlier([MISSED, BLIND, *FIRST[2:]], [*SECOND[:2], MISSED, *SECOND[3:]]), ["gm", "pt"])
     assert found.std == pytest.approx(np.std(np.subtract(FIRST[3:], SECOND[3:]), ddof=1))
-    assert found.source.endswith("27 contacts, one a recording, 3 missed or not assessable left out")
+    assert found.source.endswith("27 contacts, one per recording, 3 missed or not assessable left out")
 
 
 def test_contacts_of_one_campaign_count_as_one():

@@ -77,7 +77,7 @@ def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(com
     assert (found["detector"], found["unit"], found["verdict"]) == ("torque_rate", "N/s", "alarm")
     assert 50.0 < found["contacts"][0]["latency_ms"] < 250.0
     explained = command("explain", log, *machine, "-s", "tr.json")
-    assert explained.returncode == 0 and "The first that torque_rate reads: torque" in explained.stdout
+    assert explained.returncode == 0 and "First input of torque_rate: torque" in explained.stdout
     other = machine_with(tmp_path, "\n[detectors.tr]\ncutoff = 3.0\n")
     refused = command("detect", log, "-m", other, "-s", "tr.json")
     assert refused.returncode == 2 and "learned with cutoff = 2.0" in refused.stderr

@@ -182,8 +182,8 @@ def test_a_torque_that_is_off_from_the_start_is_never_called_usual(gate):
 @pytest.mark.parametrize(
     ("absent", "told"),
     [
-        (Absence.BY_HAND, "with limits set by hand nothing was learned"),
-        (Absence.OLDER_FILE, "learn it again with cdtool learn-signature"),
+        (Absence.BY_HAND, "limits set by hand are not learned"),
+        (Absence.OLDER_FILE, "relearn it with cdtool learn-signature"),
         (Absence.FEW_RUNS, "too few impact-free runs"),
     ],
 )
@@ -191,11 +191,11 @@ def test_without_impact_free_runs_it_says_what_it_compares_with_and_why(absent, 
     item = explained("gate", log("gate", "stiff/03.csv"), NormalMotions((), absent), 300.0)
     assert item.absent is absent and item.runs == 0
     text = " ".join(words(item))
-    assert "Nothing to compare with: " in text and "this log's own past alone" in text and told in text
+    assert "No impact-free runs to compare with: " in text and "this log's own past" in text and told in text
     # Nothing was learned, so nothing is called normal, and the next step is named.
-    assert "usual range" not in text and "normal" not in text.replace("holds no normal motion", "")
+    assert "usual range" not in text and "normal" not in text.replace("has no normal motion", "")
     assert item.cause.kind is CauseKind.CONTACT and "Likely cause: a contact: speed of gate" in text
-    assert "learn" in text.partition("Nothing to compare with")[2]
+    assert "learn" in text.partition("No impact-free runs to compare with")[2]
 
 
 def test_a_speed_that_wanders_within_its_band_departs_where_it_bends(gate):

@@ -217,7 +217,7 @@ def test_a_statistic_that_is_outside_since_before_the_contact_is_told_as_such():
     assert isinstance(missed, MissExplanation) and missed.outcome == "missed"
     assert missed.approaches[0].latched_from == pytest.approx(2.9)
     assert missed.approaches[0].longest == 0
-    assert any("outside the band since 2.900 s already" in line for line in words(missed))
+    assert any("already outside the band since 2.900 s" in line for line in words(missed))
 
 
 def test_what_could_not_be_judged_is_told_by_share_and_a_blind_contact_by_its_reason():
@@ -292,13 +292,13 @@ def test_the_words_name_joint_limit_debounce_and_what_moved_first():
     (found,) = explain(item, matching(item, CONTACT), NINE, inputs=("torque",))
     assert words(found) == [
         "alarm at 3.028 s, 28 ms after the contact (onset at 3.000 s, load cell)",
-        "hip: above its upper limit, 1.5 against 1 N m. It left the band for good 20 ms after the onset, 8 ms before "
-        "the alarm, which needs 9 consecutive samples outside.",
+        "hip: above its upper limit, 1.5 against 1 N m. Last exit from the band 20 ms after the onset, 8 ms before "
+        "the alarm (debounce: 9 consecutive samples outside).",
         "Likely cause: not clear.",
-        "Nothing to compare with: with limits set by hand nothing was learned; learn a signature with cdtool "
-        "learn-signature and give it with --signature. Until then what follows is against this log's own past alone.",
+        "No impact-free runs to compare with: limits set by hand are not learned from runs; learn a signature with "
+        "cdtool learn-signature and give it with --signature. Compared with this log's own past instead.",
         "Moved first: acceleration down 5 ms after the onset, torque up 20 ms.",
-        "The first that momentum reads: torque, 20 ms after the onset.",
+        "First input of momentum: torque, 20 ms after the onset.",
     ]
 
 
