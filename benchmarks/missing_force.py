@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from timing import environment, table
 
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_course
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts

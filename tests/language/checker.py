@@ -34,7 +34,7 @@ TO_REWRITE = (
     "cdtool/detectors",
     "cdtool/evaluation/builds/words.py",
     "cdtool/evaluation/explanation",
-    "cdtool/evaluation/force/course.py",
+    "cdtool/evaluation/force/curve.py",
     "cdtool/formats",
     "cdtool/impact",
     "cdtool/machines",

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.plain_text import counted
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult

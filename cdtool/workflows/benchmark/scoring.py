@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceCourse
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep

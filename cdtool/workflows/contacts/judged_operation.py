@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.detection import Alarm, Band, Signal, Status, Verdict
-from cdtool.evaluation.force.course import ForceCourse, force_at
+from cdtool.evaluation.force.curve import ForceCourse, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
 from cdtool.evaluation.truth.matching import Match, Matching

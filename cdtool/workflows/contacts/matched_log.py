@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.course import ForceCourse, force_course
+from cdtool.evaluation.force.curve import ForceCourse, force_course
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.operations import Operation, operations_of

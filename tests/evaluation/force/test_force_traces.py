@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_course
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.traced import force_profiles, traced_forces
 from cdtool.evaluation.force.verdict import judge

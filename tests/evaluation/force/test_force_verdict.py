@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceCourse
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged, judge
 from cdtool.recording import FloatArray

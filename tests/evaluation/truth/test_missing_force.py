@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.detection import Alarm, Signal, Status, Verdict
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_course
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.doubts import truth_findings

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import pytest
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_course
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results

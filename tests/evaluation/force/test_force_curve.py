@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.force.course import force_at, force_course
+from cdtool.evaluation.force.curve import force_at, force_course
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
