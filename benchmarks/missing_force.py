@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from timing import environment, table
 
-from cdtool.evaluation.force.curve import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
@@ -181,7 +181,7 @@ def _compare(
 
 def _verdict(part: Recording, contacts: Sequence[Contact], number: int, profile: ForceProfile) -> str:
     until = contacts[number + 1].start if number + 1 < len(contacts) else float("inf")
-    return judge(force_course(part, contacts[number], 0.0, until), profile).outcome
+    return judge(force_time_curve(part, contacts[number], 0.0, until), profile).outcome
 
 
 def main() -> int:

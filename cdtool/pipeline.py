@@ -29,7 +29,7 @@ _AT_REST = 0.01
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Section:
     """A section of an operation that is not assessable: reason, start and end [s], and positions [load unit]."""
 
     reason: str
@@ -101,7 +101,7 @@ class Detection:
             return 0.0
         return self.statistic.period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
 
-    def not_judged(self) -> list[Stretch]:
+    def not_assessable_sections(self) -> list[Section]:
         """Return the sections in which the leading joint's signal is not assessable, in order of time."""
         joint = self.operation.motion.joint
         status, time = self.statistic.status[:, self.leading], self.statistic.time
@@ -115,7 +115,7 @@ class Detection:
             else np.full(len(time), np.nan)
         )
         return [
-            Stretch(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
+            Section(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
             for a, b in found
         ]
 

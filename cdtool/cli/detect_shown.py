@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import Detected
 
 # Operations whose sections that are not assessable are shown, and how many sections of each.
-_SHOWN, _STRETCHES = 6, 3
+_SHOWN, _SECTIONS = 6, 3
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 
@@ -34,7 +34,7 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
     rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
     detections = [detection for found in done for detection in found.detections]
     _show(rows, done[0].threshold)
-    _show_not_judged(detections)
+    _show_not_assessable(detections)
     _show_notes(detections)
     for force in list(forces.values())[:_SHOWN]:
         _show_force(force)
@@ -119,12 +119,12 @@ def _show_notes(detections: list[Detection]) -> None:
         typer.echo(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
 
 
-def _show_not_judged(detections: list[Detection]) -> None:
+def _show_not_assessable(detections: list[Detection]) -> None:
     """Print the share of each operation that is not assessable, and the time, position and reason of long sections."""
     shown = [detection for detection in detections if detection.statistic.shares()]
     for detection in shown[:_SHOWN]:
-        not_judged = detection.not_judged()
-        longest = sorted(not_judged, key=lambda item: item.start - item.end)[:_STRETCHES]
+        sections = detection.not_assessable_sections()
+        longest = sorted(sections, key=lambda item: item.start - item.end)[:_SECTIONS]
         unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
@@ -134,7 +134,7 @@ def _show_not_judged(detections: list[Detection]) -> None:
                 else ""
             )
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
-        if more := len(not_judged) - len(longest):
+        if more := len(sections) - len(longest):
             parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
         if detection.other_speed and detection.verdict.outcome != "not_assessable":  # otherwise it is among the reasons
             parts.append(detection.other_speed)
@@ -185,7 +185,7 @@ def _as_json(
         "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
         "other_speed": detection.other_speed or None,
-        "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
+        "stretches_not_judged": [asdict(item) for item in detection.not_assessable_sections()],
         "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),
         "findings": _findings(found),

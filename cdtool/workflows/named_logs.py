@@ -40,7 +40,7 @@ def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, s
 
 
 def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None:
-    """Return the label file, whose rows must all be about one of the `scored` logs; None if the table names no file.
+    """Return the label file, whose rows must all be about one of the `scored` logs; None without a file.
 
     Raises ConfigurationError for a row that matches no log, or for a file name that matches several.
     """

@@ -111,8 +111,8 @@ def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
     std = float(np.std(np.subtract(FIRST, SECOND), ddof=1))
     assert done.out == (
         f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, "
-        f"measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): {impacts_for_difference(1.0, std)} "
-        "impacts, each scored for both\n"
+        "measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): "
+        f"{impacts_for_difference(1.0, std)} impacts, each scored for both\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""Select the impact-free runs with which an explanation compares a run, or state why there are none."""
+"""Select the impact-free runs with which an explanation compares a run, or state why this is impossible."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Absence(StrEnum):
 
 @dataclass(frozen=True)
 class NormalMotions:
-    """The normal motion of every class; `absent`: the reason if there is none."""
+    """The normal motion of every class; `absent`: the reason if it is empty."""
 
     motions: tuple[NormalMotion, ...] = ()
     absent: Absence = Absence.BY_HAND

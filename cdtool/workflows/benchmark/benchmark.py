@@ -96,7 +96,7 @@ def benchmark(
         left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    detect = detect_with(setup, used, learned.thresholds, learned.lacking)
+    detect = detect_with(setup, used, learned.thresholds, learned.unusable)
     factors = _factors(setup, learned.thresholds)
     gathered = Gathering(
         setup,
@@ -106,8 +106,8 @@ def benchmark(
         NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS),
     )
     gathered.skipped += [*learn.skipped, *learned.skipped]
-    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.lacking.items()]
-    gathered.findings += [*learn.findings, *left_out, *learned.blind]
+    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
+    gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
 
     def score(item: tuple[str, Path]) -> Scored:

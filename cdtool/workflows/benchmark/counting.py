@@ -25,7 +25,7 @@ class Exposure:
     seconds: float = 0.0
     not_assessable: int = 0
     samples: int = 0
-    not_judged: Counter[str] = field(default_factory=Counter)
+    by_reason: Counter[str] = field(default_factory=Counter)
 
     def add(self, detection: Detection) -> None:
         """Add one operation."""
@@ -35,11 +35,11 @@ class Exposure:
         size = detection.statistic.status.size
         self.samples += size
         for reason, share in detection.statistic.shares().items():
-            self.not_judged[reason] += round(share * size)
+            self.by_reason[reason] += round(share * size)
 
     def result(self, group: str, detector: str) -> ExposureResult:
         """Return the row of results.json."""
-        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.not_judged.items())}
+        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.by_reason.items())}
         hours = self.seconds / 3600.0
         return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.evaluation.force.curve import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult
@@ -12,7 +12,7 @@ from cdtool.strict_json import finite
 
 
 def force_rows(
-    recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+    recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], curves: Mapping[int, ForceTimeCurve]
 ) -> list[ForceResult]:
     """Return a row for each contact of a recording, by its number."""
     return [
@@ -22,7 +22,7 @@ def force_rows(
             contact=number,
             profile=verdict.profile,
             verdict=verdict.outcome,
-            peak_n=courses[number].peak,
+            peak_n=curves[number].peak,
             steps=tuple(
                 ForceStepResult(
                     name=item.step.name,

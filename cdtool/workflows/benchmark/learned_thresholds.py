@@ -22,15 +22,15 @@ from cdtool.workflows.signature.fitting import NoUsableRunError, fitting, signal
 class LearnedThresholds:
     """Each detector's thresholds, runs left out, detectors that were not assessable, and how factors were set.
 
-    `lacking` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
+    `unusable` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
     runs that every other detector left out.
     """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
     skipped: list[Skipped]
-    blind: list[Skipped]
+    not_assessable: list[Skipped]
     calibration: list[CalibrationResult]
-    lacking: dict[str, str]
+    unusable: dict[str, str]
     unused: set[str]
 
     def learned_from(self, operations: Sequence[Operation]) -> list[Operation]:
@@ -57,11 +57,11 @@ def learn_thresholds(
             fitted = with_left_out(fit, [*unread, *unusable])(pairs)
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
-            learned.blind.append(Skipped(detector.name, f"not assessable: {fault.message}"))
+            learned.not_assessable.append(Skipped(detector.name, f"not assessable: {fault.message}"))
             continue
         except NoUsableRunError as fault:
             learned.thresholds[detector.name] = ()
-            learned.lacking[detector.name] = fault.reason
+            learned.unusable[detector.name] = fault.reason
             continue
         left_out.add(detector.name, [*unusable, *fitted.skipped])
         unused.append({item.recording for item in [*unusable, *fitted.skipped]})
@@ -77,15 +77,15 @@ def learn_thresholds(
         learned.thresholds[detector.name] = thresholds
     learned.skipped.extend(left_out.said_once())
     learned.unused.update(set.intersection(*unused) if unused else ())
-    if learned.lacking and len(learned.lacking) == len(detectors):
-        raise _none_usable(learned.lacking, known=bool(operations))
+    if learned.unusable and len(learned.unusable) == len(detectors):
+        raise _none_usable(learned.unusable, known=bool(operations))
     return learned
 
 
-def _none_usable(lacking: Mapping[str, str], known: bool) -> SignatureError:
-    name, reason = next(iter(lacking.items()))
-    fault = NoUsableRunError(name if len(lacking) == 1 else f"any of {', '.join(lacking)}", reason)
-    others = f"remove {', '.join(lacking)} from `detectors`, or map the channels they need"
+def _none_usable(unusable: Mapping[str, str], known: bool) -> SignatureError:
+    name, reason = next(iter(unusable.items()))
+    fault = NoUsableRunError(name if len(unusable) == 1 else f"any of {', '.join(unusable)}", reason)
+    others = f"remove {', '.join(unusable)} from `detectors`, or map the channels they need"
     return SignatureError(fault.message, others if known else fault.hint)
 
 

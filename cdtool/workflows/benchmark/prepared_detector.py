@@ -106,7 +106,7 @@ def prepare_benchmark(
     many += f" of {classes} classes of motion" if classes > 1 else ""
     described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {many}"
     hashes = {operation.recording.digest: operation.recording.name for operation in used}
-    run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
+    run = detect_with(setup, [instance], fitted.thresholds, fitted.unusable)
     normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
     left_out = (*runs.skipped, *fitted.skipped)
     return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)

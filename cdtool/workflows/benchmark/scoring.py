@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.curve import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
@@ -61,11 +61,11 @@ def detect_with(
     setup: BenchmarkFile,
     detectors: Sequence[Any],
     thresholds: Mapping[str, tuple[FittedThreshold, ...]],
-    lacking: Mapping[str, str],
+    unusable: Mapping[str, str],
 ) -> Detect:
     """Return the detectors with their thresholds as one function; a detector that fails on a log is left out there.
 
-    Detectors in `lacking` miss what they need, for the given reason; no sample of theirs is assessable. A class of
+    Detectors in `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of
     motion is monitored for the longest matching window.
     """
     hold = max(HOLD, *(group.window for group in setup.impacts.values()))
@@ -76,8 +76,8 @@ def detect_with(
         left_out = LeftOut()
         for detector in detectors:
             failed: list[Skipped] = []
-            if detector.name in lacking:
-                unit, why = detector.unit(machine), lacking[detector.name]
+            if detector.name in unusable:
+                unit, why = detector.unit(machine), unusable[detector.name]
                 made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
             else:
                 known = thresholds[detector.name]
@@ -140,14 +140,14 @@ def score_log(
     matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
     scored.findings += matched.warnings
-    scored.matched, courses = matched, matched.courses
+    scored.matched, curves = matched, matched.curves
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
-        scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
-        scored.forces = force_rows(scored.recording, scored.verdicts, courses)
-        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, courses)
+        scored.verdicts = {number: judge(curve, profile) for number, curve in curves.items()}
+        scored.forces = force_rows(scored.recording, scored.verdicts, curves)
+        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, curves)
         numbered = enumerate(contacts, 1)
-        unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
+        unseen = [f"contact {number}" for number, item in numbered if number not in curves and not item.in_progress]
         if unseen:
             text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
@@ -159,13 +159,13 @@ def score_log(
 
 
 def _force_not_seen(
-    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], curves: Mapping[int, ForceTimeCurve]
 ) -> list[Skipped]:
     """Return the contacts not assessable by a force profile because load-cell samples are missing: a data loss."""
     lost = [
         f"contact {number} is not assessable by {profile}: {verdict.reason}"
         for number, verdict in verdicts.items()
-        if verdict.outcome == "not_assessable" and courses[number].lacks_samples
+        if verdict.outcome == "not_assessable" and curves[number].has_missing_samples
     ]
     return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.detection import Alarm, Band, Signal, Status, Verdict
-from cdtool.evaluation.force.curve import ForceCourse, force_at
+from cdtool.evaluation.force.curve import ForceTimeCurve, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
 from cdtool.evaluation.truth.matching import Match, Matching
@@ -46,7 +46,7 @@ def contact_rows(
     judged: Judged,
     recording: Recording,
     contacts: Sequence[Contact],
-    courses: Mapping[int, ForceCourse],
+    curves: Mapping[int, ForceTimeCurve],
     synchronisation: float,
 ) -> list[ContactResult]:
     """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock."""
@@ -57,7 +57,7 @@ def contact_rows(
         for found in matching.matches:
             number = numbers[found.contact]
             resolution = own + _resolution_of_onset(recording, found.contact)
-            rows.append(_contact_row(judged, recording, detection, found, number, courses.get(number), resolution))
+            rows.append(_contact_row(judged, recording, detection, found, number, curves.get(number), resolution))
     return rows
 
 
@@ -75,14 +75,14 @@ def _contact_row(
     detection: Detection,
     found: Match,
     number: int,
-    course: ForceCourse | None,
+    curve: ForceTimeCurve | None,
     resolution: float,
 ) -> ContactResult:
     contact, alarm = found.contact, found.alarm
-    peak = course.peak if course else contact.peak_force
+    peak = curve.peak if curve else contact.peak_force
     # If samples are missing where a contact began, its force before its first sample was not measured.
-    seen = course is not None and alarm is not None and not (contact.hole and found.clipped)
-    hole = course.longest_hole(contact.end - contact.start) if course else contact.hole
+    seen = curve is not None and alarm is not None and not (contact.hole and found.clipped)
+    hole = curve.longest_hole(contact.end - contact.start) if curve else contact.hole
     return ContactResult(
         recording=recording.name,
         group=judged.group,
@@ -93,7 +93,7 @@ def _contact_row(
         alarm_s=alarm.time if alarm else None,
         latency_ms=1e3 * found.latency if alarm else None,
         outcome=found.outcome,
-        force_at_alarm_n=finite(abs(force_at(course, found.latency))) if course and seen else None,
+        force_at_alarm_n=finite(abs(force_at(curve, found.latency))) if curve and seen else None,
         peak_force_n=finite(peak),
         clipped=found.clipped,
         reason=found.reason or None,

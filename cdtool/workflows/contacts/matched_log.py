@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.curve import ForceCourse, force_course
+from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.operations import Operation, operations_of
@@ -29,7 +29,7 @@ _JUDGED = 0.5
 class MatchedLog:
     """The outcome of a log's contacts and alarms.
 
-    `judged` has one entry and `contacts` a list of rows per operation. `courses` is the force by the contact's number.
+    `judged` has one entry and `contacts` a list of rows per operation. `curves` is the force by the contact's number.
     `not_scored` lists contacts that have no onset, are outside all operations or began where load-cell samples are
     missing; `warnings` concern the log itself.
     """
@@ -37,7 +37,7 @@ class MatchedLog:
     judged: tuple[Judged, ...]
     contacts: tuple[tuple[ContactResult, ...], ...]
     false_alarms: tuple[FalseAlarmResult, ...]
-    courses: dict[int, ForceCourse]
+    curves: dict[int, ForceTimeCurve]
     not_scored: tuple[Skipped, ...]
     warnings: tuple[Skipped, ...]
 
@@ -57,7 +57,7 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     """Match the detections of each operation with the log's contacts; `rearm` [s] is a setting of the activation."""
     recording, contacts, found = log.recording, log.contacts, log.detections
     inside = _by_operation(log.operations, contacts)
-    courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
+    curves, doubts = _curves(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
     crossings = _pooled(found)
     judged = []
@@ -77,11 +77,11 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         judged.append(Judged(group, operation, own, tuple(detections), matchings))
     return MatchedLog(
         tuple(judged),
-        tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
+        tuple(tuple(contact_rows(item, recording, contacts, curves, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
-        courses,
+        curves,
         (*_not_scored(recording, contacts, inside, log.cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, curves), *doubts),
     )
 
 
@@ -136,13 +136,13 @@ def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: fl
 
 
 def _unseen_forces(
-    recording: Recording, contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]
+    recording: Recording, contacts: Sequence[Contact], curves: Mapping[int, ForceTimeCurve]
 ) -> list[Skipped]:
     """Return a warning for each contact with a known onset whose force is partly missing."""
     found = []
-    for number, course in courses.items():
+    for number, curve in curves.items():
         contact = contacts[number - 1]
-        hole = course.longest_hole(contact.end - contact.start)
+        hole = curve.longest_hole(contact.end - contact.start)
         if hole and not contact.hole:
             text = f"load-cell samples are missing for {1e3 * hole:.0f} ms during contact {number}"
             found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
@@ -158,11 +158,11 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
     return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
 
 
-def _courses(
+def _curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
-) -> tuple[dict[int, ForceCourse], list[Skipped]]:
+) -> tuple[dict[int, ForceTimeCurve], list[Skipped]]:
     """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""
-    found: dict[int, ForceCourse] = {}
+    found: dict[int, ForceTimeCurve] = {}
     missing: list[Skipped] = []
     if "force" not in recording:
         return found, missing
@@ -171,7 +171,7 @@ def _courses(
         if contact.in_progress:
             continue
         try:
-            found[number] = force_course(recording, contact, mass_before_cell, until)
+            found[number] = force_time_curve(recording, contact, mass_before_cell, until)
         except CdtoolError as fault:
             missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
     return found, missing

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.force.curve import force_at, force_course
+from cdtool.evaluation.force.curve import force_at, force_time_curve
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
@@ -40,46 +40,46 @@ def moving(direction: float = 1.0, clock: FloatArray = TIME) -> dict[str, Series
     }
 
 
-def missing_share(course):
+def missing_share(curve):
     """Share of the time from the onset to the record's end in which samples are missing."""
-    begins, ends = course.holes()
-    return float(np.sum(ends - begins)) / course.end
+    begins, ends = curve.holes()
+    return float(np.sum(ends - begins)) / curve.end
 
 
 def test_the_course_of_a_rigid_leaf_is_a_half_sine_of_known_peak():
-    course = force_course(recording(half_sine(TIME)), CONTACT)
-    assert course.peak == pytest.approx(3521.0, abs=1.0)
-    assert course.time[0] == 0.0
-    assert course.end == pytest.approx(TIME[-1] - ONSET)
-    np.testing.assert_allclose(course.force, half_sine(course.time + ONSET), atol=1e-9)
-    assert not course.saturated
-    assert missing_share(course) == 0.0
+    curve = force_time_curve(recording(half_sine(TIME)), CONTACT)
+    assert curve.peak == pytest.approx(3521.0, abs=1.0)
+    assert curve.time[0] == 0.0
+    assert curve.end == pytest.approx(TIME[-1] - ONSET)
+    np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1e-9)
+    assert not curve.saturated
+    assert missing_share(curve) == 0.0
 
 
 @given(st.floats(-500.0, 500.0), st.sampled_from([-1.0, 1.0]))
 @settings(deadline=None, max_examples=20)
 def test_neither_the_cells_offset_nor_its_sign_changes_the_course(offset, sign):
-    course = force_course(recording(offset + sign * half_sine(TIME)), CONTACT)
-    np.testing.assert_allclose(course.force, half_sine(course.time + ONSET), atol=1e-6)
+    curve = force_time_curve(recording(offset + sign * half_sine(TIME)), CONTACT)
+    np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1e-6)
 
 
 def test_the_reading_at_rest_is_the_one_of_the_onset_rule():
     noisy = 30.0 + half_sine(TIME) + np.random.default_rng(2).normal(0.0, 2.0, len(TIME))
     (contact,) = find_contacts(recording(noisy), OnsetRule(20.0, 8.0))
     assert contact.rest == pytest.approx(30.0, abs=0.5)
-    course = force_course(recording(noisy), contact)
-    assert course.peak == pytest.approx(contact.peak_force, abs=1e-9)
-    assert course.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - contact.rest)
+    curve = force_time_curve(recording(noisy), contact)
+    assert curve.peak == pytest.approx(contact.peak_force, abs=1e-9)
+    assert curve.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - contact.rest)
 
 
 def test_a_pull_after_the_push_stays_negative():
     pulled = half_sine(TIME) - 300.0 * ((TIME > 3.0) & (TIME < 3.2))
-    assert force_course(recording(pulled), CONTACT).force.min() == pytest.approx(-300.0)
+    assert force_time_curve(recording(pulled), CONTACT).force.min() == pytest.approx(-300.0)
 
 
 def test_a_stronger_pull_long_after_the_contact_does_not_turn_its_sign():
     pulled = half_sine(TIME) - 9000.0 * ((TIME > 6.0) & (TIME < 6.2))
-    assert force_course(recording(pulled), CONTACT).peak == pytest.approx(PEAK, rel=1e-3)
+    assert force_time_curve(recording(pulled), CONTACT).peak == pytest.approx(PEAK, rel=1e-3)
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
@@ -89,30 +89,30 @@ def test_the_inertia_before_the_cell_is_given_back(direction, sign):
     clock = np.arange(0.0, 8.0, 0.7e-3) + 0.21e-3  # the accelerometer has a clock of its own
     cell = half_sine(TIME) * (1.0 - mass / MASS)  # the contact force less M times the deceleration
     part = recording(sign * cell, **moving(direction, clock))
-    assert force_course(part, CONTACT).peak == pytest.approx(PEAK * (1.0 - mass / MASS), rel=1e-3)
-    course = force_course(part, CONTACT, mass)
-    np.testing.assert_allclose(course.force, half_sine(course.time + ONSET), atol=1.5)
+    assert force_time_curve(part, CONTACT).peak == pytest.approx(PEAK * (1.0 - mass / MASS), rel=1e-3)
+    curve = force_time_curve(part, CONTACT, mass)
+    np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1.5)
 
 
 def test_a_mass_without_what_it_takes_is_an_error_that_names_it():
     force = half_sine(TIME)
     with pytest.raises(RecordingError, match="'acceleration'"):
-        force_course(recording(force), CONTACT, 5.0)
+        force_time_curve(recording(force), CONTACT, 5.0)
     only = {"acceleration": moving()["acceleration"]}
     with pytest.raises(RecordingError, match="'speed'"):
-        force_course(recording(force, **only), CONTACT, 5.0)
+        force_time_curve(recording(force, **only), CONTACT, 5.0)
     turning = moving() | {"acceleration": Series(TIME, TIME, "rad/s2")}
     with pytest.raises(RecordingError, match="not in rad/s2"):
-        force_course(recording(force, **turning), CONTACT, 5.0)
+        force_time_curve(recording(force, **turning), CONTACT, 5.0)
     resting = moving() | {"speed": Series(TIME, np.where(TIME > 4.0, SPEED, 0.0), "m/s")}
     with pytest.raises(RecordingError, match="stands still"):
-        force_course(recording(force, **resting), CONTACT, 5.0)
+        force_time_curve(recording(force, **resting), CONTACT, 5.0)
     silent = moving() | {"acceleration": Series(TIME, np.full(len(TIME), np.nan), "m/s2")}
     with pytest.raises(RecordingError, match="no acceleration"):
-        force_course(recording(force, **silent), CONTACT, 5.0)
+        force_time_curve(recording(force, **silent), CONTACT, 5.0)
     for wrong in (-1.0, float("nan")):
         with pytest.raises(UsageError, match="mass_before_cell"):
-            force_course(recording(force), CONTACT, wrong)
+            force_time_curve(recording(force), CONTACT, wrong)
 
 
 def test_without_acceleration_for_a_while_the_corrected_force_is_missing_there():
@@ -120,80 +120,80 @@ def test_without_acceleration_for_a_while_the_corrected_force_is_missing_there()
     values = gone["acceleration"].values[:, 0].copy()
     values[(TIME >= 2.03) & (TIME < 2.08)] = np.nan
     gone["acceleration"] = Series(TIME, values, "m/s2")
-    course = force_course(recording(half_sine(TIME), **gone), CONTACT, 5.0)
-    (begins,), (ends,) = course.holes()
+    curve = force_time_curve(recording(half_sine(TIME), **gone), CONTACT, 5.0)
+    (begins,), (ends,) = curve.holes()
     assert (begins, ends) == (pytest.approx(0.029), pytest.approx(0.080))
 
 
 def test_missing_samples_are_left_out_and_counted():
     force = half_sine(TIME)
     force[3000:3600] = np.nan
-    course = force_course(recording(force), CONTACT)
-    assert np.isfinite(course.force).all()
-    (begins,), (ends,) = course.holes()
+    curve = force_time_curve(recording(force), CONTACT)
+    assert np.isfinite(curve.force).all()
+    (begins,), (ends,) = curve.holes()
     assert (begins, ends) == (pytest.approx(0.999), pytest.approx(1.6))
-    assert missing_share(course) == pytest.approx(0.601 / course.end)
+    assert missing_share(curve) == pytest.approx(0.601 / curve.end)
 
 
 def test_a_few_lost_samples_of_a_fast_cell_and_the_rhythm_of_a_slow_one_are_no_hole():
     force = half_sine(TIME)
     force[3000:3004] = np.nan
-    assert missing_share(force_course(recording(force), CONTACT)) == 0.0
+    assert missing_share(force_time_curve(recording(force), CONTACT)) == 0.0
     slow = np.full(len(TIME), np.nan)
     slow[::10] = half_sine(TIME)[::10]
-    course = force_course(recording(slow), CONTACT)
-    assert missing_share(course) == pytest.approx(0.0, abs=2e-3)
-    assert len(course.time) == 600
+    curve = force_time_curve(recording(slow), CONTACT)
+    assert missing_share(curve) == pytest.approx(0.0, abs=2e-3)
+    assert len(curve.time) == 600
 
 
 def test_a_cell_that_dies_is_missing_to_the_end_of_the_record():
     force = half_sine(TIME)
     force[3000:] = np.nan
-    course = force_course(recording(force), CONTACT)
-    assert course.end == pytest.approx(5.999)
-    assert missing_share(course) == pytest.approx(5.0 / 5.999, abs=1e-3)
+    curve = force_time_curve(recording(force), CONTACT)
+    assert curve.end == pytest.approx(5.999)
+    assert missing_share(curve) == pytest.approx(5.0 / 5.999, abs=1e-3)
 
 
 def test_a_cell_at_its_stop_is_marked_there_and_nowhere_else():
-    course = force_course(recording(np.minimum(half_sine(TIME), 2000.0)), CONTACT)
-    assert course.saturated
-    np.testing.assert_array_equal(course.clipped, half_sine(course.time + ONSET) >= 2000.0)
-    negative = force_course(recording(7.0 - np.minimum(half_sine(TIME), 2000.0)), CONTACT)
-    np.testing.assert_array_equal(negative.clipped, course.clipped)
+    curve = force_time_curve(recording(np.minimum(half_sine(TIME), 2000.0)), CONTACT)
+    assert curve.saturated
+    np.testing.assert_array_equal(curve.clipped, half_sine(curve.time + ONSET) >= 2000.0)
+    negative = force_time_curve(recording(7.0 - np.minimum(half_sine(TIME), 2000.0)), CONTACT)
+    np.testing.assert_array_equal(negative.clipped, curve.clipped)
 
 
 def test_four_equal_readings_or_readings_that_are_held_for_many_rows_are_no_stop():
     few = half_sine(TIME)
     top = int(np.argmax(few))
     few[top - 1 : top + 3] = few[top]
-    assert not force_course(recording(few), CONTACT).saturated
+    assert not force_time_curve(recording(few), CONTACT).saturated
     few[top + 3] = few[top]
-    assert force_course(recording(few), CONTACT).saturated
+    assert force_time_curve(recording(few), CONTACT).saturated
     held = np.repeat(half_sine(TIME)[::10], 10)
-    assert not force_course(recording(held), CONTACT).saturated
+    assert not force_time_curve(recording(held), CONTACT).saturated
 
 
 def test_the_course_ends_where_the_next_contact_begins():
     twice = half_sine(TIME) + half_sine(TIME - 3.0) * 2.0
-    course = force_course(recording(twice), CONTACT, until=5.0)
-    assert course.peak == pytest.approx(PEAK, rel=1e-3)
-    assert course.end == pytest.approx(3.0)
-    assert course.time[-1] < 3.0
+    curve = force_time_curve(recording(twice), CONTACT, until=5.0)
+    assert curve.peak == pytest.approx(PEAK, rel=1e-3)
+    assert curve.end == pytest.approx(3.0)
+    assert curve.time[-1] < 3.0
 
 
 def test_a_contact_that_the_cell_did_not_see_has_no_course():
     with pytest.raises(RecordingError, match="no load-cell sample after the onset"):
-        force_course(recording(half_sine(TIME)), Contact(9.0, 9.5, 0.0))
+        force_time_curve(recording(half_sine(TIME)), Contact(9.0, 9.5, 0.0))
     with pytest.raises(RecordingError, match="force"):
-        force_course(Recording("run", "run.csv", ("gate",), moving()), CONTACT)
+        force_time_curve(Recording("run", "run.csv", ("gate",), moving()), CONTACT)
 
 
 def test_the_force_at_an_alarm_is_that_of_the_last_sample_before_it():
     force = half_sine(TIME)
     force[3000:3600] = np.nan
-    course = force_course(recording(force), CONTACT)
-    assert force_at(course, 0.0149) == course.force[14]
-    assert force_at(course, 0.0) == course.force[0]
-    assert np.isnan(force_at(course, -0.001))
-    assert np.isnan(force_at(course, 1.3))
-    assert np.isnan(force_at(course, 99.0))
+    curve = force_time_curve(recording(force), CONTACT)
+    assert force_at(curve, 0.0149) == curve.force[14]
+    assert force_at(curve, 0.0) == curve.force[0]
+    assert np.isnan(force_at(curve, -0.001))
+    assert np.isnan(force_at(curve, 1.3))
+    assert np.isnan(force_at(curve, 99.0))

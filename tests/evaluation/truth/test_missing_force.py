@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.detection import Alarm, Signal, Status, Verdict
-from cdtool.evaluation.force.curve import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.doubts import truth_findings
@@ -71,7 +71,7 @@ def test_without_a_hole_and_with_single_samples_lost_nothing_is_marked():
         one = Recording("a", "a.csv", ("x",), {"force": Series(TIME, force, "N")})
         (contact,) = find_contacts(one, RULE)
         assert contact.hole == 0.0 and contact.uncertainty < 5e-3
-        assert judge(force_course(one, contact), LENIENT).outcome == "pass"
+        assert judge(force_time_curve(one, contact), LENIENT).outcome == "pass"
 
 
 def test_a_slow_cell_with_jitter_and_one_sample_lost_is_judged_unless_the_limit_is_near():
@@ -83,11 +83,11 @@ def test_a_slow_cell_with_jitter_and_one_sample_lost_is_judged_unless_the_limit_
     keep[np.searchsorted(time, ONSET + 0.095)] = False
     one = Recording("a", "a.csv", ("x",), {"force": Series(time[keep], force[keep], "N")})
     (contact,) = find_contacts(one, RULE)
-    course = force_course(one, contact)
+    curve = force_time_curve(one, contact)
     assert contact.hole == 0.0
-    assert judge(course, LENIENT).outcome == "pass"
-    near = ForceProfile("n", "n", "own", True, (ForceStep(0.0, course.peak + 10.0, "dynamic"),))
-    verdict = judge(course, near)
+    assert judge(curve, LENIENT).outcome == "pass"
+    near = ForceProfile("n", "n", "own", True, (ForceStep(0.0, curve.peak + 10.0, "dynamic"),))
+    verdict = judge(curve, near)
     assert verdict.outcome == "not_assessable" and "may have reached" in verdict.reason
 
 
@@ -106,17 +106,17 @@ def test_a_hole_as_long_as_the_window_makes_the_contact_not_assessable():
 def test_a_force_that_nobody_saw_never_passes(begin, end, own_clock):
     one = recording(bump(TIME), ONSET + begin, ONSET + end, own_clock)
     (contact,) = find_contacts(one, RULE)
-    course = force_course(one, contact)
-    verdict = judge(course, LENIENT)
+    curve = force_time_curve(one, contact)
+    verdict = judge(curve, LENIENT)
     assert verdict.outcome == "not_assessable"
     assert f"missing for {1e3 * (end - begin) + 1:.0f} ms" in verdict.reason
-    assert course.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
+    assert curve.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
 
 
 def test_a_violation_that_was_seen_stands():
     one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
     (contact,) = find_contacts(one, RULE)
-    verdict = judge(force_course(one, contact), PROFILE)
+    verdict = judge(force_time_curve(one, contact), PROFILE)
     assert verdict.outcome == "fail"
     (failed,) = [item for item in verdict.steps if item.outcome == "fail"]
     assert "ms after it was first seen" in failed.reason and "after the onset" not in failed.reason
@@ -128,7 +128,7 @@ def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
     one = recording(force, ONSET - 0.01, ONSET + 0.09, True)
     (contact,) = find_contacts(one, RULE)
     assert contact.start == pytest.approx(ONSET + 0.09, abs=2e-3)
-    verdict = judge(force_course(one, contact), LENIENT)
+    verdict = judge(force_time_curve(one, contact), LENIENT)
     assert [item.outcome for item in verdict.steps] == ["not_assessable", "not_assessable"]
     assert "onset" in verdict.steps[1].reason
 
@@ -163,4 +163,4 @@ def test_a_cell_that_ends_in_the_contact_while_the_log_goes_on_gives_no_pass():
         one = Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
         (contact,) = find_contacts(one, RULE)
         single = ForceProfile("s", "s", "own", True, (ForceStep(0.0, 9000.0, "all"),))
-        assert judge(force_course(one, contact), single).outcome == outcome
+        assert judge(force_time_curve(one, contact), single).outcome == outcome
