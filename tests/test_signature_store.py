@@ -80,7 +80,7 @@ def test_a_file_of_version_3_is_still_read_and_has_no_normal_motions(tmp_path, l
     assert json.loads(path.read_text())["schema_version"] == 4 and read_signature(path).normal is None
 
 
-def test_normal_motions_that_are_none_are_a_damaged_file(tmp_path, learned):
+def test_invalid_normal_motions_are_a_damaged_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     values = json.loads(path.read_text())
@@ -113,7 +113,7 @@ def test_another_machine_detector_or_gain_is_refused(learned, gate):
         ("\x00\x01", "not a signature file"),
     ],
 )
-def test_a_file_that_is_no_signature_is_one_clear_error(tmp_path, content, message):
+def test_a_file_that_is_not_a_signature_is_one_clear_error(tmp_path, content, message):
     path = tmp_path / "s.json"
     path.write_text(content)
     with pytest.raises(SignatureError, match=message):
@@ -127,7 +127,7 @@ def test_a_missing_file_and_a_missing_folder_are_named(tmp_path, learned):
         write_signature(tmp_path / "no" / "s.json", learned)
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, learned, monkeypatch):
+def test_a_failed_write_leaves_only_the_old_file(tmp_path, learned, monkeypatch):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     old = path.read_bytes()
@@ -237,13 +237,13 @@ def test_a_wrong_value_in_the_file_is_one_clear_error(tmp_path, learned, path, v
         read_signature(file)
 
 
-def test_deeply_nested_rubbish_is_one_clear_error(tmp_path):
+def test_deeply_nested_content_is_one_clear_error(tmp_path):
     (tmp_path / "s.json").write_text("[" * 100_000)
     with pytest.raises(SignatureError, match="not a signature file"):
         read_signature(tmp_path / "s.json")
 
 
-def test_an_update_without_a_change_leaves_the_file_alone(tmp_path, learned):
+def test_an_update_without_a_change_does_not_write_the_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     before = path.stat()

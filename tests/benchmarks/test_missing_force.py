@@ -35,7 +35,7 @@ def test_no_hole_gives_a_wrong_onset_without_a_mark_or_a_pass_that_nobody_saw(sc
     assert counts["single samples"].passes > 5 and counts["single samples"].marked == 0
 
 
-def test_what_is_wrong_is_found(script, monkeypatch, capsys):
+def test_wrong_answers_are_reported(script, monkeypatch, capsys):
     monkeypatch.setattr(script, "is_wrong", lambda found, _: found.hole > 0.0)
     monkeypatch.setattr(sys, "argv", ["missing_force.py", "--seeds", "31", "--contacts", "3", "--faults", "6"])
     assert script.main() == 1

@@ -58,7 +58,7 @@ def imported(script: ModuleType, root: Path) -> set[tuple[str, str, str]]:
     return {(item.importer, item.imported, item.kind) for item in script.imports_of(script.modules_of(root))}
 
 
-def test_an_import_is_found_wherever_it_stands_and_however_it_is_written(script, package):
+def test_an_import_is_found_at_any_position_in_any_form(script, package):
     root = package(
         {
             "a.py": "from typing import TYPE_CHECKING\nfrom pkg import b\nif TYPE_CHECKING:\n    from pkg.c import C\n",
@@ -96,7 +96,7 @@ def test_cycles_are_groups_of_modules_that_reach_one_another(script, package):
     assert script.cycles(imports, every) == [["pkg.a", "pkg.b", "pkg.c"], ["pkg.x", "pkg.y"]]
 
 
-def test_a_single_caller_is_the_only_one_and_stands_in_the_same_folder(script, package):
+def test_a_single_caller_is_the_only_one_and_in_the_same_folder(script, package):
     root = package(
         {
             "sub/__init__.py": "from pkg.sub import of_the_package\nTABLE = {'one': 'pkg.sub.registered:One'}\n",

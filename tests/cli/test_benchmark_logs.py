@@ -53,7 +53,7 @@ def test_a_label_outside_the_recording_is_left_out_with_its_line(read):
     assert "onset:" in done.out and "label file labels.csv" in done.out
 
 
-def test_a_recording_labelled_without_a_contact_is_told_where_to_write_one(read):
+def test_a_recording_labelled_without_a_contact_gets_a_hint_where_to_add_one(read):
     read(LEARN, STIFF, ONSET, labels="stiff/01.csv,,\nstiff/02.csv,5.0,5.2\n")
     (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
     done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
@@ -62,7 +62,7 @@ def test_a_recording_labelled_without_a_contact_is_told_where_to_write_one(read)
 
 
 @pytest.mark.parametrize("table", ["points", "campaigns"])
-def test_another_spelling_of_a_path_is_the_same_log(read, table):
+def test_different_spellings_of_a_path_are_the_same_log(read, table):
     folder = read.folder.name
     setup = read(PROFILE, LEARN, STIFF, f'[{table}.a]\nlogs = ["../{folder}/stiff/*.csv"]\n')
     assert set(getattr(setup, table)) == set(setup.impacts["stiff"].logs)
@@ -89,7 +89,7 @@ def test_another_spelling_of_a_path_is_the_same_log(read, table):
         ('[holdout]\nlogs = ["stiff/*.csv"]\n', r"stiff/01\.csv is scored in stiff and in holdout"),
     ],
 )
-def test_a_log_or_name_that_would_do_nothing_or_count_twice_is_refused(read, text, said):
+def test_an_unscored_log_an_empty_name_and_a_repeated_log_are_refused(read, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read(PROFILE, LEARN, STIFF, text)
 

@@ -23,7 +23,7 @@ def results(gate_folder, tmp_path_factory):
     return path, new, done.out
 
 
-def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(results, tmp_path):
+def test_fewer_than_ten_contacts_show_a_median_with_its_range(results, tmp_path):
     old, new, shown = results
     target = tmp_path / "compare.md"
     done = cdtool("compare", old, new, "-o", target, "--json")
@@ -43,7 +43,7 @@ def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(r
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_a_file_compared_with_itself_or_a_copy_is_called_so(results, tmp_path, copied):
+def test_a_file_compared_with_itself_or_a_copy_is_reported_as_identical(results, tmp_path, copied):
     old = results[0]
     other = old
     if copied:

@@ -24,21 +24,21 @@ def cut(gate_folder: Path, tmp_path: Path):
     return make
 
 
-def test_detect_says_that_a_cut_log_is_damaged_and_used(cut, gate_folder):
+def test_detect_reports_a_truncated_log_as_damaged_and_used(cut, gate_folder):
     done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert done.status == 3 and " alarm " in done.out
     assert "loss: " in done.err and "cut.csv: the last line" in done.err
     assert "left out" not in done.err and done.err.endswith("done, but 1 log is damaged\n")
 
 
-def test_what_was_left_out_and_what_is_damaged_are_counted_apart(cut, gate_folder, tmp_path):
+def test_left_out_and_damaged_logs_are_counted_separately(cut, gate_folder, tmp_path):
     (tmp_path / "empty.csv").touch()
     machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     done = cdtool("detect", tmp_path / "empty.csv", cut(1e9), cut(1e9, "too.csv"), *machine)
     assert done.status == 3 and done.err.endswith("done, but 1 item was left out and 2 logs are damaged\n")
 
 
-def test_an_alarm_after_the_load_cell_s_last_sample_is_told_why_it_has_no_latency(gate_folder, tmp_path):
+def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(gate_folder, tmp_path):
     machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     whole = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine)
     (row,) = [line for line in whole.out.splitlines() if " alarm " in line]
@@ -58,7 +58,7 @@ def test_an_alarm_after_the_load_cell_s_last_sample_is_told_why_it_has_no_latenc
     assert f"the load cell ends at {last:.3f} s, the log at " in line and "holdout" not in line
 
 
-def test_a_false_alarm_is_told_to_belong_to_no_contact(gate_folder):
+def test_a_false_alarm_is_shown_with_no_contact(gate_folder):
     done = cdtool(
         "detect", gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 20
     )

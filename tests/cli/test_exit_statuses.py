@@ -208,20 +208,20 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
 }
 
 
-def test_every_status_of_every_command_is_driven_and_no_other():
+def test_every_status_of_every_command_is_tested_and_no_other():
     driven = {name: {status for command, status in DRIVEN if command == name} for name, _ in DRIVEN}
     assert driven == {name: set(map(int, of)) for name, of in STATUSES_OF.items()}
 
 
 @pytest.mark.parametrize(("command", "status"), DRIVEN, ids=[f"{name}-{status}" for name, status in DRIVEN])
-def test_a_command_ends_with_the_status_it_is_driven_into(command, status, files):
+def test_a_command_exits_with_the_expected_status(command, status, files):
     done = DRIVEN[command, status](files)
     assert done.status == status, done.err
     assert "Traceback" not in done.err
     assert bool(done.err) or status in (0, 1, 4) or command == "recover"
 
 
-def test_where_several_apply_a_wrong_limit_comes_before_a_violation_and_that_before_a_loss(files):
+def test_a_wrong_limit_takes_priority_over_a_violation_and_that_over_a_loss(files):
     holdout = '[holdout]\nlogs = ["holdout/01.csv", "empty.csv"]\n'
     assert _score(files, holdout).status == 3
     assert _score(files, holdout + VIOLATED).status == 1
@@ -233,7 +233,7 @@ def test_where_several_apply_a_wrong_limit_comes_before_a_violation_and_that_bef
     assert done.status == 3 and "force profile not assessable for 1 of 2 contacts" in done.out
 
 
-def test_a_log_that_could_not_be_assessed_at_all_ends_with_3_and_the_reason(files):
+def test_a_log_that_is_not_assessable_exits_with_3_and_the_reason(files):
     lines = files.log.read_text(encoding="utf-8").splitlines()
     place = lines[0].split(",").index("motor_torque") if "motor_torque" in lines[0] else 1
     rows = [line.split(",") for line in lines[1:]]

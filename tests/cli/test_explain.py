@@ -39,12 +39,12 @@ def is_number(text: str) -> bool:
         return False
 
 
-def test_the_help_holds_an_example():
+def test_the_help_contains_an_example():
     done = cdtool("explain", "--help")
     assert done.status == 0 and "Example: cdtool explain" in one_line(done.out)
 
 
-def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_first(explain, feekf_signature, tmp_path):
+def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_mover(explain, feekf_signature, tmp_path):
     plot = tmp_path / "why.svg"
     done = explain("stiff/01.csv", "-s", feekf_signature, "--plot", plot)
     assert done.status == 0 and done.err == ""
@@ -65,7 +65,7 @@ def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_firs
     assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
 
 
-def test_a_missed_contact_is_told_with_how_near_it_came(explain):
+def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
     done = explain("soft/02.csv", "-d", "pi", "--limit", "30")
     told = " ".join(done.out.split())
     assert done.status == 0
@@ -84,13 +84,13 @@ def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
     assert "from onset" not in told and "to alarm" in told
 
 
-def test_a_quiet_log_says_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
+def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
     done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
     assert done.status == 0 and "no alarm and no missed contact" in " ".join(done.out.split())
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
+def test_the_json_is_strict_and_contains_every_number(explain):
     done = explain("soft/01.csv", "-d", "pi", "--limit", "30", "--json")
     values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
     (missed,) = values["missed"]
@@ -105,7 +105,7 @@ def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
     assert missed["not_compared_because"] == "limits set by hand" and missed["compared_with_runs"] == 0
 
 
-def test_the_json_has_the_cause_and_what_every_channel_was_compared_with(explain, feekf_signature):
+def test_the_json_has_the_cause_and_the_comparison_of_every_channel(explain, feekf_signature):
     (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
     cause = alarm["likely_cause"]
     assert cause["kind"] == "contact" and cause["transient"] is None and cause["lost"] is None
@@ -117,7 +117,7 @@ def test_the_json_has_the_cause_and_what_every_channel_was_compared_with(explain
             assert abs(item["value"] - item["normal_mean"]) > 3.0 * item["normal_spread"]
 
 
-def test_a_signature_file_of_before_says_how_to_learn_what_is_normal(explain, feekf_signature, tmp_path):
+def test_an_older_signature_file_gets_a_hint_to_relearn_it(explain, feekf_signature, tmp_path):
     values = json.loads(feekf_signature.read_text())
     del values["normal_motion"]
     old = tmp_path / "old.json"
@@ -138,7 +138,7 @@ def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_
     assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(0.008)
 
 
-def test_the_debounce_that_is_given_is_the_one_that_is_told(explain):
+def test_the_given_debounce_is_the_one_shown(explain):
     for debounce in (1, 4):
         done = explain("stiff/01.csv", "-d", "gm", "--limit", "250", "--debounce", debounce, "--json")
         (alarm,) = json.loads(done.out)["alarms"]
@@ -187,14 +187,14 @@ def test_bad_input_is_one_line_and_status_2(explain, log, arguments, words):
     assert all(word in done.err for word in words), done.err
 
 
-def test_a_log_of_which_a_part_is_lost_is_explained_and_ends_with_3(gate_folder, feekf_signature, tmp_path):
+def test_a_partly_lost_log_is_explained_with_status_3(gate_folder, feekf_signature, tmp_path):
     half = tmp_path / "half.csv"
     half.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes()[:-20])
     done = cdtool("explain", half, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
     assert done.status == 3 and "alarm at" in done.out and "last line" in done.err
 
 
-def test_names_from_files_cannot_command_the_terminal(explain, gate_folder, tmp_path):
+def test_names_from_files_cannot_control_the_terminal(explain, gate_folder, tmp_path):
     evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
     evil.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes())
     done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", "250")
@@ -235,7 +235,7 @@ def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatc
     assert module.columns_to_fill() == width
 
 
-def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
+def test_a_pipe_gets_100_columns_for_any_terminal(monkeypatch):
     from cdtool.cli import console as module
 
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
@@ -255,7 +255,7 @@ def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feek
     assert one != other and other == pytest.approx(one, rel=0.05)
 
 
-def test_a_benchmark_explains_its_events_against_the_runs_it_learned_from(gate_folder):
+def test_a_benchmark_compares_its_events_with_the_runs_learned_from(gate_folder):
     done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
     told = [line for trace in done.traces for panel in trace.panels for line in panel.why]
     assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]

@@ -143,7 +143,7 @@ def test_every_toml_file_is_loaded_within_the_same_bounds(tmp_path, arguments):
 
 
 @pytest.mark.parametrize("scale", ["7" * 400, "1e400", "nan", "-inf"], ids=["400 digits", "1e400", "nan", "-inf"])
-def test_a_scale_that_no_number_holds_names_its_key(tmp_path, scale):
+def test_a_scale_out_of_range_is_reported_with_its_key(tmp_path, scale):
     machine = machine_of(tmp_path, **{'"g", scale = -1': f'"g", scale = {scale}'})
     refused("info", LOG, "-m", machine, words=("channels.acceleration.scale",))
 
@@ -304,7 +304,7 @@ def test_a_hostile_urdf_is_refused_in_one_line(tmp_path, name):
     ],
     ids=["log", "machine", "benchmark", "signature", "results", "builds", "triggers", "show", "study"],
 )
-def test_what_is_no_file_is_refused_before_it_is_read(tmp_path, kind, arguments):
+def test_devices_and_pipes_are_refused_before_reading(tmp_path, kind, arguments):
     path = {"device": Path("/dev/zero"), "FIFO": tmp_path / "fifo", "folder": tmp_path / "folder"}[kind]
     if kind == "FIFO":
         os.mkfifo(path)
@@ -376,7 +376,7 @@ NUMBERS = ("99999999999999999999", "-99999999999999999999", "0", "-1", "nan", "1
 
 
 @pytest.mark.parametrize("value", NUMBERS, ids=lambda value: value[:24])
-def test_a_debounce_of_any_digits_is_one_line(value):
+def test_a_debounce_with_many_digits_is_one_line(value):
     done = cdtool("detect", LOG, "-m", GATE / "machine.toml", "-d", "gm", "--limit", "40", "--debounce", value)
     assert done.status == 2 and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert "debounce" in done.err and len(done.err) <= LONGEST_LINE + 1 and "Traceback" not in done.err
@@ -409,7 +409,7 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     assert str(tmp_path)[:20] in done.err and "known: " in done.err  # the file is named, and the next step
 
 
-def test_what_was_left_out_is_cut_as_well(tmp_path):
+def test_left_out_lines_are_cut_as_well(tmp_path):
     logs = [written(tmp_path / f"{'n' * 200}{i}.csv", "") for i in range(2)]
     arguments = ("-m", GATE / "machine.toml", "-d", "gm", "--limit", "40")
     done = cdtool("detect", LOG, *logs, *arguments)
@@ -446,7 +446,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
         "plan --difference-ms 5 --std-ms 3",
     ],
 )
-def test_a_reader_that_goes_leaves_no_traceback_and_the_status_as_it_is(arguments):
+def test_a_closed_pipe_causes_no_traceback_and_keeps_the_status(arguments):
     for command, shown in ((f"cdtool {arguments} | head -1", True), (f"cdtool {arguments} | true", False)):
         done = shell(f"{command}; echo ${{PIPESTATUS[0]}}")
         assert done.stderr == "", done.stderr
@@ -454,7 +454,7 @@ def test_a_reader_that_goes_leaves_no_traceback_and_the_status_as_it_is(argument
         assert shown == (len(done.stdout.splitlines()) > 1) or arguments.endswith("--help")
 
 
-def test_a_reader_that_goes_does_not_make_a_violated_limit_pass(tmp_path):
+def test_a_closed_pipe_does_not_hide_a_violated_limit(tmp_path):
     text = benchmark_text().replace("{ max = 40 }", "{ max = 1 }")
     benchmark = written(tmp_path / "benchmark.toml", text)
     done = shell(f"cdtool benchmark {benchmark} --detectors pi -o {tmp_path}/r.json | head -1; echo ${{PIPESTATUS[0]}}")
@@ -506,7 +506,7 @@ def test_json_on_a_terminal_without_its_characters_is_the_same_json(tmp_path):
     assert narrow.isascii() and json.loads(narrow) == json.loads(plain) and "☃" in plain
 
 
-def test_memory_that_is_not_there_is_one_line(tmp_path):
+def test_missing_memory_is_one_line(tmp_path):
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (1_200 * 2**20,) * 2)
 

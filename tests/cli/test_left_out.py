@@ -34,7 +34,7 @@ def test_a_benchmark_names_each_run_that_is_left_out_once(gate_folder, tmp_path)
     assert "has the same content as" in reasons[0][1] and "runs forward at" in reasons[1][1]
 
 
-def test_a_file_that_is_named_twice_is_not_said_to_hold_the_bytes_of_another(gate_folder, tmp_path):
+def test_a_file_named_twice_is_not_reported_as_a_copy(gate_folder, tmp_path):
     free = sorted((gate_folder / "free").glob("*.csv"))
     again = free[0].parent / ".." / "free" / free[0].name
     machine = ("-m", gate_folder / "machine.toml")
@@ -50,7 +50,7 @@ def test_a_file_that_is_named_twice_is_not_said_to_hold_the_bytes_of_another(gat
     assert "this run is already in the signature" in done.err
 
 
-def test_too_few_runs_name_what_was_left_out_before(gate_folder, tmp_path):
+def test_too_few_runs_count_those_left_out_before(gate_folder, tmp_path):
     source = (gate_folder / "free" / "01.csv").read_bytes()
     copies = [tmp_path / f"copy_{number}.csv" for number in range(10)]
     for copy in copies:
@@ -61,7 +61,7 @@ def test_too_few_runs_name_what_was_left_out_before(gate_folder, tmp_path):
     assert "left out before: 9 runs, first" in done.err and "used once" in done.err
 
 
-def test_a_reason_that_not_all_detectors_have_names_them():
+def test_a_reason_of_some_detectors_names_them():
     left_out = LeftOut()
     left_out.add("pure_inertia", [Skipped("a.csv", "no acceleration"), Skipped("b.csv", "another class")])
     left_out.add("momentum", [Skipped("b.csv", "another class")])

@@ -38,7 +38,7 @@ def benchmark_of(folder: Path, rows: Rows, more: str = "") -> tuple[Path, Path]:
     return file, log
 
 
-def test_all_three_commands_end_with_3_where_no_contact_could_be_assessed(tmp_path):
+def test_all_three_commands_exit_with_3_if_no_contact_is_assessable(tmp_path):
     """A false alarm beside it excuses nothing."""
     rows = [[1.3 * row[0], row[1], row[2] / 1.3, *row[3:]] for row in rows_of("stiff/04.csv")]
     file, log = benchmark_of(tmp_path, rows)
@@ -64,7 +64,7 @@ def two_strokes() -> Rows:
 
 
 @pytest.mark.parametrize("more", ["", 'operations = "motion"\n'])
-def test_a_log_of_two_strokes_that_is_not_cut_is_told_how_to_cut_it(tmp_path, more):
+def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):

@@ -36,7 +36,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", ["free/01.csv", "machine.toml", "benchmark.toml", "free/../machine.toml", "new.csv"])
-def test_a_signature_goes_into_a_name_in_json_only(folder, name):
+def test_a_signature_is_written_only_to_a_json_name(folder, name):
     before = bytes_of(folder)
     done = learn(folder, folder / name)
     assert done.status == 2 and "must end in .json" in done.err
@@ -44,7 +44,7 @@ def test_a_signature_goes_into_a_name_in_json_only(folder, name):
 
 
 @pytest.mark.parametrize("way", ["symlink_to", "hardlink_to"])
-def test_a_link_in_json_to_a_recording_is_no_way_round(folder, way):
+def test_a_json_link_to_a_recording_is_refused(folder, way):
     link = folder / "link.json"
     getattr(link, way)(folder / "free" / "01.csv")
     before = bytes_of(folder)
@@ -72,17 +72,17 @@ def test_a_signature_replaces_a_signature(folder):
         ("build.xml", "JUnit report"),
     ],
 )
-def test_a_report_never_replaces_what_is_no_report(folder, name, kind):
+def test_a_report_never_replaces_another_file(folder, name, kind):
     path = folder / name
     if not path.exists():
         path.write_text(TEXT, encoding="utf-8")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "fine.json", "-o", path)
-    assert done.status == 2 and f"holds no {kind}" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and f"contains no {kind}" in done.err and done.err.count("\n") == 1
     assert bytes_of(folder) == before
 
 
-def test_a_folder_that_holds_a_recording_under_a_report_s_name_is_refused(folder):
+def test_a_folder_with_a_recording_under_a_report_s_name_is_refused(folder):
     shutil.copyfile(folder / "free" / "01.csv", folder / "stiff" / "contacts.csv")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "stiff")
@@ -90,7 +90,7 @@ def test_a_folder_that_holds_a_recording_under_a_report_s_name_is_refused(folder
     assert bytes_of(folder) == before
 
 
-def test_reports_are_written_anew_as_often_as_one_likes(folder):
+def test_reports_can_be_written_again_any_number_of_times(folder):
     targets = [
         word
         for name in ("r.json", "r.html", "r.md", "r.xml", "r.csv", "r.svg", "all")
@@ -156,7 +156,7 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
         assert [cdtool(*words, "--force").status, cdtool(*words).status] == [0, 0], words
 
 
-def test_a_folder_with_anything_but_a_report_keeps_it(folder):
+def test_other_files_in_a_report_folder_stay(folder):
     report = folder / "report"
     report.mkdir()
     (report / "notes.txt").write_text(TEXT, encoding="utf-8")
@@ -168,7 +168,7 @@ def test_a_folder_with_anything_but_a_report_keeps_it(folder):
     assert (report / "notes.txt").read_text(encoding="utf-8") == TEXT and (report / "report.html").exists()
 
 
-def test_a_report_folder_is_swapped_in_as_a_whole_and_what_is_no_longer_drawn_is_gone(folder):
+def test_a_report_folder_is_replaced_as_a_whole_without_outdated_figures(folder):
     report = folder / "report"
     assert cdtool("benchmark", folder / "benchmark.toml", "-o", report).status == 0
     shutil.copyfile(report / "latency.png", report / "triggers_of-last-year.png")
@@ -177,7 +177,7 @@ def test_a_report_folder_is_swapped_in_as_a_whole_and_what_is_no_longer_drawn_is
     assert not [name for name in bytes_of(folder) if ".cdtool-" in name]
 
 
-def test_force_never_reaches_what_the_command_reads(folder):
+def test_force_never_overwrites_an_input(folder):
     (folder / "stiff" / "01.csv").rename(folder / "stiff" / "contacts.csv")
     before = bytes_of(folder)
     for target in (folder / "stiff" / "contacts.csv", folder / "stiff"):
@@ -195,7 +195,7 @@ def test_a_dead_link_is_refused_before_any_work(folder):
     assert not (folder / "nowhere.json").exists()
 
 
-def test_dotfiles_are_no_logs_whatever_the_pattern(folder):
+def test_dotfiles_are_never_logs(folder):
     for name in ("free/.04.csv", "free/.cdtool-0123456789abcdef-0123456789abcdef.tmp", "stiff/.hidden/02.csv"):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(folder / "free" / "03.csv", folder / name)

@@ -179,19 +179,19 @@ def test_contacts_of_one_campaign_count_as_one():
         ),
     ],
 )
-def test_what_is_not_complete_ends_with_2_and_names_the_option(source, monkeypatch, arguments, message):
+def test_an_incomplete_question_exits_with_2_and_names_the_option(source, monkeypatch, arguments, message):
     monkeypatch.chdir(source.parent)
     done = cdtool("plan", *arguments)
     assert done.status == 2 and message in done.err and done.out == ""
 
 
-def test_a_spread_needs_two_recordings():
+def test_a_standard_deviation_requires_two_recordings():
     for outcomes in ([40.0], [MISSED] * 5):
         with pytest.raises(UsageError, match="at least 2 are required"):
             measured_std(earlier(outcomes, outcomes), ["gm", "pt"])
 
 
-def test_a_group_has_to_be_named_where_there_are_several():
+def test_a_group_is_required_if_there_are_several():
     results = build({(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")})
     with pytest.raises(UsageError, match=r"no group is given \(known: soft, stiff\)"):
         measured_std(results, ["gm", "pt"])
@@ -208,21 +208,21 @@ def test_only_the_contacts_of_the_group_named_count():
     }
 
 
-def test_whole_numbers_have_all_their_digits():
+def test_integers_are_shown_with_all_digits():
     done = cdtool("plan", "--false-alarms-at-most", "1/1000000op")
     assert "a budget of 1/1000000op false alarms" in done.out and "1000000 impact-free operations" in done.out
     assert "2995733 others" in done.out and "e+" not in done.out
     assert "e+" not in cdtool("plan", "--missed-at-most", "0.000001").out
 
 
-def test_one_operation_is_no_plural():
+def test_one_operation_is_singular():
     done = cdtool("plan", "--false-alarms-at-most", "1/op")
     assert "1 impact-free operation to learn from" in done.out
     assert "1 impact-free hour to learn from" in cdtool("plan", "--false-alarms-at-most", "1/h").out
 
 
 @pytest.mark.parametrize("command", ["plan", "compare"])
-def test_a_level_that_no_computer_number_tells_from_0_is_refused(source, command):
+def test_a_level_indistinguishable_from_0_is_refused(source, command):
     asked = ("--missed-at-most", "5%") if command == "plan" else (source, source)
     done = cdtool(command, *asked, "--level", "1e-300")
     assert done.status == 2 and "significance level is 1e-300" in done.err and "0.000000001" in done.err

@@ -129,11 +129,11 @@ def test_of_every_impact_of_the_sample_logs(sample, detector):
 
 
 @pytest.mark.parametrize(("sample", "detector"), [("gate", "gm"), ("arm/trial_1", "igm")])
-def test_with_every_setting_that_makes_numbers_away_from_its_default(sample, detector, tmp_path):
+def test_with_every_relevant_setting_changed_from_its_default(sample, detector, tmp_path):
     assert check(benchmark_with_other_settings(tmp_path, sample), detector) >= 6
 
 
-def test_the_options_by_hand_give_the_figures_of_the_file(tmp_path):
+def test_individual_options_give_the_results_of_the_file(tmp_path):
     """As `detect` did with 80 ms beside 81 ms: the same levels, the same limit, the same latency."""
     log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
     file = tmp_path / "benchmark.toml"
@@ -170,7 +170,7 @@ def test_the_options_by_hand_give_the_figures_of_the_file(tmp_path):
         ("--mass-before-cell", 0),
     ],
 )
-def test_a_setting_beside_the_benchmark_file_is_refused(command, option):
+def test_a_setting_together_with_the_benchmark_file_is_refused(command, option):
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
     assert done.status == 2
@@ -179,7 +179,7 @@ def test_a_setting_beside_the_benchmark_file_is_refused(command, option):
     )
 
 
-def test_a_detector_has_to_be_named_where_the_file_names_several():
+def test_a_detector_is_required_if_the_file_has_several():
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
     assert done.status == 2 and "names 5 detectors (give --detector, one of pure_inertia" in done.err
@@ -189,7 +189,7 @@ def test_a_detector_has_to_be_named_where_the_file_names_several():
     assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
 
 
-def test_a_signature_of_all_joints_fits_a_benchmark_file_that_names_none(tmp_path):
+def test_a_signature_of_all_joints_fits_a_benchmark_file_without_joints(tmp_path):
     gate = Path(__file__).parents[2] / "sample_logs" / "gate"
     logs = sorted((gate / "free").iterdir())
     made = cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", tmp_path / "s.json")
@@ -198,7 +198,7 @@ def test_a_signature_of_all_joints_fits_a_benchmark_file_that_names_none(tmp_pat
     assert done.status == 0 and "alarm" in done.out, done.err
 
 
-def test_detect_and_explain_count_the_runs_learned_from_alike_and_name_those_left_out(tmp_path):
+def test_detect_and_explain_count_the_same_runs_and_name_those_left_out(tmp_path):
     gate = Path(__file__).parents[2] / "sample_logs" / "gate"
     shutil.copy(gate / "machine.toml", tmp_path)
     (tmp_path / "free").mkdir()

@@ -67,7 +67,7 @@ def after(measured: dict[str, Any], seconds: float) -> str:
     return "".join(rows) + QUIET
 
 
-def test_the_alarms_of_a_benchmark_get_the_same_figures_again(logs, measured):
+def test_the_alarms_of_a_benchmark_get_the_same_results_again(logs, measured):
     contacts = measured["contacts"]
     rows = "".join(f"{row['recording']},{row['alarm_s']!r},{row['detector']},\n" for row in contacts)
     quiet = QUIET.replace("plc", "friction_ekf") + QUIET.replace("plc", "pure_inertia")
@@ -83,7 +83,7 @@ def test_the_alarms_of_a_benchmark_get_the_same_figures_again(logs, measured):
     assert values["provenance"]["trigger_clock"] == "recording" and len(values["provenance"]["triggers_sha256"]) == 64
 
 
-def test_the_latency_is_the_trigger_less_the_onset_and_the_table_shows_it(logs, measured):
+def test_the_latency_is_trigger_minus_onset_and_shown_in_the_table(logs, measured):
     done = score(logs, after(measured, 0.05))
     assert done.status == 0 and done.err == ""
     (row,) = [line.split() for line in done.out.splitlines() if line.startswith("stiff ")]
@@ -111,7 +111,7 @@ def test_a_late_alarm_and_none_are_missed_contacts_at_the_end_of_the_window(logs
     assert "plc: 1 of 6 recordings without a row: counted as monitored without an alarm; first soft/02.csv" in err
 
 
-def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_exposure(logs, measured):
+def test_an_unassessable_section_over_a_contact_shortens_the_exposure(logs, measured):
     onset = onsets(measured)["stiff/01.csv"]
     others = after(measured, 0.05).replace(f"stiff/01.csv,{onset + 0.05!r},plc,\n", "")
     values, _ = scored(logs, f"stiff/01.csv,{onset - 0.5},plc,{onset + 1.5}\n" + others)
@@ -124,7 +124,7 @@ def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_expos
     assert next(row for row in part["contacts"] if row["recording"] == "stiff/01.csv")["outcome"] == "missed"
 
 
-def test_a_recording_that_is_blind_all_over_is_not_assessable_with_a_reason(logs, measured):
+def test_a_recording_without_assessable_time_is_not_assessable_with_a_reason(logs, measured):
     rows = "stiff/01.csv,0,plc,100\nstiff/02.csv,0,plc,100\n"
     values, _ = scored(logs, rows, "--listed-only", status=3)
     assert {row["outcome"] for row in values["contacts"]} == {"not_assessable"}
@@ -160,7 +160,7 @@ def epoch_folder(folder: Path, logs: Path) -> float:
     return 1.7e9
 
 
-def test_triggers_on_the_source_clock_are_moved_and_on_the_wrong_clock_are_told(logs, measured, tmp_path):
+def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reported(logs, measured, tmp_path):
     origin = epoch_folder(tmp_path, logs)
     at = onsets(measured)
     times = {name: origin + at[name] + 0.045 for name in ("stiff/01.csv", "soft/01.csv")}
@@ -202,7 +202,7 @@ def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
     assert all(word in done.err for word in words), done.err
 
 
-def test_nothing_that_could_be_scored_is_never_0(logs, tmp_path):
+def test_nothing_to_score_never_exits_with_0(logs, tmp_path):
     done = score(logs, "stiff/99.csv,1.0,plc,\n", "--listed-only")
     assert done.status == 2 and "no recording could be scored" in done.err and "stiff/99.csv" in done.err
     missing = cdtool("score", tmp_path / "none.csv", "-b", logs / "benchmark.toml")
@@ -222,7 +222,7 @@ def test_a_log_of_nothing_but_the_load_cell_can_be_scored(logs, measured, tmp_pa
     assert [item["latency_ms"] for item in values["contacts"]] == [pytest.approx(30.0)]
 
 
-def test_limits_hold_for_whoever_triggers(logs, measured, tmp_path):
+def test_limits_apply_to_external_triggers(logs, measured, tmp_path):
     (tmp_path / "limits").mkdir()
     folder = tmp_path / "limits"
     for name in ("stiff", "soft", "holdout", "machine.toml"):
@@ -267,7 +267,7 @@ def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measu
     )
 
 
-def test_triggers_were_held_against_no_threshold_and_have_no_value_and_no_limit(logs, measured, tmp_path):
+def test_triggers_have_no_threshold_value_or_limit(logs, measured, tmp_path):
     report = tmp_path / "score.html"
     values, _ = scored(logs, after(measured, 0.05) + "holdout/01.csv,2.0,plc,\n", "-o", report)
     rows = [*values["contacts"], *values["false_alarms"]]

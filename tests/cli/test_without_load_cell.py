@@ -44,7 +44,7 @@ def benchmark_of(folder: Path, gate_folder: Path, *impacts: Path) -> Path:
     return file
 
 
-def test_a_signature_is_learned_and_a_line_says_that_nothing_tells_of_contacts(bare, gate_folder, tmp_path):
+def test_a_signature_is_learned_with_a_note_that_contacts_cannot_be_checked(bare, gate_folder, tmp_path):
     logs = sorted((bare / "free").glob("*.csv"))
     done = cdtool(
         "learn-signature", *logs, "-m", gate_folder / "machine.toml", "-d", "gm", "--force", "-o", tmp_path / "s.json"
@@ -81,7 +81,7 @@ def test_detect_shows_the_alarm_and_says_why_it_has_no_latency(bare, gate_folder
     assert f"note: {bare / 'stiff' / '01.csv'}: force: is not in this log: no column '{CELL}'" in done.err
 
 
-def test_a_misspelt_column_is_told_with_the_one_that_was_meant(gate_folder, tmp_path):
+def test_a_misspelt_column_is_reported_with_the_nearest(gate_folder, tmp_path):
     text = (gate_folder / "machine.toml").read_text(encoding="utf-8")
     (tmp_path / "machine.toml").write_text(text.replace(f'"{CELL}"', '"loadcell"'), encoding="utf-8")
     found = api.info(gate_folder / "stiff" / "01.csv", machine=tmp_path / "machine.toml")
@@ -89,7 +89,7 @@ def test_a_misspelt_column_is_told_with_the_one_that_was_meant(gate_folder, tmp_
     assert note.severity == "note" and f"no column 'loadcell'; did you mean '{CELL}'?" in note.message
 
 
-def test_a_column_that_is_there_twice_is_no_absent_one(gate_folder, tmp_path):
+def test_a_repeated_column_is_not_reported_as_missing(gate_folder, tmp_path):
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
     twice = [f"{line},{line.split(',')[lines[0].split(',').index(CELL)]}" for line in lines]
     (tmp_path / "twice.csv").write_text("\n".join(twice) + "\n", encoding="utf-8")
@@ -97,7 +97,7 @@ def test_a_column_that_is_there_twice_is_no_absent_one(gate_folder, tmp_path):
     assert done.status == 2 and "is there 2 times" in done.err
 
 
-def test_any_other_channel_is_still_needed(gate_folder, tmp_path):
+def test_any_other_channel_is_still_required(gate_folder, tmp_path):
     text = (gate_folder / "machine.toml").read_text(encoding="utf-8")
     (tmp_path / "machine.toml").write_text(text.replace('"i_motor"', '"i_motors"'), encoding="utf-8")
     with pytest.raises(SignatureError, match="no column 'i_motors'"):

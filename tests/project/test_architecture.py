@@ -52,7 +52,7 @@ def test_imports_run_downward():
     assert lint_imports(config_filename=str(ROOT / "pyproject.toml")) == 0
 
 
-def test_every_module_says_what_it_is():
+def test_every_module_has_a_docstring():
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         assert path.read_text(encoding="utf-8").startswith('"""'), path
 
@@ -74,7 +74,7 @@ def words_of(*folders: Path) -> Counter[str]:
     return Counter(word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8")))
 
 
-def test_what_is_public_is_used_or_shown_by_more_than_tests():
+def test_public_names_are_used_or_documented_outside_tests():
     code, shown = words_of(ROOT / "cdtool"), words_of(ROOT / "docs", ROOT / "benchmarks")
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -63,7 +63,7 @@ def test_the_scripts_make_exactly_the_diagrams_of_the_docs(made):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_diagram_is_valid_small_and_described_for_those_who_do_not_see_it(name):
+def test_a_diagram_is_valid_small_and_has_a_text_description(name):
     path = DOCS / "images" / f"{name}.svg"
     root = ElementTree.fromstring(path.read_text(encoding="utf-8"))
     title, description = root.findtext(f"{SVG}title"), root.findtext(f"{SVG}desc")
@@ -72,7 +72,7 @@ def test_a_diagram_is_valid_small_and_described_for_those_who_do_not_see_it(name
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_diagram_of_the_docs_says_what_its_script_draws(name, made):
+def test_a_diagram_of_the_docs_matches_its_script(name, made):
     words, formulas = content(made / f"{name}.svg")
     assert words and formulas
     assert content(DOCS / "images" / f"{name}.svg") == (words, formulas)
@@ -84,7 +84,7 @@ def test_the_same_script_gives_the_same_bytes(script, made):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_text_leaves_the_sheet_or_lies_over_another(name, script):
+def test_no_text_leaves_the_sheet_or_overlaps_another(name, script):
     with matplotlib.rc_context(script.STYLE):
         figure = script.diagram(name).figure
         boxes = {item: item.get_window_extent() for item in figure.axes[0].texts if item.get_text()}
@@ -96,7 +96,7 @@ def test_no_text_leaves_the_sheet_or_lies_over_another(name, script):
         assert not box.overlaps(other_box), (one.get_text(), other.get_text())
 
 
-def test_a_wire_that_would_run_askew_is_an_error(script):
+def test_a_wire_that_is_not_straight_is_an_error(script):
     sheet = script.Diagram(50)
     with pytest.raises(ValueError, match="neither horizontally nor vertically"):
         sheet.wire(sheet.block(20, 10, "one"), sheet.block(60, 40, "two"))

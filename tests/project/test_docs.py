@@ -445,6 +445,6 @@ def test_the_benchmark_file_page_is_valid_and_names_every_key(tmp_path):
         assert key in words, key
 
 
-def test_the_docs_name_no_path_of_a_machine_of_ours():
+def test_the_docs_contain_no_local_paths():
     for page in [*PAGES, *DOCS.rglob("*.py"), *DOCS.rglob("*.toml"), ROOT / "sample_logs" / "README.md"]:
         assert not re.search(r"(?<![\w.])/(work|tmp|home|root)\b", page.read_text(encoding="utf-8")), page

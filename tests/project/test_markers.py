@@ -53,7 +53,7 @@ def test_every_test_that_is_listed_as_slow_exists():
     assert set(listed) <= functions, "tests/slow_tests.txt: correct the names of tests that were renamed"
 
 
-def test_the_list_holds_what_took_longer_than_the_bound_and_drops_what_took_less_than_half(tmp_path):
+def test_the_list_adds_tests_above_the_bound_and_drops_those_below_half(tmp_path):
     report = tmp_path / "times.xml"
     report.write_text(REPORT, encoding="utf-8")
     took = durations(report)

@@ -58,7 +58,7 @@ def test_a_write_is_recognised(code, count):
     assert len(list(writes(ast.parse(code)))) == count
 
 
-def test_files_are_written_by_the_one_module_for_it_alone():
+def test_files_are_written_only_by_the_module_for_it():
     """The writers of formats fill the name that they are handed: the temporary file of a `replaced` block."""
     found = set()
     for path in sorted((ROOT / "cdtool").rglob("*.py")):

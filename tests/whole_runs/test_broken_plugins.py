@@ -69,7 +69,7 @@ def detect(name: str, *logs: Path) -> Outcome:
     return cdtool("detect", *(logs or (LOG,)), "-m", GATE / "machine.toml", "-d", name, "--limit", 4)
 
 
-def test_the_detector_that_the_others_are_made_from_is_fine(install):
+def test_the_template_detector_is_valid(install):
     install(DETECTOR)
     assert detect("odd").status == detect("od").status == detect("OD").status == cdtool("list", "detectors").status == 0
 
@@ -113,7 +113,7 @@ def test_a_package_that_cannot_be_used_is_one_line_that_names_it(install, old, n
     assert done.err.endswith("(repair or uninstall 'odd-things')\n")
 
 
-def test_a_plugin_has_the_look_that_its_class_gives_and_otherwise_one_that_its_name_decides(install):
+def test_a_plugin_has_the_look_of_its_class_or_one_derived_from_its_name(install):
     absent = look_of("odd")
     install(DETECTOR)
     assert look_of("odd") == absent
@@ -122,7 +122,7 @@ def test_a_plugin_has_the_look_that_its_class_gives_and_otherwise_one_that_its_n
     assert look_of("even") == Look("#123456", "s")
 
 
-def test_the_others_are_listed_beside_a_package_that_cannot_be_used(install):
+def test_the_others_are_listed_despite_an_unusable_package(install):
     install("import no_such_module")
     listed = cdtool("list", "detectors", "--json")
     assert listed.status == 3 and [entry["name"] for entry in json.loads(listed.out)] == DETECTORS.names()
@@ -148,7 +148,7 @@ def test_two_packages_with_one_name_are_both_named(install):
     assert done.status == 2 and "the packages one and two both provide a detector 'odd'" in done.err
 
 
-def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_go_on(install):
+def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_work(install):
     install(DETECTOR, package="one")
     install(DETECTOR.replace('"odd"', '"even"'), "even", package="two")
     done = detect("od")
@@ -203,7 +203,7 @@ def benchmark_file(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("new", ["import no_such_module", DETECTOR.replace("torque = rec", "1 / 0; torque = rec")])
-def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(install, tmp_path, new):
+def test_all_detectors_run_except_an_unusable_one_which_is_named(install, tmp_path, new):
     install(new)
     done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "all", "--json")
     results = json.loads(done.out)
@@ -212,7 +212,7 @@ def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(in
     assert finding["reason"].startswith("left out: ") and "odd" in done.err
 
 
-def test_a_detector_that_cannot_learn_stops_no_other_and_alone_ends_with_one_line(install, tmp_path):
+def test_a_detector_that_cannot_learn_does_not_stop_others(install, tmp_path):
     install(DETECTOR.replace("torque = recording", "1 / 0; torque = recording"))
     why = "detector odd fails: ZeroDivisionError"
     done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "gm,odd", "--json")
@@ -253,7 +253,7 @@ def benchmark_with_threshold(folder: Path) -> Outcome:
     return cdtool("benchmark", path)
 
 
-def test_the_threshold_that_the_others_are_made_from_is_fine(install, tmp_path):
+def test_the_template_threshold_is_valid(install, tmp_path):
     install(THRESHOLD, group="thresholds")
     assert benchmark_with_threshold(tmp_path).status == 0
 
@@ -293,7 +293,7 @@ def test_a_threshold_whose_other_methods_fail_is_one_line_too(install, tmp_path,
     assert "Traceback" not in done.err
 
 
-def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_path):
+def test_a_program_error_never_has_the_status_of_a_violated_limit(monkeypatch, tmp_path):
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError("deep inside")
 

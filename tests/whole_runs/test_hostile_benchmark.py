@@ -83,7 +83,7 @@ def text(bench, name: str) -> str:
     return (bench[0] / "out" / name).read_bytes().decode("utf-8")
 
 
-def test_both_commands_end_as_the_limits_say(bench):
+def test_both_commands_exit_with_the_status_of_the_limits(bench):
     _, made, again = bench
     assert (made.status, again.status) == (1, 1), made.err + again.err
     assert "Traceback" not in made.err + again.err
@@ -98,7 +98,7 @@ def test_nothing_is_written_outside_the_output_folder_and_every_file_name_is_pla
     assert {path.parent for path in (folder / "out").rglob("*")} == {folder / "out"}
 
 
-def test_nothing_is_garbled_on_a_terminal(bench):
+def test_terminal_output_has_no_control_characters(bench):
     for said in (bench[1].out, bench[1].err, bench[2].out, bench[2].err):
         active = {letter for letter in said if unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")}
         assert active <= {"\n"}
@@ -111,7 +111,7 @@ def test_json_is_strict_and_holds_every_recording(bench, name):
     assert len(values["contacts"]) == 2 * len(SEEN)
 
 
-def test_a_report_made_again_is_the_same(bench):
+def test_a_report_written_again_is_the_same(bench):
     pairs = {"html": "report.html", "xml": "junit.xml", "csv": "contacts.csv", "json": "results.json"}
     for suffix, name in pairs.items():  # the folder's Markdown differs: it links the figures beside it
         assert text(bench, f"again.{suffix}") == text(bench, name)

@@ -77,7 +77,7 @@ def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
     assert results.contacts[0].force_at_alarm_n > 10.0
 
 
-def test_the_plain_limit_serves_a_benchmark_too(folder):
+def test_the_plain_limit_works_in_a_benchmark(folder):
     text = BENCHMARK.replace('operations = "motion"', 'operations = "motion"\nthreshold = "limit"')
     (folder / "limit.toml").write_text(text)
     results = cdtool.benchmark(folder / "limit.toml").results
@@ -86,7 +86,7 @@ def test_the_plain_limit_serves_a_benchmark_too(folder):
     assert results.provenance["threshold"] == "limit"
 
 
-def test_labels_serve_as_ground_truth_where_no_load_cell_is_mapped(folder):
+def test_labels_are_the_ground_truth_without_a_load_cell(folder):
     text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
     (folder / "labels.toml").write_text(text)
     (folder / "label_benchmark.toml").write_text(BENCHMARK.replace("machine.toml", "labels.toml"))
@@ -119,7 +119,7 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
     assert second["current"][0]["by_position"]["mean"] != first["current"][0]["by_position"]["mean"]
 
 
-def test_the_signature_rule_reaches_the_file(folder):
+def test_the_signature_rule_is_stored_in_the_file(folder):
     rule = Signature(sides="two", safety_factor=7.0, alignment="position")
     learned = cdtool.learn_signature(
         [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", activation={"debounce": 4}
@@ -129,7 +129,7 @@ def test_the_signature_rule_reaches_the_file(folder):
     assert learned.signature.activation == Activation(4)
 
 
-def test_what_could_not_be_judged_is_told_with_its_share(folder):
+def test_unassessable_sections_are_shown_with_their_share(folder):
     (folder / "benchmark.toml").write_text(BENCHMARK)
     results = cdtool.benchmark(folder / "benchmark.toml").results
     momentum = next(item for item in results.exposure if (item.group, item.detector) == ("holdout", "momentum"))
@@ -154,7 +154,7 @@ def test_what_could_not_be_judged_is_told_with_its_share(folder):
     )
 
 
-def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
+def test_a_contact_outside_all_operations_is_reported(folder):
     write_log(folder / "rest.csv", 6, {1: 60.0}, 4)
     table = np.loadtxt(folder / "rest.csv", delimiter=",", skiprows=1)
     resting = table[-1].copy()
@@ -173,7 +173,7 @@ def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
     assert len(results.contacts) == 2
 
 
-def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
+def test_an_unassessable_contact_has_a_reason(folder, tmp_path):
     """The speed is lost from before the contact on: the momentum observer sees nothing, and says so."""
     table = np.loadtxt(folder / "hits.csv", delimiter=",", skiprows=1)
     table[(table[:, 0] > 5.9) & (table[:, 0] < 8.0), 2] = np.nan
@@ -185,7 +185,7 @@ def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
 
 
 @pytest.mark.parametrize("call", [cdtool.detect, cdtool.explain])
-def test_detect_and_explain_take_the_fields_of_the_options_as_keywords_and_no_other(call):
+def test_detect_and_explain_accept_only_the_option_fields_as_keywords(call):
     log, *given = inspect.signature(call).parameters
     assert log == "log" and given == list(inspect.signature(DetectionOptions).parameters)
     with pytest.raises(TypeError, match="'limits'"):

@@ -55,7 +55,7 @@ def machine_with(folder: Path, more: str) -> Path:
     return path
 
 
-def test_list_tells_the_plugins_with_gains_units_and_defaults(command):
+def test_list_shows_the_plugins_with_gains_units_and_defaults(command):
     entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").stdout)}
     assert list(entries) == [*DETECTORS.names(), "torque_rate"]
     assert entries["torque_rate"]["short_name"] == "tr" and entries["torque_rate"]["needs"] == ["torque"]
@@ -85,7 +85,7 @@ def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(com
     assert without.returncode == 2 and "unknown detector 'torque_rate'" in without.stderr
 
 
-def test_its_gains_stand_in_the_machine_file_under_either_name(command, tmp_path):
+def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp_path):
     log = GATE / "stiff" / "03.csv"
     alarms = []
     for name in ("tr", "torque_rate"):
@@ -122,7 +122,7 @@ def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_pat
         assert "cdtool-plugin-example" in (tmp_path / report).read_text(encoding="utf-8"), report
 
 
-def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
+def test_all_detectors_include_those_of_plugins(command, tmp_path):
     machine = ("--machine", GATE / "machine.toml")
     text = f'machine = "{GATE}/machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
     text += f'[learn]\nlogs = ["{GATE}/free/03.csv", "{GATE}/free/04.csv"]\n'

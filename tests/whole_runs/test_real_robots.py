@@ -76,7 +76,7 @@ def forward_euler_observer(time, net_force, momentum, gain):
 
 @needs_arm
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
-def test_the_reference_observer_of_the_data_comes_out_of_the_machines_terms(arm, name):
+def test_the_reference_observer_of_the_data_follows_from_the_machines_terms(arm, name):
     import pinocchio as pin
 
     recording = read(name, arm)
@@ -124,7 +124,7 @@ def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(a
 
 
 @needs_arm
-def test_at_rest_the_model_and_the_currents_hold_the_shoulder_alike(arm):
+def test_at_rest_model_and_currents_agree_for_the_shoulder(arm):
     position, _, torque = motion_of(read("ur-static", arm))
     gravity = read_machine_file(arm).machine.gravity(position).mean(axis=0)
     assert gravity[1] == pytest.approx(-44.5, abs=0.05)
@@ -157,7 +157,7 @@ def test_joints_named_in_another_order_with_their_columns_give_the_same_residual
         ("[1, 2, 3, 4, 5, 6]", "[1, 2, 3, 4, 5]", "names 5 columns"),
     ],
 )
-def test_joints_and_columns_that_do_not_belong_together_are_refused(arm, tmp_path, right, wrong, message):
+def test_mismatched_joints_and_columns_are_refused(arm, tmp_path, right, wrong, message):
     text = arm.read_text(encoding="utf-8")
     assert right in text
     (tmp_path / "wrong.toml").write_text(text.replace(right, wrong), encoding="utf-8")
@@ -201,7 +201,7 @@ def test_false_alarms_come_only_from_a_wrist_that_stands_still(judged, name, cou
 
 
 @needs_arm
-def test_the_energy_observer_misses_slow_contacts_and_says_that_it_cannot_judge_at_rest(judged):
+def test_the_energy_observer_misses_slow_contacts_and_is_not_assessable_at_rest(judged):
     _, moving, resting = judged["energy"]
     assert [match.outcome for match in moving.matching.matches] == ["missed"] * 3
     assert [match.outcome for match in resting.matching.matches] == ["not_assessable"] * 4
@@ -209,7 +209,7 @@ def test_the_energy_observer_misses_slow_contacts_and_says_that_it_cannot_judge_
 
 
 @needs_arm
-def test_the_table_of_the_page_is_what_the_example_finds(judged):
+def test_the_table_of_the_page_matches_the_example(judged):
     text = (EXAMPLE.parents[1] / "real-recordings.md").read_text(encoding="utf-8")
     for name, (_, moving, resting) in judged.items():
         row_of = rf"^\| `{name}` \| (.*) (?:N m|W) \| (.*) \| (.*) \| (\d) \| (\d+) % \|$"
@@ -322,7 +322,7 @@ def test_every_detector_runs_on_joint_states_of_a_real_arm(name, detector, tmp_p
 
 @needs_robots
 @needs_data("mcap_samples/panda_joint_states.mcap")
-def test_joints_of_a_urdf_that_the_log_names_otherwise_are_asked_for_by_name(tmp_path):
+def test_joints_with_other_names_in_the_log_must_be_named(tmp_path):
     text = machine_text(
         robot_urdf("panda_description/urdf/panda.urdf"),
         {joint: joint for joint in PANDA},

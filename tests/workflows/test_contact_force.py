@@ -51,14 +51,14 @@ def test_a_force_in_the_plane_is_found_from_the_residual_once_it_has_settled(arm
     assert 0.0 < summary.at_alarm < summary.largest
 
 
-def test_near_a_stretched_pose_what_cannot_be_felt_is_zero_and_not_noise(arm):
+def test_near_a_singular_pose_unobservable_forces_are_zero(arm):
     position, residual = np.array([[0.5, 0.501]]), np.array([[1.0, 2.0]])
     found = arm.contact_force(position, residual, POINT.link, POINT.point)[0]
     along = np.array([np.cos(0.5), 0.0, np.sin(0.5)])
     assert abs(found @ along) < 0.05 * np.linalg.norm(found) and np.linalg.norm(found) < 20.0
 
 
-def test_samples_that_cannot_be_judged_have_no_force(arm):
+def test_unassessable_samples_have_no_force(arm):
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
     speed = recording["speed"].values.copy()
     speed[3000:3100] = np.nan
@@ -68,7 +68,7 @@ def test_samples_that_cannot_be_judged_have_no_force(arm):
     assert np.isfinite(found.values[4000:]).all()
 
 
-def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated):
+def test_a_signal_that_is_not_the_contact_torque_of_all_joints_is_refused(arm, gate, simulated):
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
     with pytest.raises(UsageError, match="energy of whole machine is not the contact torque"):
         contact_force(detected(arm, recording, Energy()), arm, POINT)
@@ -86,12 +86,12 @@ def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated
 
 
 @pytest.mark.parametrize("text", ["forearm", "forearm:1,2", "forearm:1,2,x", ":1,2,3", "forearm:1,2,nan"])
-def test_a_point_that_cannot_be_understood_is_refused(text):
+def test_an_invalid_point_is_refused(text):
     with pytest.raises(UsageError, match="LINK:X,Y,Z"):
         ContactPoint.parse(text)
 
 
-def test_detect_tells_the_force_beside_its_alarms(tmp_path):
+def test_detect_shows_the_force_with_its_alarms(tmp_path):
     write_arm_recordings(tmp_path / "logs", {"free": 1, "holdout": 0, "stiff": 1, "soft": 0}, seed=1)
     command = ("detect", tmp_path / "logs/stiff/01.csv", "-m", tmp_path / "logs/machine.toml", "-d", "gm")
     done = cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0")

@@ -46,7 +46,7 @@ def missing_share(curve):
     return float(np.sum(ends - begins)) / curve.end
 
 
-def test_the_course_of_a_rigid_leaf_is_a_half_sine_of_known_peak():
+def test_the_force_curve_of_a_rigid_leaf_is_a_half_sine_of_known_peak():
     curve = force_time_curve(recording(half_sine(TIME)), CONTACT)
     assert curve.peak == pytest.approx(3521.0, abs=1.0)
     assert curve.time[0] == 0.0
@@ -58,7 +58,7 @@ def test_the_course_of_a_rigid_leaf_is_a_half_sine_of_known_peak():
 
 @given(st.floats(-500.0, 500.0), st.sampled_from([-1.0, 1.0]))
 @settings(deadline=None, max_examples=20)
-def test_neither_the_cells_offset_nor_its_sign_changes_the_course(offset, sign):
+def test_offset_and_sign_of_the_cell_do_not_change_the_curve(offset, sign):
     curve = force_time_curve(recording(offset + sign * half_sine(TIME)), CONTACT)
     np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1e-6)
 
@@ -94,7 +94,7 @@ def test_the_inertia_before_the_cell_is_given_back(direction, sign):
     np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1.5)
 
 
-def test_a_mass_without_what_it_takes_is_an_error_that_names_it():
+def test_a_mass_without_the_required_channel_is_an_error_that_names_it():
     force = half_sine(TIME)
     with pytest.raises(RecordingError, match="'acceleration'"):
         force_time_curve(recording(force), CONTACT, 5.0)
@@ -105,7 +105,7 @@ def test_a_mass_without_what_it_takes_is_an_error_that_names_it():
     with pytest.raises(RecordingError, match="not in rad/s2"):
         force_time_curve(recording(force, **turning), CONTACT, 5.0)
     resting = moving() | {"speed": Series(TIME, np.where(TIME > 4.0, SPEED, 0.0), "m/s")}
-    with pytest.raises(RecordingError, match="stands still"):
+    with pytest.raises(RecordingError, match="is at rest"):
         force_time_curve(recording(force, **resting), CONTACT, 5.0)
     silent = moving() | {"acceleration": Series(TIME, np.full(len(TIME), np.nan), "m/s2")}
     with pytest.raises(RecordingError, match="no acceleration"):
@@ -135,7 +135,7 @@ def test_missing_samples_are_left_out_and_counted():
     assert missing_share(curve) == pytest.approx(0.601 / curve.end)
 
 
-def test_a_few_lost_samples_of_a_fast_cell_and_the_rhythm_of_a_slow_one_are_no_hole():
+def test_a_few_lost_samples_and_a_slow_sample_rate_are_not_a_hole():
     force = half_sine(TIME)
     force[3000:3004] = np.nan
     assert missing_share(force_time_curve(recording(force), CONTACT)) == 0.0
@@ -162,7 +162,7 @@ def test_a_cell_at_its_stop_is_marked_there_and_nowhere_else():
     np.testing.assert_array_equal(negative.clipped, curve.clipped)
 
 
-def test_four_equal_readings_or_readings_that_are_held_for_many_rows_are_no_stop():
+def test_four_equal_readings_or_repeated_readings_are_not_a_stop():
     few = half_sine(TIME)
     top = int(np.argmax(few))
     few[top - 1 : top + 3] = few[top]
@@ -173,7 +173,7 @@ def test_four_equal_readings_or_readings_that_are_held_for_many_rows_are_no_stop
     assert not force_time_curve(recording(held), CONTACT).saturated
 
 
-def test_the_course_ends_where_the_next_contact_begins():
+def test_the_curve_ends_at_the_next_contact():
     twice = half_sine(TIME) + half_sine(TIME - 3.0) * 2.0
     curve = force_time_curve(recording(twice), CONTACT, until=5.0)
     assert curve.peak == pytest.approx(PEAK, rel=1e-3)
@@ -181,7 +181,7 @@ def test_the_course_ends_where_the_next_contact_begins():
     assert curve.time[-1] < 3.0
 
 
-def test_a_contact_that_the_cell_did_not_see_has_no_course():
+def test_a_contact_not_measured_by_the_cell_has_no_curve():
     with pytest.raises(RecordingError, match="no load-cell sample after the onset"):
         force_time_curve(recording(half_sine(TIME)), Contact(9.0, 9.5, 0.0))
     with pytest.raises(RecordingError, match="force"):

@@ -43,7 +43,7 @@ def outcomes(verdict: ForceVerdict) -> list[str]:
     return [item.outcome for item in verdict.steps]
 
 
-def test_a_rigid_leaf_of_620_kg_leaves_4_ms_to_stay_below_400_n_and_14_ms_below_1400_n():
+def test_a_rigid_leaf_of_620_kg_exceeds_400_n_after_4_ms_and_1400_n_after_14_ms():
     for profile, budget in ((GAP, 4.0085e-3), (WIDE, 14.398e-3)):
         verdict = judge(leaf(), profile)
         assert outcomes(verdict) == ["fail", "pass", "pass"]
@@ -62,14 +62,14 @@ def test_a_force_at_the_limit_passes_and_just_above_it_fails():
     assert outcomes(judge(pressing(400.1, 150.1, 25.1), GAP)) == ["fail", "fail", "fail"]
 
 
-def test_a_limit_that_comes_to_hold_under_load_is_exceeded_from_that_moment():
+def test_a_limit_that_starts_under_load_is_exceeded_from_its_start():
     verdict = judge(pressing(300.0, 300.0), GAP)
     assert outcomes(verdict) == ["pass", "fail", "pass"]
     assert verdict.time_budget == 0.75
     assert judge(pressing(500.0), GAP).time_budget == 0.0
 
 
-def test_a_record_that_ends_early_is_not_assessable_where_it_is_silent():
+def test_a_record_that_ends_early_is_not_assessable_after_its_end():
     short = TIME <= 1.2
     verdict = judge(curve(pressing(100.0).force[short], TIME[short]), GAP)
     assert outcomes(verdict) == ["pass", "not_assessable", "not_assessable"]
@@ -84,7 +84,7 @@ def test_a_record_that_reaches_the_end_of_a_step_to_a_sample_is_whole():
     assert judge(curve(pressing(100.0).force[short], TIME[short]), GAP).steps[0].outcome == "pass"
 
 
-def test_what_is_exceeded_fails_although_the_record_ends_and_samples_are_missing():
+def test_an_exceeded_limit_fails_despite_missing_samples():
     kept = (TIME < 0.3) & ((TIME < 0.01) | (TIME > 0.03))
     verdict = judge(curve(leaf().force[kept], TIME[kept]), GAP)
     assert verdict.steps[0].outcome == verdict.outcome == "fail"
@@ -103,7 +103,7 @@ def test_samples_that_are_missing_over_a_boundary_concern_both_steps():
     assert outcomes(verdict) == ["not_assessable", "not_assessable", "pass"]
 
 
-def test_behind_missing_samples_the_time_budget_is_counted_from_where_they_begin():
+def test_after_missing_samples_the_time_budget_counts_from_their_beginning():
     kept = (TIME <= 0.002) | (TIME > 0.020)
     assert judge(curve(leaf().force[kept], TIME[kept]), GAP).time_budget == pytest.approx(0.002)
 
@@ -205,7 +205,7 @@ def test_fewer_tests_than_are_averaged_are_not_assessable_and_more_are_all_avera
     assert averaged([], GAP).outcome == "not_assessable"
 
 
-def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails():
+def test_an_unassessable_test_makes_a_step_unassessable_unless_its_mean_fails():
     short = TIME <= 1.2
     cut = judge(curve(pressing(100.0, 600.0).force[short], TIME[short]), with_limits([400.0, 700.0, 25.0]))
     whole = judge(pressing(100.0, 100.0), with_limits([400.0, 700.0, 25.0]))
@@ -220,7 +220,7 @@ def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails()
     assert averaged([loud, loud, cut], lower).steps[1].outcome == "fail"
 
 
-def test_where_each_test_counts_by_itself_the_highest_is_judged_and_nothing_is_averaged_away():
+def test_without_averaging_the_highest_test_counts():
     face = profile_of(read_force_limits(), "iso_ts_15066_face")
     tests = [judge(pressing(force), face) for force in (10.0, 10.0, 70.0)]
     point = averaged(tests, face)

@@ -137,7 +137,7 @@ def test_five_thousand_contacts_take_little_memory():
         ([1.0, math.inf], [0, 1], "mean", "missing or infinite"),
     ],
 )
-def test_wrong_arguments_are_told(values, clusters, statistic, said):
+def test_wrong_arguments_are_reported(values, clusters, statistic, said):
     with pytest.raises(UsageError, match=said) as fault:
         bca(values, clusters, statistic)
     assert fault.value.hint

@@ -77,7 +77,7 @@ def test_no_difference_at_all_is_no_evidence():
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_one_recording_or_none_says_nothing(number):
+def test_one_recording_or_none_is_no_evidence(number):
     values = [3.0] * number
     for found in (
         paired_difference(values, range(number)),
@@ -175,7 +175,7 @@ def test_holms_correction_keeps_the_order_and_lies_between_p_and_bonferroni(p_va
         (lambda: holm([0.5, 1.5]), "outside 0 to 1"),
     ],
 )
-def test_impossible_arguments_are_told(call, said):
+def test_impossible_arguments_are_reported(call, said):
     with pytest.raises(UsageError, match=said) as fault:
         call()
     assert fault.value.hint

@@ -65,7 +65,7 @@ def test_below_six_contacts_no_ranks_do_and_there_is_no_interval(n):
 
 
 @pytest.mark.parametrize("n", range(4, 10))
-def test_what_is_shown_of_few_contacts_with_slow_cases_holds_what_it_says(n):
+def test_the_interval_of_few_contacts_with_slow_cases_has_its_coverage(n):
     rng, held, shown, total = np.random.default_rng(n), 0, 0, 1500
     for _ in range(total):
         values = mixture(rng, n)
@@ -85,7 +85,7 @@ def test_a_missed_contact_is_later_than_all_in_the_upper_bound_and_counts_from_i
     assert (early.low, early.high) == (12.0, math.inf)
 
 
-def test_contacts_of_one_recording_are_alike_so_that_few_recordings_give_no_interval():
+def test_correlated_contacts_of_few_recordings_have_no_interval():
     found = median_of(np.arange(30) + 20.0, [False] * 30, np.arange(30) % 5)
     assert math.isnan(found.low) and found.value == 34.5
     assert "there are 5, and contacts of one recording are alike" in found.reason

@@ -49,7 +49,7 @@ def row(outcome: str, number: int, latency: float | None = None, clipped: bool =
     )
 
 
-def test_it_is_counted_by_itself_and_in_no_other_figure():
+def test_it_is_counted_separately_and_in_no_other_result():
     rows = (row("in_progress", 1), row("detected", 2, 0.0, True), row("detected", 3, 30.0), row("missed", 4))
     results = Results({}, ("gm",), ("stiff",), rows, (), ())
     (item,) = summarise(results)

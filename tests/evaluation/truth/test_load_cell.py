@@ -99,7 +99,7 @@ def test_whatever_the_force_does_at_the_start_its_release_is_never_an_onset(cour
 
 @pytest.mark.parametrize("offset", [300.0, -300.0])
 @pytest.mark.parametrize("peak", [1000.0, -1000.0, 200.0, -200.0])
-def test_a_cell_that_is_not_tared_is_at_rest_as_long_as_it_comes_back(offset, peak):
+def test_an_untared_cell_is_at_rest_if_it_returns_to_its_level(offset, peak):
     (found,) = contacts(T, offset + noise(T) + pulse(T, 5.0, peak=peak))
     assert not found.in_progress
     assert found.start == pytest.approx(5.003, abs=4e-3)
@@ -134,7 +134,7 @@ def test_the_onset_is_within_its_uncertainty_of_the_truth_at_every_rate(rate, ji
 
 @pytest.mark.parametrize(("rate", "jitter"), [(62.5, 0.0), (60, 0.9), (100, 0.0)])
 @pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
-def test_of_a_slow_cell_one_sample_of_157_newtons_is_a_contact(rate, jitter, rule):
+def test_one_sample_of_157_newtons_of_a_slow_cell_is_a_contact(rate, jitter, rule):
     time = clock(rate, jitter)
     force = noise(time)
     hit = int(5.0 * rate)
@@ -143,14 +143,14 @@ def test_of_a_slow_cell_one_sample_of_157_newtons_is_a_contact(rate, jitter, rul
     assert (found.start, found.peak_force) == (time[hit], pytest.approx(157.0, abs=3.0))
 
 
-def test_of_a_cell_of_1_khz_one_sample_is_none_and_three_are_one():
+def test_three_samples_at_1_khz_are_a_contact_and_one_is_not():
     for samples, count in ((1, 0), (2, 0), (3, 1)):
         force = noise(T)
         force[5000 : 5000 + samples] = 157.0
         assert len(contacts(T, force)) == count
 
 
-def test_a_burst_of_noise_is_no_contact_and_hides_none():
+def test_a_burst_of_noise_is_not_a_contact_and_hides_none():
     for seed in range(20):
         burst = np.where((T > 3.0) & (T < 3.03), noise(T, 60.0, 100 + seed), 0.0)
         (found,) = contacts(T, pulse(T, 6.0) + noise(T, seed=seed) + burst)
@@ -166,7 +166,7 @@ def test_an_impact_that_rings_is_a_contact(frequency):
 
 
 @pytest.mark.parametrize("step", [1.0, 5.0, 10.0])
-def test_coarse_steps_and_drift_together_move_the_onset_by_no_more_than_the_steps_say(step):
+def test_coarse_steps_and_drift_shift_the_onset_within_the_step_size(step):
     force = pulse(T, 6.0) + noise(T, 1.0) + DRIFTS["rising, 30 N over 7 s"]
     (found,) = contacts(T, step * np.round(force / step))
     assert found.start == pytest.approx(6.001, abs=2e-3)
@@ -230,7 +230,7 @@ def test_a_rebound_within_the_separation_is_the_same_contact_whatever_the_cell_r
     assert begun.in_progress and begun.end == pytest.approx(1.3, abs=3e-3)
 
 
-def test_a_cell_whose_rest_shifts_in_the_contact_is_not_taken_for_one_that_began_in_it():
+def test_a_shift_of_rest_during_a_contact_is_not_a_contact_in_progress():
     """The pushes of the UR10e: friction keeps a part of what was felt."""
     for before, after in ((-29.0, -25.0), (30.0, 20.0)):
         (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
@@ -255,7 +255,7 @@ def test_a_short_contact_is_found_where_the_cell_rests_at_one_constant_reading(r
 
 
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0, 50.0])
-def test_no_flicker_of_a_coarse_cell_is_a_contact_beside_one_that_it_felt(step):
+def test_flicker_of_a_coarse_cell_is_not_a_contact_next_to_a_real_one(step):
     time = clock(62.5)
     force = step * np.round(pulse(time, 6.0, peak=60.0 * step) / step)
     force[[100, 200, 201, 300]] += step * np.array([1.0, 1.0, 1.0, -1.0])
@@ -281,7 +281,7 @@ def test_a_cell_that_is_not_tared_is_at_rest_where_the_log_ends_in_a_contact_aga
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("offset", [200.0, 291.0, 400.0])
-def test_a_touch_that_is_held_before_the_impact_is_no_release_to_zero(offset, sign):
+def test_a_touch_held_before_the_impact_is_not_a_release(offset, sign):
     """The soft impacts of the gate: the guard is pressed to its stop at 290 N, and then hit."""
     felt = np.interp(T, [6.0, 6.1, 6.35, 6.7, 7.2], [0.0, 290.0, 290.0, 2466.0, 600.0])
     kept = T < 7.2

@@ -52,7 +52,7 @@ def test_a_hole_over_the_onset_is_in_its_uncertainty_and_marked(begin, end, own_
 
 
 @pytest.mark.parametrize("own_clock", [False, True])
-def test_a_rebound_after_a_hole_that_hid_the_first_touch_is_not_taken_for_the_onset(own_clock):
+def test_a_rebound_after_a_hole_over_the_first_touch_is_not_the_onset(own_clock):
     force = bump(TIME) + np.where(TIME > ONSET + 0.3, bump(TIME, 400.0, ONSET + 0.4), 0.0)
     (contact,) = find_contacts(recording(force, ONSET - 0.02, ONSET + 0.22, own_clock), RULE)
     assert contact.start == pytest.approx(ONSET + 0.4, abs=3e-3)
@@ -74,7 +74,7 @@ def test_without_a_hole_and_with_single_samples_lost_nothing_is_marked():
         assert judge(force_time_curve(one, contact), LENIENT).outcome == "pass"
 
 
-def test_a_slow_cell_with_jitter_and_one_sample_lost_is_judged_unless_the_limit_is_near():
+def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the_limit():
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 9.0, 1 / 60)
     time = time + rng.uniform(-0.4, 0.4, len(time)) / 60
@@ -103,7 +103,7 @@ def test_a_hole_as_long_as_the_window_makes_the_contact_not_assessable():
 
 @pytest.mark.parametrize("own_clock", [False, True])
 @pytest.mark.parametrize("begin, end", [(-0.003, 0.138), (-0.05, 0.1), (0.05, 0.17), (-0.003, 0.186), (0.08, 0.12)])
-def test_a_force_that_nobody_saw_never_passes(begin, end, own_clock):
+def test_an_unmeasured_force_never_passes(begin, end, own_clock):
     one = recording(bump(TIME), ONSET + begin, ONSET + end, own_clock)
     (contact,) = find_contacts(one, RULE)
     curve = force_time_curve(one, contact)
@@ -113,7 +113,7 @@ def test_a_force_that_nobody_saw_never_passes(begin, end, own_clock):
     assert curve.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
 
 
-def test_a_violation_that_was_seen_stands():
+def test_a_measured_violation_counts():
     one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
     (contact,) = find_contacts(one, RULE)
     verdict = judge(force_time_curve(one, contact), PROFILE)
@@ -133,7 +133,7 @@ def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
     assert "onset" in verdict.steps[1].reason
 
 
-def test_a_cell_that_begins_shortly_before_the_contact_is_warned_of_and_one_that_was_masked_there_is_a_hole():
+def test_a_cell_starting_just_before_the_contact_is_a_warning_and_a_masked_one_a_hole():
     lost = TIME < ONSET + 0.3
     force = bump(TIME) + np.where(TIME > ONSET + 0.3, bump(TIME, 400.0, ONSET + 0.6), 0.0)
     cell = Series(TIME[~lost], force[~lost], "N")
@@ -156,7 +156,7 @@ def test_samples_that_are_stamped_in_batches_have_onsets_no_finer_than_a_batch()
     assert contact.start - contact.uncertainty <= ONSET + 1e-3 and contact.resolution >= 9e-3
 
 
-def test_a_cell_that_ends_in_the_contact_while_the_log_goes_on_gives_no_pass():
+def test_a_cell_that_ends_during_the_contact_prevents_a_pass():
     for end, outcome in ((ONSET + 0.05, "not_assessable"), (ONSET + 0.25, "pass")):
         kept = end > TIME
         cell = Series(TIME[kept], bump(TIME)[kept], "N")

@@ -58,7 +58,7 @@ def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset)
 
 
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
-def test_of_a_load_cell_without_noise_a_contact_begins_above_eight_deviations_of_its_rounding(step):
+def test_without_noise_a_contact_begins_above_eight_deviations_of_the_rounding(step):
     heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms from 2 s on
     (contact,) = find_contacts(recording(heights), OnsetRule())
     assert 8.0 / np.sqrt(12.0) == pytest.approx(2.309, abs=1e-3)
@@ -75,7 +75,7 @@ def test_steps_finer_than_the_noise_change_nothing():
     assert (stepped.start, stepped.end) == (smooth.start, smooth.end)
 
 
-def test_what_arithmetic_rounds_is_no_step_of_the_load_cell():
+def test_rounding_errors_are_not_steps_of_the_load_cell():
     reading = np.zeros(4000)
     reading[2000:2010] = 3.0
     reading[3000:3010] = 3.0 * (1.0 + 1e-15)
@@ -101,7 +101,7 @@ def test_a_contact_from_the_first_sample_on_is_in_progress_until_its_release():
     assert contact.peak_force == 500.0
 
 
-def test_labels_serve_where_there_is_no_load_cell():
+def test_labels_replace_a_missing_load_cell():
     label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
     (contact,) = find_contacts(recording(label, "label"), GATE_RULE)
     assert (contact.start, contact.end) == (pytest.approx(1.001), pytest.approx(1.5))

@@ -18,7 +18,7 @@ def read(folder: Path, text: str | bytes) -> TriggerFile:
     return read_triggers(path)
 
 
-def test_rows_are_alarms_quiet_recordings_and_stretches_without_sight(tmp_path):
+def test_rows_are_alarms_recordings_without_alarms_and_unassessable_sections(tmp_path):
     rows = "a.csv,1.5,gm,\na.csv,2.5,gm,\na.csv,3,gm,4.5\nb.csv,,gm,\nb.csv,0.5,edge,\n"
     given = read(tmp_path, HEADER + rows)
     assert given.rows["gm"] == {"a.csv": Triggered([1.5, 2.5], [(3.0, 4.5)]), "b.csv": Triggered()}
@@ -26,7 +26,7 @@ def test_rows_are_alarms_quiet_recordings_and_stretches_without_sight(tmp_path):
     assert list(given.rows) == ["gm", "edge"]
 
 
-def test_without_a_detector_the_files_own_name_stands_for_it(tmp_path):
+def test_without_a_detector_the_file_name_is_used(tmp_path):
     assert list(read(tmp_path, "recording,time_s\na.csv,1\n").rows) == ["plc"]
     assert list(read(tmp_path, "recording,time_s,detector\na.csv,1, \n").rows) == ["plc"]
 
@@ -79,6 +79,6 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, said):
     assert "plc.csv" in fault.value.message and fault.value.hint
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match=r"none\.csv"):
         read_triggers(tmp_path / "none.csv")

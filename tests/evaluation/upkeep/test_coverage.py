@@ -29,7 +29,7 @@ def coverage(**changed: object) -> Coverage:
 
 
 @pytest.mark.parametrize("alignment", ["time", "position", "time_then_position"])
-def test_taking_a_run_out_gives_what_learning_from_the_others_gives(alignment):
+def test_removing_a_run_equals_learning_from_the_others(alignment):
     rule = replace(RULE, alignment=alignment)
     bare = [(item.recording, found) for item, found in RUNS]
     whole = rule.fit(bare)
@@ -85,7 +85,7 @@ def test_the_verdict_says_how_many_runs_or_which_factor():
     assert "14 assessable runs: too few" in coverage(chance=math.nan).verdict
 
 
-def test_a_part_without_a_limit_is_told_with_its_place_and_the_share_of_runs():
+def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs():
     blind = season(14)
     for _, signal in blind[:5]:
         signal.status[2400:2600] = Status.GAP
@@ -111,14 +111,14 @@ def test_while_accelerating_a_part_without_a_limit_is_a_time():
     assert {item.axis for item in gaps_of(learned(blind))} == {"time", "travel"}
 
 
-def test_a_run_that_can_be_judged_nowhere_is_named_and_not_counted():
+def test_an_unassessable_run_is_named_and_not_counted():
     blind = season(14)
     blind[3][1].status[:] = Status.NOT_APPLICABLE
     found = check_coverage(blind, RULE, ACTIVATION)
     assert found.not_assessable == ("run3",) and len(found.runs) == 13
 
 
-def test_too_few_runs_and_a_target_that_is_no_chance_are_refused():
+def test_too_few_runs_and_an_invalid_target_are_refused():
     with pytest.raises(SignatureError, match="2 runs to judge by the others"):
         check_coverage(RUNS[:2], replace(RULE, force=True), ACTIVATION)
     with pytest.raises(SignatureError, match="9 impact-free runs"):

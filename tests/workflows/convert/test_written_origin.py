@@ -79,7 +79,7 @@ def test_info_shows_the_same_times_of_a_converted_table(tmp_path):
     ],
     ids=["written", "edited", "no number", "in a comment of another's", "none"],
 )
-def test_only_a_head_that_convert_wrote_tells_the_start(head, origin, tmp_path):
+def test_only_a_header_written_by_convert_states_the_start(head, origin, tmp_path):
     (tmp_path / "log.csv").write_text(head + "t [s],v\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50)))
     assert LogRows(tmp_path / "log.csv").origin == origin
     assert list(survey(tmp_path / "log.csv").columns) == ["t [s]", "v"]

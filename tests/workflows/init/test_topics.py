@@ -61,7 +61,7 @@ def test_units_in_the_names_of_fields_are_read_and_the_ratio_makes_them_certain(
         ("", False),
     ],
 )
-def test_si_units_are_said_of_known_types_only(name, known):
+def test_si_units_are_assumed_only_for_known_types(name, known):
     assert is_si(name) is known
 
 
@@ -84,7 +84,7 @@ def test_a_known_type_whose_numbers_are_not_in_si_units_is_marked(tmp_path):
     assert "must be 1 in SI units" in draft.said("position") and draft.checked("speed")
 
 
-def test_a_sensor_of_forces_never_gives_the_torque(tmp_path):
+def test_a_force_sensor_is_never_the_torque(tmp_path):
     """Its torque moves here, and is named so."""
     run = stroke()
     path = tmp_path / "a.mcap"
@@ -96,7 +96,7 @@ def test_a_sensor_of_forces_never_gives_the_torque(tmp_path):
     assert draft.channels["speed"]["topic"] == "/rpm" and draft.checked("speed")
 
 
-def test_topics_that_tell_of_no_channel_stand_in_the_file_as_comments(tmp_path):
+def test_unrecognised_topics_are_comments_in_the_file(tmp_path):
     run = stroke()
     path = write_json(tmp_path / "a.mcap", {"box": {"alpha": np.sin(run.time), "beta": np.sin(run.time) ** 2}})
     draft = drafted(path, tmp_path)

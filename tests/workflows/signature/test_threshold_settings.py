@@ -81,7 +81,7 @@ def test_what_the_signature_learns_is_set_in_its_own_table(door):
     assert rule.signature.position_step == 0.01 and rule.signature.alignment == "position"
 
 
-def test_limits_set_by_hand_stand_instead_of_what_the_runs_teach_and_results_say_so(door):
+def test_limits_set_by_hand_replace_learned_ones_and_results_state_it(door):
     setup = read_benchmark_file(written(door, '[threshold]\nname = "limit"\nlimits = 50\n'))
     assert setup.rule == Limit(limits=(50,)) and setup.limits_by_hand == (50,)
     done = cdtool.benchmark(setup)
@@ -92,7 +92,7 @@ def test_limits_set_by_hand_stand_instead_of_what_the_runs_teach_and_results_say
     assert 50.0 not in {row.limit for row in learned.contacts}
 
 
-def test_results_say_in_which_unit_the_statistic_is(door):
+def test_results_state_the_unit_of_the_statistic(door):
     units = cdtool.benchmark(written(door, 'threshold = "cusum"\n')).results.provenance["units"]
     assert units == {"momentum": "1"}
     units = cdtool.benchmark(written(door, 'threshold = "trend"\n')).results.provenance["units"]
@@ -174,7 +174,7 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
     assert found.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
 
 
-def test_a_factor_set_by_hand_is_refused_beside_a_budget_and_told_without_one(door):
+def test_a_factor_set_by_hand_is_refused_with_a_budget_and_shown_without(door):
     machine, logs = door / "machine.toml", [door / "free.csv"]
     with pytest.raises(UsageError, match="set by hand cannot be combined with a false-alarm budget 1/8op"):
         cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion", false_alarm_budget="1/8op")
