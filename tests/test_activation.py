@@ -1,4 +1,4 @@
-"""Debounce, re-arming and the handling of samples that cannot be judged."""
+"""Debounce, re-arming and the handling of samples that are not assessable."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_a_wrong_setting_is_refused_by_its_name(settings, said):
 
 
 def judged(values, activation):
-    """Alarms and crossings [samples] of values against -1 and 1, through a threshold as the pipeline does it."""
+    """Return alarms and crossings [samples] of values with limits -1 and 1, through a threshold as in the pipeline."""
     values = np.asarray(values, dtype=float).reshape(-1, 1)
     time = np.arange(len(values)) * 1e-3
     recording = Recording("r", "r", ("a",), {"speed": Series(time, np.ones(values.shape), "m/s")})
@@ -98,7 +98,7 @@ def judged(values, activation):
     return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
 
 
-# Out of the band, then 0.6 s just inside it, out again, 0.6 s far inside, and out once more.
+# Outside the band, then 0.6 s just inside it, outside again, 0.6 s far inside, and outside once more.
 DWELLING = [2.0] * 5 + [0.9] * 600 + [2.0] * 5 + [0.1] * 600 + [2.0] * 5
 
 
@@ -192,7 +192,7 @@ def test_no_alarm_comes_before_the_one_before_it_is_armed_again(samples, debounc
     for i, alarm in enumerate(raised):
         assert alarm.time < again[i]
         assert i + 1 == len(raised) or again[i] < raised[i + 1].time
-    # Cut where the last one is armed again, nothing but that sample is missing for it.
+    # Cut at the last re-arming, only that sample is missing for it.
     if raised and np.isfinite(again[-1]):
         k = round(again[-1] / 1e-3)
         assert rearmed(values[:k], status[:k], debounce, rearm=4e-3)[1][-1:] in ((np.inf,), again[-2:-1])

@@ -1,4 +1,4 @@
-"""The nearest float64 to a decimal number: as Python's float() has it, bit for bit."""
+"""The nearest float64 to a decimal number, bit for bit as Python's float()."""
 
 from __future__ import annotations
 

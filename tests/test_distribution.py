@@ -1,4 +1,4 @@
-"""Quantiles of more values than memory holds."""
+"""Quantiles of more values than memory can hold."""
 
 from __future__ import annotations
 

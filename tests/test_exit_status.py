@@ -1,4 +1,4 @@
-"""Exit statuses: one place decides from facts, and docs and help say what the code does."""
+"""Exit statuses: derived from facts in one place, and documented as in the code."""
 
 from __future__ import annotations
 

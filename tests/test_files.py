@@ -1,4 +1,4 @@
-"""The one safe write: links, locks, modes, leftovers, signals, whole folders."""
+"""Safe writing: links, locks, modes, leftover files, signals, whole folders."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_an_existing_file_keeps_its_mode(tmp_path, mode):
     path.write_text("old")
     path.chmod(mode)
     with replaced(path) as (part,):
-        assert stat.S_IMODE(part.stat().st_mode) & ~mode & 0o077 == 0  # no more readers meanwhile than it had
+        assert stat.S_IMODE(part.stat().st_mode) & ~mode & 0o077 == 0  # no additional readers meanwhile
         part.write_text("new")
     assert stat.S_IMODE(path.stat().st_mode) == mode and path.read_text() == "new"
 
@@ -179,7 +179,7 @@ def test_one_writer_of_a_file_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr(file_locks, "LOCK_SECONDS", 0.05)
     with locked(tmp_path / "a.json") as target:
         assert target == (tmp_path / "a.json").resolve()
-        write_text(target, "mine")  # under the lock that this thread holds
+        write_text(target, "mine")  # under the lock held by this thread
         told: list[Exception] = []
 
         def other() -> None:

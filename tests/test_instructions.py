@@ -1,4 +1,4 @@
-"""Instructions in kernels: prefetch changes nothing, wherever it points; store writes what it is given, there only."""
+"""Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address."""
 
 from __future__ import annotations
 

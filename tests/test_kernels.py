@@ -1,4 +1,4 @@
-"""Compiled kernels: lazy, linked, cached, and without a cache where none can be written."""
+"""Compiled kernels: lazy, linked, cached, and without a writable cache."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_arrays_in_a_named_tuple_are_read_only_and_not_copied():
 
 @pytest.fixture
 def no_cache_folder(monkeypatch):
-    """As in a read-only installation with a read-only home: numba finds nowhere to put its cache."""
+    """As in a read-only installation with a read-only home: numba has no writable cache."""
     from numba.core import caching
 
     implementation = getattr(caching, "_CacheImpl", None) or caching.CacheImpl

@@ -1,4 +1,4 @@
-"""machine.toml: what is accepted, and that every refusal names the key and what is allowed."""
+"""machine.toml: accepted content, and errors that name the key and what is allowed."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_the_example_of_the_documentation_is_read(tmp_path):
         ('time = { column = "t", unit = "ms" }', "", "channels.time", "is missing"),
         ('unit = "ms"', 'unit = "mm"', "channels.time.unit", "unit of time"),
         ('column = "phi"', "column = -1", "channels.position.column", "counted from 0"),
-        ('column = "phi"', 'columns = ["a", "b"]', "channels.position.columns", "1 are needed"),
+        ('column = "phi"', 'columns = ["a", "b"]', "channels.position.columns", "give 1"),
         ('field = "position[0]"', 'feild = "position[0]"', "channels.mcap.position.field", "missing"),
         ("[detectors.friction_ekf]", "[detectors.friction]", "detectors.friction", "friction_ekf"),
         ("minimum_speed = 0.02", "minimum_sped = 0.02", "minimum_sped", "minimum_speed"),
@@ -146,7 +146,7 @@ def test_a_motor_voltage_can_replace_the_torque(tmp_path):
 
 def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
     text = MACHINE + CHANNELS + "[detectors.feekf]\nminimum_speed = 0.04\n"
-    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*friction_ekf again"):
+    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*repeats friction_ekf"):
         read(tmp_path, text)
 
 

@@ -1,4 +1,4 @@
-"""Cutting and classing of strokes."""
+"""Division into strokes and their classes."""
 
 from __future__ import annotations
 

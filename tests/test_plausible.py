@@ -1,4 +1,4 @@
-"""Values that no sensor gives are masked, counted and a loss, and real contacts are not."""
+"""Values that no sensor can measure are masked, counted and reported as a loss; real contacts are not."""
 
 from __future__ import annotations
 
@@ -69,7 +69,9 @@ def test_a_peak_of_hundreds_of_spreads_is_a_contact_and_not_masked(runs, factor)
         series = free[0].recording[channel]
         peak = factor * np.nanstd(series.values)
         log = free[0]
-        for k, share in enumerate(np.sin(np.linspace(0.1, 3.0, 12)).tolist()):  # it rises and falls within some samples
+        for k, share in enumerate(
+            np.sin(np.linspace(0.1, 3.0, 12)).tolist()
+        ):  # it rises and falls within a few samples
             log = with_values(log, channel, slice(100 + k, 101 + k), peak * share)
         assert not masked(ranges, log)[channel].any(), channel
 
@@ -90,7 +92,7 @@ def test_an_impossible_value_is_masked_only_in_its_own_row(runs, channel, raw, r
 
 @pytest.mark.parametrize("raw", [-32768.0, 32767.0, 65535.0])
 def test_the_end_of_an_integer_that_fills_a_gap_is_masked(raw):
-    """Counts of an int16 that stay within some hundred, as a drive's torque in thousandths does."""
+    """Counts of an int16 that stay within some hundred, like a drive's torque in per mille."""
     rng = np.random.default_rng(1)
     free = logged(FOLDERS[0], "free")[:3]
     counts = [np.rint(300.0 * np.sin(np.arange(500) / 40.0) + rng.normal(0.0, 5.0, 500)) for _ in free]
@@ -114,7 +116,7 @@ def test_a_position_whose_counter_wraps_is_masked_until_it_is_back():
         return LoggedRecording(replace(free.recording, channels=channels), {"position": (1e-3,)}, 50.0)
 
     ranges = learned_of([log(stroke)] * 3)
-    wrapped = np.mod(stroke + 20000.0 + 2.0**15, 2.0**16) - 2.0**15  # as an int16 that starts at 20,000
+    wrapped = np.mod(stroke + 20000.0 + 2.0**15, 2.0**16) - 2.0**15  # like an int16 that starts at 20,000
     assert (np.abs(np.diff(wrapped)) > 60000.0).sum() == 2
     found = masked(ranges, log(wrapped))["position"][:, 0]
     assert np.array_equal(found, wrapped < 0.0)
@@ -159,7 +161,7 @@ def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
 
 
 def strokes(*starts: float, stuck: slice | None = None) -> Series:
-    """One stroke of 20 rad after another, each from its own start, with rests; stuck at 0 where asked."""
+    """Consecutive strokes of 20 rad, each from its own start, with rests; constant at 0 on request."""
     shape = np.concatenate((np.zeros(50), np.linspace(0.0, 20.0, 400), np.full(50, 20.0)))
     values = np.concatenate([start + shape for start in starts])
     if stuck:
@@ -181,7 +183,7 @@ def test_a_reset_encoder_is_read_from_its_new_zero_once_it_moves():
     free = logged(FOLDERS[0], "free")[0]
     found, words = masked_position(free, strokes(0.0, 0.0, 0.0))
     rows = np.flatnonzero(found)
-    # Behind each leap: the rest, and until it has moved by a fiftieth of what runs move.
+    # After each leap: the rest, and until it has moved by a fiftieth of the runs' travel.
     for leap in (500, 1000):
         own = rows[(rows >= leap) & (rows < leap + 500)]
         assert own[0] == leap and 55 <= len(own) <= 65 and np.array_equal(own, np.arange(leap, leap + len(own)))

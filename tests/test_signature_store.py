@@ -76,7 +76,7 @@ def test_a_file_of_version_3_is_still_read_and_has_no_normal_motions(tmp_path, l
     path.write_text(json.dumps({**values, "schema_version": 3}))
     loaded = read_signature(path)
     assert loaded.normal is None and loaded.current[0].to_dict() == learned.current[0].to_dict()
-    write_signature(path, loaded)  # an update: version 4 from now on, and still nothing to compare with
+    write_signature(path, loaded)  # an update: now version 4, still without normal motions
     assert json.loads(path.read_text())["schema_version"] == 4 and read_signature(path).normal is None
 
 
@@ -162,7 +162,7 @@ def test_concurrent_updates_lose_no_run(tmp_path, learned):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="links as POSIX has them")
 def test_eight_processes_that_update_by_three_paths_one_of_them_a_link_lose_no_run(tmp_path, learned):
-    """48 runs, six by each process; through the link 20 of them were lost."""
+    """48 runs, six per process; without following the link, 20 of them were lost."""
     (tmp_path / "store").mkdir()
     path = tmp_path / "store" / "s.json"
     write_signature(path, learned)

@@ -1,4 +1,4 @@
-"""benchmarks/delay_bound.py: Lorden's bound on closed forms, and Page's sum against it."""
+"""benchmarks/delay_bound.py: Lorden's bound on closed forms, and Page's sum compared with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PERIOD = 1e-3
 
 
 def loaded() -> dict[str, Any]:
-    """The script's names; it looks for its neighbours in its own folder."""
+    """The script's names; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(BENCHMARKS))
     try:

@@ -1,4 +1,4 @@
-"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py tries five and 100 alarms."""
+"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py uses five and 100 alarms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "explain_causes.py"
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:

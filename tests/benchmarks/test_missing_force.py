@@ -1,4 +1,4 @@
-"""Missing load-cell samples on a dozen drawn contacts; benchmarks/missing_force.py tries 200."""
+"""Missing load-cell samples on a dozen random contacts; benchmarks/missing_force.py uses 200."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "missing_force.py"
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:

@@ -1,4 +1,4 @@
-"""benchmarks/structure.py on small packages that are written here, and on the logs that it makes."""
+"""benchmarks/structure.py on small generated packages, and on its own generated logs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _numbers = itertools.count()
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:
@@ -38,7 +38,7 @@ def script() -> ModuleType:
 
 @pytest.fixture
 def package(tmp_path: Path) -> Callable[..., Path]:
-    """Writes a package of files by their paths below it, where PKG stands for its name."""
+    """Write a package of files by their paths below it, where PKG stands for its name."""
 
     def write(files: Mapping[str, str], name: str = "pkg") -> Path:
         root = tmp_path / name
@@ -246,7 +246,7 @@ READING = {
 def calls(
     script: ModuleType, package: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., list[tuple[str, str, str]]]:
-    """The calls that reading by the package above makes."""
+    """The calls made when the package above reads."""
 
     def record(utility: str = "", method: str = "") -> list[tuple[str, str, str]]:
         root = package(READING, f"made_for_walk_{next(_numbers)}")

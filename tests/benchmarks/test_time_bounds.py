@@ -1,4 +1,4 @@
-"""benchmarks/time_bounds.py: what the tests note, and what is said of it."""
+"""benchmarks/time_bounds.py: the times recorded by tests, and their report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bad input: one clear line naming file, row or key and the next step; no traceback; the other files go on."""
+"""Bad input: one clear line with file, row or key and the next step; no traceback; other files are processed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_bad_file_is_one_line_with_its_name_and_a_next_step(detect, tmp_path, 
     assert done.status == 2, done
     assert done.out == "" and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert all(word in done.err for word in words), done.err
-    assert done.err.rstrip().endswith(")"), done.err  # the next step stands in brackets
+    assert done.err.rstrip().endswith(")"), done.err  # the next step is in brackets
 
 
 def test_other_files_are_processed_and_the_last_line_counts_those_left_out(detect, tmp_path, gate_folder):

@@ -1,4 +1,4 @@
-"""Robots described wrongly: one clear line, status 2, no traceback, and never a silent permutation of joints."""
+"""Wrong robot descriptions: one clear line, status 2, no traceback, and never a silent permutation of joints."""
 
 from __future__ import annotations
 

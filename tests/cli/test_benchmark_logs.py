@@ -1,4 +1,4 @@
-"""Logs that a benchmark file or a label file names: each has to be one that is scored, and only once."""
+"""Logs named in a benchmark file or a label file must be scored, and only once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ONSET = '[onset]\nlabels = "labels.csv"\n'
 
 @pytest.fixture
 def read(gate_folder: Path, tmp_path: Path):
-    """read(*tables): the benchmark file of these tables beside the logs of the gate."""
+    """read(*tables): the benchmark file with these tables for the logs of the gate."""
     for name in ("free", "stiff", "soft", "holdout", "machine.toml"):
         (tmp_path / name).symlink_to(gate_folder / name)
 

@@ -1,4 +1,4 @@
-"""The commands as a user meets them: what they print, write and return."""
+"""The commands from a user's view: what they print, write and return."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp
 def test_a_log_at_another_speed_is_assessable_while_it_may_be_a_contact(gate_folder, feekf_signature, tmp_path):
     write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
-    # The class that it fitted while it began to move judges it for 1 s more; from then on nothing does, and it says so.
+    # The class that matched at the start of the motion applies for 1 s more; then none applies, which is reported.
     said = " ".join(done.out.split())
     assert done.status == 0 and re.search(r"1\.9\d to 8\.20 s \(0\.18\d? to 1\.45 m\) other speed", said)
 

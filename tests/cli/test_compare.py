@@ -1,4 +1,4 @@
-"""`cdtool compare` as a pipeline meets it: exit status, table, JSON, Markdown."""
+"""`cdtool compare` in a pipeline: exit status, table, JSON, Markdown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cdtool compare` shows few contacts as `cdtool benchmark` does, and says so where it is given one file twice."""
+"""`cdtool compare` shows few contacts as `cdtool benchmark` does, and reports a file compared with itself."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.command import cdtool
 
 @pytest.fixture(scope="module")
 def results(gate_folder, tmp_path_factory):
-    """Results of two contacts a group, and the same with every latency of the first half as long again."""
+    """Results of two contacts per group, and the same with every latency of the first half 50 % longer."""
     path = tmp_path_factory.mktemp("results") / "old.json"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "gm,pt", "-o", path)
     assert done.status == 0, done.err
@@ -34,7 +34,7 @@ def test_fewer_than_ten_contacts_show_a_median_with_its_range(results, tmp_path)
     for row in rows:
         for item in (item for item in row["questions"] if item["figure"] == "latency_ms"):
             values = latencies[row["detector"], row["group"]]
-            assert item["old"] == pytest.approx(sum(values) / 2)  # of two the median is the mean
+            assert item["old"] == pytest.approx(sum(values) / 2)  # the median of two values is their mean
             assert item["ranges"][0] == [min(values), max(values)]
     screen = cdtool("compare", old, new).out
     reason = "Fewer than 10 contacts detected: median and range, no mean, std or P95."

@@ -1,4 +1,4 @@
-"""What every command shares in a terminal: lines that fit it, and an end by Ctrl-C that is said."""
+"""Common terminal output of the commands: lines that fit, and a message for Ctrl-C."""
 
 from __future__ import annotations
 

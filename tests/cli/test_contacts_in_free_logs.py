@@ -1,4 +1,4 @@
-"""An impact log among the impact-free ones is left out by name; a label file or a level by hand decides otherwise."""
+"""An impact log among the impact-free ones is left out by name, unless a label file or a manual level accepts it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHOWN = "the load cell shows a contact of "
 
 @pytest.fixture(scope="module")
 def mixed(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of 3 impact-free logs in which an impact has been put away wrongly, a hold-out with another."""
+    """A folder of 3 impact-free logs with an impact added by mistake, and a hold-out with another."""
     folder = tmp_path_factory.mktemp("mixed")
     copies = {"free/01.csv": "free/01.csv", "free/02.csv": "free/02.csv", "free/03.csv": "free/03.csv"}
     copies |= {"stiff/01.csv": "free/04.csv", "holdout/01.csv": "holdout/01.csv", "stiff/02.csv": "holdout/02.csv"}

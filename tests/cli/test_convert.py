@@ -1,4 +1,4 @@
-"""`cdtool convert` as a user meets it."""
+"""`cdtool convert` from a user's view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A log of which a part is lost was not left out: it is used as far as it goes, and said to be damaged."""
+"""A partly lost log is not left out: its intact part is used, and it is reported as damaged."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.command import cdtool
 
 @pytest.fixture
 def cut(gate_folder: Path, tmp_path: Path):
-    """cut(seconds): the first seconds of an impact log, its last line cut off."""
+    """cut(seconds): the first seconds of an impact log, with an incomplete last line."""
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
 
     def make(seconds: float, name: str = "cut.csv") -> Path:
@@ -42,7 +42,7 @@ def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(
     machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     whole = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine)
     (row,) = [line for line in whole.out.splitlines() if " alarm " in line]
-    ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log counts ms
+    ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log is in ms
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
     place = lines[0].split(",").index("load_cell")
     cells = [line.split(",") for line in lines[1:]]
@@ -76,7 +76,7 @@ def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cu
 
 
 def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:
-    """A benchmark of that log beside a whole one, on 3 impact-free logs."""
+    """A benchmark of that log and an intact one, learned from 3 impact-free logs."""
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/02.csv", "machine.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(gate_folder / name, tmp_path / name)

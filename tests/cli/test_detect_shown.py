@@ -1,4 +1,4 @@
-"""What `cdtool detect` says of an alarm that detected no contact: one more of the same contact, or one without any."""
+"""`cdtool detect` on an alarm without a detection: a repeated alarm of the same contact, or one without a contact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ONSET = 5.0
 
 
 def detected(bursts: Sequence[tuple[int, float, float]], pressed: float = 0.4) -> Detected:
-    """Two joints whose torque leaves its limit in `bursts` (joint, from s, to s); the load cell is pressed from 5 s."""
+    """Two joints whose torque exceeds its limit in `bursts` (joint, from s, to s), with a contact from 5 s."""
     time = np.arange(0.0, 10.0, 2e-3)
     torque = np.zeros((len(time), 2))
     for joint, start, end in bursts:

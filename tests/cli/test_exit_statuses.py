@@ -1,4 +1,4 @@
-"""Every command is driven into each status that it can have; the list of them is the code's own."""
+"""Every command is tested for each of its exit statuses, from the list in the code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LATENCIES = [40.0 + 0.1 * i for i in range(30)]
 
 
 class Folder:
-    """Files that drive a command into a status."""
+    """Files that cause each status of a command."""
 
     def __init__(self, path: Path, gate: Path, signature: Path) -> None:
         self.path, self.gate, self.signature = path, gate, signature
@@ -62,7 +62,7 @@ class Folder:
         return path
 
     def profiles(self, stiff_until_s: float) -> str:
-        """A profile that every contact keeps; that of the group stiff ends only at that time."""
+        """A profile met by every contact; that of the group stiff ends at the given time."""
         step = '{{ from_s = {0}, at_most_n = 1e6, name = "{1}" }}'
         easy, late = step.format(0.0, "first"), step.format(stiff_until_s, "second")
         text = f'[easy]\ntitle = "t"\nsource = "s"\nsteps = [{easy}]\n'

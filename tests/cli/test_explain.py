@@ -1,4 +1,4 @@
-"""`cdtool explain` as a user meets it."""
+"""`cdtool explain` from a user's view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def explain(gate_folder: Path) -> Callable[..., Outcome]:
 
 
 def margins(text: str) -> list[list[float]]:
-    """The rows of numbers of the tables that are printed."""
+    """The number rows of the printed tables."""
     rows = [line.split() for line in text.splitlines()]
     return [[float(cell) for cell in row] for row in rows if row and all(is_number(cell) for cell in row)]
 
@@ -59,7 +59,7 @@ def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_move
     rows = margins(done.out)
     assert [row[1] for row in rows if row[0] != 0.0] == pytest.approx([-100, -50, -20, -10, -5, 0])
     for _, _, signal, limit, margin, share in rows:
-        assert margin == pytest.approx(limit - signal, abs=1.1)  # four digits of each are printed
+        assert margin == pytest.approx(limit - signal, abs=1.1)  # both are printed with four digits
         assert (margin < 0.0) == (share > 100.0)
     assert max(map(len, done.out.splitlines())) <= 100
     assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
@@ -159,7 +159,7 @@ def test_an_arm_is_explained_joint_by_joint():
     (alarm,) = json.loads(done.out)["alarms"]
     assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
     assert alarm["moved"][0]["channel"] == "acceleration"
-    assert "position" in alarm["detector_reads"]  # the model of coupled links needs the pose
+    assert "position" in alarm["detector_reads"]  # a model of coupled links requires the pose
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "from 1 to")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
-        # The figure's folder is looked at before the log is.
+        # The figure's folder is checked before the log.
         ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "make")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),

@@ -1,4 +1,4 @@
-"""What is wrong with a log itself is reported alike by every command, once, as what it is."""
+"""Findings on a log are the same in every command, and reported once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_a_masked_value_is_counted_once(gate_folder, tmp_path, value, what):
 
 
 def _of(text: str, word: str) -> set[str]:
-    """What is said of one log in lines that begin with a word, without the log's name."""
+    """The lines about one log that begin with a word, without the log's name."""
     lines = (line for line in text.splitlines() if line.startswith(f"{word}: "))
     return {line.removeprefix(f"{word}: ").partition(".csv: ")[2] or line.removeprefix(f"{word}: ") for line in lines}
 

@@ -1,4 +1,4 @@
-"""Hostile input of every kind to the real command: one line, a documented exit status, no traceback, bounded memory."""
+"""Hostile input of every kind: one line, a documented exit status, no traceback, bounded memory."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GATE = ROOT / "sample_logs" / "gate"
 MACHINE = (GATE / "machine.toml").read_text(encoding="utf-8")
 SECONDS, MIB = 5.0, 300
 LONGEST_LINE = 300
-# Prints, last on stderr, the seconds and the peak memory [KiB] of a command beyond what importing all of it takes.
+# Prints last, on stderr, the seconds and peak memory [KiB] of a command, minus those for importing all of it.
 CHILD = """
 import resource, sys, time
 from cdtool.cli.app import main
@@ -57,7 +57,7 @@ class Ended:
 
 
 def measured(*arguments: object, **environment: str) -> Ended:
-    """The command in a process of its own."""
+    """Run the command in a separate process."""
     done = subprocess.run(
         [sys.executable, "-c", CHILD, *map(os.fsencode, map(str, arguments))],
         capture_output=True,
@@ -73,7 +73,7 @@ def measured(*arguments: object, **environment: str) -> Ended:
 
 
 def refused(*arguments: object, words: Sequence[str] = ()) -> Ended:
-    """The command, which must end in one error line, with status 2, and without the memory."""
+    """Run the command, which must exit with one error line, with status 2, and within the memory limit."""
     done = measured(*arguments)
     assert "Traceback" not in done.err, done.err
     assert done.status == 2, done
@@ -103,7 +103,7 @@ LOG = GATE / "stiff" / "03.csv"
 
 
 def benchmark_text() -> str:
-    """The sample benchmark file, its paths absolute."""
+    """The sample benchmark file with absolute paths."""
     text = (GATE / "benchmark.toml").read_text(encoding="utf-8").replace("machine.toml", str(GATE / "machine.toml"))
     return re.sub(r'"([a-z]+/\*)', rf'"{GATE}/\1', text)
 
@@ -220,7 +220,7 @@ def test_traces_that_unpack_to_gigabytes_are_refused(bench, tmp_path, unit):
 
 
 def test_damaged_traces_are_one_line_wherever_they_are_damaged(bench, tmp_path):
-    """Each value of the file replaced by one of a wrong type, and the packed bytes cut and changed."""
+    """Replace each value of the file by one of a wrong type, and truncate and change the packed bytes."""
     good = json.loads(gzip.decompress((bench / "results.traces.json.gz").read_bytes()))
     random = np.random.default_rng(4)
     for wrong in (None, "x", -1, [], {}, [[]], 1e300, 2**62):
@@ -285,7 +285,7 @@ def test_a_hostile_urdf_is_refused_in_one_line(tmp_path, name):
     refused("info", LOG, "-m", robot(tmp_path, urdf), words=words)
 
 
-# --- Files that are none: devices, FIFOs, folders
+# --- Not regular files: devices, FIFOs, folders
 
 
 @pytest.mark.parametrize("kind", ["device", "FIFO", "folder"])
@@ -406,7 +406,7 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     done = cdtool("info", LOG, "-m", written(tmp_path / "machine.toml", text))
     assert done.status == 2 and done.err.count("\n") == 1
     assert len(done.err) == LONGEST_LINE + 1 and "…" in done.err and "\x1b" not in done.err
-    assert str(tmp_path)[:20] in done.err and "known: " in done.err  # the file is named, and the next step
+    assert str(tmp_path)[:20] in done.err and "known: " in done.err  # names the file and the next step
 
 
 def test_left_out_lines_are_cut_as_well(tmp_path):
@@ -421,7 +421,7 @@ def test_left_out_lines_are_cut_as_well(tmp_path):
 
 
 def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A pipeline in bash; `cdtool` is the command. Its status is that of cdtool."""
+    """Run a pipeline in bash in which `cdtool` is the command; the status is that of cdtool."""
     program = f"{sys.executable} -c 'from cdtool.cli.app import main; main()'"
     return subprocess.run(
         ["bash", "-c", f'cdtool() {{ {program} "$@"; }}; {command}'],
@@ -469,7 +469,7 @@ def test_closed_streams_do_not_change_what_a_command_does(tmp_path, closed):
     assert done.stdout.splitlines()[-1] == "0" and "Traceback" not in done.stderr, done
     done = shell(f"cdtool convert {LOG} {tmp_path}/out.csv {closed}; echo $?")
     assert done.stdout.splitlines()[-1] == "0"
-    lines = (tmp_path / "out.csv").read_text().splitlines()  # nothing printed went into the file
+    lines = (tmp_path / "out.csv").read_text().splitlines()  # no printed line is in the file
     assert all(line.startswith("# ") or re.fullmatch(r"[\w.,+\-]+", line) for line in lines)
 
 

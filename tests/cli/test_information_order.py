@@ -1,4 +1,4 @@
-"""What `info` and the other commands say first, and what they say of clocks that are none."""
+"""Order of findings in `info` and other commands, and findings on unusable clocks."""
 
 from __future__ import annotations
 

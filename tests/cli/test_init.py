@@ -1,4 +1,4 @@
-"""`cdtool init`: what is guessed of simulated and of real logs; registered here, so that the test stands alone."""
+"""`cdtool init`: guesses from simulated and real logs; the command is registered here to keep the test independent."""
 
 from __future__ import annotations
 

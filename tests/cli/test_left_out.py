@@ -1,4 +1,4 @@
-"""What is left out is counted once, whatever number of detectors leaves it out, and for the reason that it is."""
+"""A left-out log is counted once for any number of detectors, with its reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The load cell as the truth, through the commands: in progress at the start, drift, negative latencies, forces."""
+"""The load cell as ground truth in the commands: contacts in progress, drift, negative latencies, forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A detector that lacks a channel is not assessable and stops no other; where all lack one it is an error."""
+"""A detector with a missing channel is not assessable and does not stop others; if none can run, it is an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Load-cell samples that are missing at a contact, through the commands: no pass, no latency without a mark."""
+"""Missing load-cell samples during a contact, in the commands: no pass, and no unmarked latency."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_hole_over_the_onset_prevents_a_pass_and_marks_the_latency(tmp_path, b
     assert row.latency_ms <= true_latency <= row.latency_ms + 1e3 * row.onset_uncertainty_s + 1.0
     (force,) = results.forces
     assert force.verdict == "not_assessable" and f"{row.onset_hole_ms:.0f} ms" in force.reason
-    # Limits that hold for what was seen only are not met, and so the status is 1; without them it is 3.
+    # Limits on partly measured contacts are not met, so the status is 1; without limits it is 3.
     outcomes = {item.figure: item.outcome for item in results.limits}
     assert outcomes == {
         "max_ms": "not_assessable",

@@ -1,4 +1,4 @@
-"""Tables in terminals of 60 and 80 columns: names and figures stay whole, and every column is shown."""
+"""Tables in terminals of 60 and 80 columns: names and numbers are not split, and every column is shown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS = [
 
 @pytest.fixture
 def terminal(monkeypatch, capsys):
-    """terminal(columns): print the table in a terminal so wide; returns its lines."""
+    """terminal(columns): print the table in a terminal of that width; return its lines."""
 
     def shown(columns: int, rows=ROWS) -> list[str]:
         monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)

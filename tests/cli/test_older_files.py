@@ -1,6 +1,6 @@
-"""Files of earlier versions are read, with a line on what they have not, or refused with one that says how to migrate.
+"""Files of earlier versions are read with a note on missing data, or refused with a hint how to migrate.
 
-The files were written by the commands of an earlier version, from the gate of `cdtool simulate`.
+They were written by the commands of an earlier version, from the gate of `cdtool simulate`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A log at another speed than was learned: every command names the speed that was measured and those learned."""
+"""A log at a speed that was not learned: every command names the measured and the learned speeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEASURED = re.compile(r"measured forward at ([\d.]+) m/s, learned forward at 0\.
 
 @pytest.fixture
 def at_speed(gate_folder: Path, tmp_path: Path):
-    """at_speed(factor, rows): an impact-free log whose speed is changed by a factor in these rows."""
+    """at_speed(factor, rows): an impact-free log with its speed multiplied by a factor in these rows."""
     log = gate_folder / "holdout" / "01.csv"
     head, *lines = log.read_text(encoding="utf-8").splitlines()
     names, columns = head.split(","), list(zip(*(line.split(",") for line in lines), strict=True))

@@ -1,4 +1,4 @@
-"""What `-o` may replace: a file of the kind that the command writes, told by what it holds; nothing else, ever."""
+"""`-o` may replace a file of the kind that the command writes, recognised by content, and no other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TEXT = "x"
 
 @pytest.fixture
 def folder(gate_folder: Path, tmp_path: Path) -> Path:
-    """A folder of its own: 3 logs to learn from, an impact, the machine file, a benchmark file."""
+    """A separate folder: 3 logs to learn from, an impact, the machine file, a benchmark file."""
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/01.csv", "machine.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(gate_folder / name, tmp_path / name)
@@ -96,7 +96,7 @@ def test_reports_can_be_written_again_any_number_of_times(folder):
         for name in ("r.json", "r.html", "r.md", "r.xml", "r.csv", "r.svg", "all")
         for word in ("-o", folder / name)
     ]
-    (folder / "r.csv").touch()  # an empty file holds nothing that could be lost
+    (folder / "r.csv").touch()  # an empty file has no content to lose
     first = cdtool("benchmark", folder / "benchmark.toml", *targets)
     assert first.status == 0, first.err
     written = bytes_of(folder)

@@ -1,4 +1,4 @@
-"""`cdtool plan`: how large a test must be."""
+"""`cdtool plan`: the required size of a test."""
 
 from __future__ import annotations
 

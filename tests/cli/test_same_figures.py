@@ -18,7 +18,7 @@ from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 OF_THE_LOG = ("recording", "group", "detector")
-# What else may make numbers, all of it away from its default.
+# Other settings that affect numbers, all different from their defaults.
 SETTINGS = """
 joints = {joints}
 operations = "motion"
@@ -42,12 +42,12 @@ mass_before_cell_kg = {mass}
 
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
-    """Each command learns the threshold anew; here it is learned once for a file and a detector."""
+    """Learn the threshold once per file and detector instead of in each command."""
     monkeypatch.setattr(prepared_detector, "prepare_benchmark", cache(prepared_detector.prepare_benchmark))
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
-    """A copy of a sample's benchmark in which everything that makes numbers is other than the default."""
+    """Return a copy of a sample's benchmark in which every setting that affects numbers differs from its default."""
     base = SAMPLES / sample
     values = tomllib.loads((base / "benchmark.toml").read_text(encoding="utf-8"))
     gate = sample == "gate"
@@ -73,7 +73,7 @@ def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
 
 
 def rows_of(values: Any) -> dict[tuple[str, int], dict[str, Any]]:
-    """Contact rows by log and number, without what only a benchmark says of them."""
+    """Contact rows by log and number, without the fields that only a benchmark has."""
     found = {}
     for row in values:
         log = str(row.get("recording") or row["operation"].partition("#")[0])
@@ -134,7 +134,7 @@ def test_with_every_relevant_setting_changed_from_its_default(sample, detector, 
 
 
 def test_individual_options_give_the_results_of_the_file(tmp_path):
-    """As `detect` did with 80 ms beside 81 ms: the same levels, the same limit, the same latency."""
+    """The results of `detect` with individual options and with the file are the same: levels, limit, latency."""
     log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
     file = tmp_path / "benchmark.toml"
     file.write_text(
@@ -204,7 +204,7 @@ def test_detect_and_explain_count_the_same_runs_and_name_those_left_out(tmp_path
     (tmp_path / "free").mkdir()
     for i in range(3, 8):
         shutil.copy(gate / "free" / f"0{i}.csv", tmp_path / "free")
-    # A stray run at half the speed, and a copy of another: neither is learned from.
+    # A stray run at half the speed and a copy of another run: neither is learned from.
     lines = (gate / "free" / "08.csv").read_text(encoding="utf-8").splitlines()
     rows = [line.split(",") for line in lines]
     slow = [rows[0], *([str(2 * int(row[0])), row[1], str(0.5 * float(row[2])), *row[3:]] for row in rows[1:])]

@@ -1,4 +1,4 @@
-"""`cdtool score`: triggers of any program get the figures that a detector's alarms would get, and nothing is silent."""
+"""`cdtool score`: external triggers get the same results as a detector's alarms, and problems are reported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUIET = "holdout/01.csv,,plc,\nholdout/02.csv,,plc,\n"
 
 @pytest.fixture(scope="module")
 def logs(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder's logs with a benchmark file that has nothing to learn from."""
+    """The folder's logs with a benchmark file without logs to learn from."""
     folder = tmp_path_factory.mktemp("score")
     for name in ("stiff", "soft", "holdout", "free", "machine.toml"):
         (folder / name).symlink_to(gate_folder / name)
@@ -37,7 +37,7 @@ def write_benchmark(folder: Path, more: str = "", name: str = "benchmark.toml") 
 
 @pytest.fixture(scope="module")
 def measured(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What the benchmark finds with two detectors."""
+    """The benchmark's results with two detectors."""
     path = tmp_path_factory.mktemp("measured") / "results.json"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "feekf,pi", "-o", path)
     assert done.status == 0, done.err
@@ -62,7 +62,7 @@ def onsets(measured: dict[str, Any]) -> dict[str, float]:
 
 
 def after(measured: dict[str, Any], seconds: float) -> str:
-    """A row for each contact: an alarm that long after its onset; and none in the hold-out."""
+    """Return a row per contact, with an alarm at that time after its onset; no rows for the hold-out."""
     rows = [f"{name},{onset + seconds!r},plc,\n" for name, onset in onsets(measured).items()]
     return "".join(rows) + QUIET
 
@@ -148,7 +148,7 @@ def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
 
 
 def epoch_folder(folder: Path, logs: Path) -> float:
-    """Logs whose time column counts from 1970; gives the first stamp of stiff/01.csv [s]."""
+    """Logs with a time column since 1970; returns the first stamp of stiff/01.csv [s]."""
     (folder / "machine.toml").symlink_to(logs / "machine.toml")
     for name in ("stiff/01.csv", "soft/01.csv", "holdout/01.csv"):
         with (logs / name).open(encoding="utf-8", newline="") as stream:
@@ -193,7 +193,7 @@ def test_a_file_name_that_fits_two_recordings_is_refused(logs, measured):
         ("recording,time\n", "stiff/01.csv,1\n", ("triggers.csv line 1", "'time'", "time_s")),
         ("recording,time_s\n", "stiff/01.csv,6,05\n", ("triggers.csv line 2", "3 cells")),
         ("recording,time_s\n", "stiff/01.csv,late\n", ("triggers.csv line 2", "'late'")),
-        ("recording,time_s\n", "", ("triggers.csv", "holds no row")),
+        ("recording,time_s\n", "", ("triggers.csv", "contains no row")),
     ],
 )
 def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
@@ -246,7 +246,7 @@ def test_the_example_gives_the_lines_of_its_page():
 
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measured, kind, tmp_path):
-    name = HOSTILE[kind].replace("\ud800", "").strip() or "x"  # no file in UTF-8 holds a surrogate
+    name = HOSTILE[kind].replace("\ud800", "").strip() or "x"  # UTF-8 files cannot contain a surrogate
     path = tmp_path / "triggers.csv"
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)

@@ -1,4 +1,4 @@
-"""`cdtool signature show|check|update` on a simulated gate: coverage, a season that drifts, and what is not learned."""
+"""`cdtool signature show|check|update` on a simulated gate: coverage, a drifting season, and refused runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.command import Outcome, cdtool
 
 @pytest.fixture(scope="module")
 def seasons(tmp_path_factory) -> Path:
-    """30 runs each: nothing changes, friction grows by half, an obstruction grows at 0.9 m."""
+    """30 runs each: no change, friction increased by half, an obstruction growing at 0.9 m."""
     folder = tmp_path_factory.mktemp("seasons")
     changes = {"quiet": (), "friction": ("--friction-change", 0.5), "stone": ("--obstruction-growth", 8)}
     for name, change in changes.items():

@@ -1,4 +1,4 @@
-"""The benchmark.toml that `cdtool simulate` writes is one that `cdtool benchmark` runs; else there is none, and why."""
+"""`cdtool simulate` writes a benchmark.toml that `cdtool benchmark` can run, or states why it does not."""
 
 from __future__ import annotations
 

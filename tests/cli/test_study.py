@@ -1,4 +1,4 @@
-"""`cdtool study`: the sensors of a machine ranked, and the thesis's figures drawn anew."""
+"""`cdtool study`: ranking of a machine's sensors, and the thesis's figures."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def test_a_derivative_part_and_a_force_limit_of_the_controller_count(tmp_path):
     torque = {name: one["sensors"][-1] for name, one in (("plain", plain), ("quick", quick), ("held", held))}
     assert {one["sensor"] for one in torque.values()} == {"motor_torque"}
     assert torque["quick"]["time_ms"] < torque["plain"]["time_ms"] == pytest.approx(torque["held"]["time_ms"])
-    # Without a limit the controller presses ever harder; with it the load's own swing is the worst.
+    # Without a limit the controller force keeps growing; with it the load's own oscillation is the largest.
     assert plain["peak_time_ms"] > 400.0 and held["peak_time_ms"] < 100.0
     assert held["peak_force_n"] < 0.85 * plain["peak_force_n"]
 

@@ -1,4 +1,4 @@
-"""The table of a benchmark on screen: below ten contacts median and range, from ten on the mean with its interval."""
+"""The table of a benchmark on screen: median and range below ten contacts, else the mean with its interval."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The load cell is fitted for impact tests only: impact-free logs without its column or topic serve, with a note."""
+"""The load cell may be fitted for impact tests only: impact-free logs without it are accepted with a note."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def without_cell(source: Path, target: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def bare(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """3 logs to learn from, a hold-out and an impact, all without the load cell's column."""
+    """3 logs to learn from, a hold-out and an impact, all without a load-cell column."""
     folder = tmp_path_factory.mktemp("bare")
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "holdout/01.csv", "stiff/01.csv"):
         without_cell(gate_folder / name, folder / name)
@@ -133,7 +133,7 @@ def test_a_topic_that_is_not_in_an_mcap_log_is_noted(tmp_path):
     (tmp_path / "machine.toml").write_text(MACHINE, encoding="utf-8")
     door(tmp_path, "free.mcap", 0.0)
     recording = api.read(tmp_path / "free.mcap", tmp_path / "machine.toml")
-    assert sorted(recording.channels) == ["position", "speed", "torque"]  # the position is made of the speed
+    assert sorted(recording.channels) == ["position", "speed", "torque"]  # the position is integrated from the speed
     told = [str(item) for item in recording.findings if item.channel in ("force", "event")]
     assert told == [
         "force: is not in this log: no topic '/load_cell wrench.force.z'",

@@ -1,4 +1,4 @@
-"""A file of another kind than a command needs is named as what it is, and what is wrong in a file is said in words."""
+"""A file of the wrong kind is named by its kind, and errors in a file are described in plain words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tests.command import cdtool
 
-# What only Python calls so.
+# Terms that only Python uses.
 PYTHON = re.compile(
     r"[A-Z][a-z]+Error|NoneType|\bNone\b|\bTrue\b|\bFalse\b|[({\[]'|\w+\(\w+=|object is|argument|iterable"
 )

@@ -1,4 +1,4 @@
-"""Findings that are alike are one line with a count."""
+"""Similar findings are one line with a count."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_singular_plural_and_lists_of_any_length_match():
     ]
     (name, text), *others = grouped(items)
     assert name == "a" and text.endswith("; 3 more like it (b, c, d)")
-    assert len(others) == 2  # of two each is shown
+    assert len(others) == 2  # two are both shown
 
 
 def test_similar_messages_are_one_line_with_a_count():

@@ -1,4 +1,4 @@
-"""Latency against false alarms: rates with their exposure, the factor in use, and what was not reached."""
+"""Latency against false alarms: rates with their exposure, the factor in use, and quantities not reached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a benchmark concludes, and that every report and the exit status say the same."""
+"""The conclusion of a benchmark, identical in every report and the exit status."""
 
 from __future__ import annotations
 

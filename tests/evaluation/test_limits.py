@@ -1,4 +1,4 @@
-"""[limits]: which figures they name, and what becomes of them."""
+"""[limits]: the quantities they name, and their outcomes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which recordings have a part in a broken limit."""
+"""The recordings that contribute to a violated limit."""
 
 from __future__ import annotations
 

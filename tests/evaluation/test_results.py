@@ -1,4 +1,4 @@
-"""Results, their file, and the statistics that are derived from them."""
+"""Results, their file, and the statistics derived from them."""
 
 from __future__ import annotations
 

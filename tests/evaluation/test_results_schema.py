@@ -1,4 +1,4 @@
-"""The published schema is that of the dataclasses; real results follow it, wrong ones do not."""
+"""The published schema matches the dataclasses; real results follow it, wrong ones do not."""
 
 from __future__ import annotations
 

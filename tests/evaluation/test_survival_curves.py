@@ -1,4 +1,4 @@
-"""One survival curve a detector and group: what is missed stays undetected, what is not assessable does not count."""
+"""One survival curve per detector and group: missed contacts stay undetected, unassessable ones do not count."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A detection with its limits moved gives what matching gives with those limits."""
+"""A detection with changed limits gives the same result as matching with these limits."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_the_budget_is_met_on_average_by_independent_operations():
     for _ in range(400):
         order = rng.permutation(len(pool))
         runs, others = pool[order[:20]], pool[order[20:]]
-        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # what set_factor gives for 1/10op on 20 operations
+        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # the result of set_factor for 1/10op on 20 operations
         broken.append(np.mean(others > factor))
     assert np.mean(broken) == pytest.approx(2 / 21, abs=0.01)
 

@@ -1,4 +1,4 @@
-"""The pipeline files in docs/examples: they parse, ask for little, and their shell lines do what the page says."""
+"""The pipeline files in docs/examples: they parse, request few permissions, and work as documented."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def github_job() -> dict[str, Any]:
 
 
 def github_step(words: str) -> str:
-    """The shell lines of the one step that holds these words."""
+    """Return the shell lines of the only step that contains these words."""
     (found,) = [step["run"] for step in github_job()["steps"] if words in step.get("run", "")]
     return str(found)
 
 
 class Shell:
-    """Runs lines as a runner would: bash that stops at the first failure, in a checkout with sample logs."""
+    """Run lines like a runner: bash that stops at the first failure, in a checkout with sample logs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -90,7 +90,7 @@ def test_the_steps_of_github_make_every_report_compare_and_show_the_summary(shel
     done = shell(github_step("cdtool benchmark"))
     assert done.returncode == 0, done.stderr
     assert shell.names("out") == REPORTS
-    assert shell(compare).returncode == 0 and shell.names("out") == REPORTS  # the first time there is nothing of main
+    assert shell(compare).returncode == 0 and shell.names("out") == REPORTS  # the first run has no results of main
     (shell.folder / "baseline").mkdir()
     shutil.copy(shell.folder / "out" / "results.json", shell.folder / "baseline")
     done = shell(compare)

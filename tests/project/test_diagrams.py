@@ -1,4 +1,4 @@
-"""The block diagrams: made by their script, valid, described, and nothing in them lies over anything else."""
+"""The block diagrams: written by their script, valid, described, and without overlapping text."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NAMES = [
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is no package."""
+    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is not a package."""
     for name in ("make_diagrams", "make_impact_diagrams"):
         spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
         assert spec and spec.loader
@@ -51,7 +51,7 @@ def made(script, tmp_path_factory) -> Path:
 
 
 def content(path: Path) -> tuple[list[str], list[str]]:
-    """Words and formulas of a drawing, which no version of matplotlib changes."""
+    """Return the words and formulas of a drawing, which are the same in all versions of matplotlib."""
     text = path.read_text(encoding="utf-8")
     words = [element.text or "" for element in ElementTree.fromstring(text).iter(f"{SVG}text")]
     return words, re.findall(r"<!-- (\$.*?\$) -->", text)

@@ -50,4 +50,4 @@ def test_ci_installs_the_lower_bounds_and_runs_the_main_job():
     job = (ROOT / ".ci" / "lowest_versions.sh").read_text(encoding="utf-8")
     for part in ("lowest_versions.py", "python3.11", "--help", "learn-signature", "detect", "benchmark"):
         assert part in job
-    assert "://" not in job  # where packages come from is for the machine to say
+    assert "://" not in job  # the source of packages is configured on the machine

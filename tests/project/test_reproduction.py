@@ -1,4 +1,4 @@
-"""docs/reproduction.md holds what its script makes."""
+"""docs/reproduction.md matches the output of its script."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plug-ins that are wrong: one clear line that names the package, and the others go on."""
+"""Faulty plug-ins: one clear line that names the package, and the others work."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """A package of one module and one entry point, as pip would have left it, for the time of a test."""
+    """A package of one module and one entry point, as installed by pip, for the duration of a test."""
     modules = []
 
     def write(code: str, name: str = "odd", group: str = "detectors", package: str = "odd-things") -> None:
@@ -272,7 +272,7 @@ def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old
     assert THRESHOLD.count(old) == 1
     install(THRESHOLD.replace(old, new), group="thresholds")
     done = benchmark_with_threshold(tmp_path)
-    # The middle of a long line is cut out: its end names the fault.
+    # The middle of a long line is cut: its end names the error.
     assert done.status == 2 and words[-25:] in done.err and "docs/own-detector.md" in done.err
     assert "Traceback" not in done.err
 

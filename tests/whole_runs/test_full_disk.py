@@ -1,4 +1,4 @@
-"""What becomes of a file that cannot be written to its end: one line, status 2, nothing left behind."""
+"""A file that cannot be written completely: one line, status 2, no file left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.workflows.convert.kinds import KINDS, needs, table
 
-# A disk that is full as far as a process can tell: no file may grow beyond some KiB.
+# A full disk, simulated for a process: no file may exceed a few KiB.
 LIMITED = """
 import resource, sys
 limit = int(sys.argv.pop(1))

@@ -148,7 +148,7 @@ def test_unassessable_sections_are_shown_with_their_share(folder):
         "motion",
     )
     assert done.status == 0
-    told = " ".join(done.out.split())  # lines end where the terminal does
+    told = " ".join(done.out.split())  # lines wrap at the terminal's width
     assert re.search(
         r"not assessable in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told
     )
@@ -161,7 +161,7 @@ def test_a_contact_outside_all_operations_is_reported(folder):
     tail = np.tile(resting, (4000, 1))
     tail[:, 0] = table[-1, 0] + 1e-3 * np.arange(1, 4001)
     tail[:, 2], tail[:, 4] = 0.0, 0.0
-    tail[2500:2800, 4] = 200.0  # the cell is hit long after the last stroke
+    tail[2500:2800, 4] = 200.0  # an impact on the cell long after the last stroke
     rows = np.vstack((table, tail))
     header = "t,drive,v,x,cell,hit"
     np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
@@ -174,7 +174,7 @@ def test_a_contact_outside_all_operations_is_reported(folder):
 
 
 def test_an_unassessable_contact_has_a_reason(folder, tmp_path):
-    """The speed is lost from before the contact on: the momentum observer sees nothing, and says so."""
+    """The speed is lost before the contact: the momentum observer is not assessable, and reports it."""
     table = np.loadtxt(folder / "hits.csv", delimiter=",", skiprows=1)
     table[(table[:, 0] > 5.9) & (table[:, 0] < 8.0), 2] = np.nan
     np.savetxt(folder / "lost.csv", table, delimiter=",", header="t,drive,v,x,cell,hit", comments="", fmt="%.7g")

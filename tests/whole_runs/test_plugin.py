@@ -1,4 +1,4 @@
-"""A detector and a threshold of another package, really installed, through every command."""
+"""A detector and a threshold of another, installed package, in every command."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
 def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Another interpreter that finds the packages in `site`."""
+    """Run another interpreter that finds the packages in `site`."""
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{site}", "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(
         [sys.executable, *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=folder, check=False
@@ -34,7 +34,7 @@ def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.Co
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where pip has installed the example package."""
+    """Folder in which pip has installed the example package."""
     folder = tmp_path_factory.mktemp("plugin")
     shutil.copytree(ROOT / "tests" / "plugin_example", folder / "source")
     install = ("install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", "--no-build-isolation")
@@ -45,7 +45,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def command(site: Path, tmp_path: Path) -> Command:
-    """`cdtool ARGUMENTS` with the example package, in a fresh folder."""
+    """Run `cdtool ARGUMENTS` with the example package, in a new folder."""
     return lambda *arguments: python("-c", MAIN, *arguments, site=site, folder=tmp_path)
 
 

@@ -55,7 +55,7 @@ def test_each_emps_stroke_raises_no_alarm_with_a_signature_of_the_others(emps, n
 
 @needs_data("emps/DATA_EMPS.mat")
 def test_an_added_force_on_an_emps_stroke_is_found(emps):
-    """The other side of the quiet test: a force of 60 N that the model does not know must not stay quiet."""
+    """The counterpart of the test without alarms: an unmodelled force of 60 N must raise an alarm."""
     machine_file, recording = emps
     strokes = operations_of(recording, "motion")
     detector = machine_file.detector("momentum")

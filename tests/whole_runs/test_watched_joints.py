@@ -1,4 +1,4 @@
-"""Machines of several joints through every command: chosen joints, blind detectors, alarms that name their joint."""
+"""Machines with several joints in every command: selected joints, unassessable joints, alarms that name their joint."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_benchmark_monitors_the_joints_it_names_and_shows_them(forearm):
     assert results.provenance["watched_joints"] == "forearm"
     assert {item.joint for item in results.contacts if item.joint} == {"forearm"}
     done = cdtool("benchmark", forearm / "benchmark.toml")
-    # The friction EKF can judge no joint at rest: that is said, and counts as left out.
+    # The friction EKF cannot assess a joint at rest, which is reported and counts as left out.
     assert done.status == 3 and "joints monitored, of all: forearm" in done.out
 
 

@@ -1,4 +1,4 @@
-"""A planted regression of the simulated gate is found, and equal builds are left in peace.
+"""A planted regression of the simulated gate is found, and equal builds are not reported as different.
 
 A small set; the full one is benchmarks/compare_builds.py.
 """

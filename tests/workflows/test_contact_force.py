@@ -1,4 +1,4 @@
-"""From a joint residual to the force at a known point."""
+"""The force at a known point, from a joint residual."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ POINT = ContactPoint("forearm", (0.2, 0.0, 0.0))
 
 
 def hit(machine, force, at=2.0):
-    """A recording in which the point meets a force that stays as it is in the base's axes from `at` s on."""
-    free = moving(machine, seconds=5.0, amplitude=0.15, seed=4)  # the elbow stays bent: both directions can be felt
+    """A recording in which a force, constant in the base's axes, acts at the point from `at` s."""
+    free = moving(machine, seconds=5.0, amplitude=0.15, seed=4)  # the elbow stays bent: both directions are observable
     torque, position = free["torque"], free["position"].values
     pushed = np.zeros((len(position), 6))
     pushed[torque.time >= at, :3] = force
@@ -99,6 +99,6 @@ def test_detect_shows_the_force_with_its_alarms(tmp_path):
     values = json.loads(cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0", "--json").out)[0]
     estimate = values["estimated_force"]
     assert estimate["link"] == "arm" and estimate["point_m"] == [0.28, 0.0, 0.0]
-    # The load cell's peak, and what the joint's dry friction, which the machine file does not know, adds at this lever.
+    # The load cell's peak, plus what the joint's dry friction, unknown to the machine file, adds at this lever.
     assert 20.0 < estimate["largest_n"] < 60.0
     assert values["alarms"] and 0.0 < estimate["at_alarm_n"] <= estimate["largest_n"]

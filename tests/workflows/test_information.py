@@ -1,4 +1,4 @@
-"""What `cdtool info` finds without a machine file: the clock, gaps, missing values."""
+"""`cdtool info` without a machine file: clock, gaps, missing values."""
 
 from __future__ import annotations
 

@@ -118,7 +118,9 @@ def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVe
     """
     for verdict in verdicts:
         if verdict.profile != profile.name:
-            raise UsageError(f"a verdict on '{verdict.profile}' is no test of '{profile.name}'", "judge all by one")
+            raise UsageError(
+                f"a verdict on '{verdict.profile}' is not a test of '{profile.name}'", "use one profile for all"
+            )
     steps = tuple(
         _judge_point(step, [verdict.steps[i] for verdict in verdicts], profile.average_of)
         for i, step in enumerate(profile.steps)

@@ -57,7 +57,9 @@ def read_triggers(path: Path) -> TriggerFile:
         by_name = rows.setdefault(row.text("detector") or path.stem, {})
         _take(row, by_name.setdefault(row.recording, Triggered()))
     if not rows:
-        raise ConfigurationError(f"{path}: holds no row", "write one a trigger; an empty time_s: watched, no alarm")
+        raise ConfigurationError(
+            f"{path}: contains no row", "write one per trigger; an empty time_s: monitored, no alarm"
+        )
     return TriggerFile(path, rows, hashlib.sha256(read_bytes(path, ConfigurationError)).hexdigest())
 
 

@@ -1,4 +1,4 @@
-"""Two builds: what is shown, what is not, what is paired, and what is refused."""
+"""Comparison of two builds: shown changes, pairing and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The likely cause of an alarm, and what left its normal band first: on logs that are shipped, with known changes."""
+"""The likely cause of an alarm, and the first departures, on sample logs with known changes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def explained(
     detector: str = "momentum",
     activation: Activation = NINE,
 ) -> AlarmExplanation:
-    """The first alarm of a detector against a constant limit."""
+    """Return the first alarm of a detector with a constant limit."""
     file = machine(folder)
     (operation,) = operations_of(recording)
     instance = file.detector(detector)
@@ -77,7 +77,7 @@ def changed(recording: Recording, channel: str, change: Callable[[np.ndarray, np
 
 
 def glitch(recording: Recording, height: float, start: float = 4.0, length: float = 0.006) -> Recording:
-    """The speed is off by `height` for `length` from `start` [s]; downward it looks to an observer like a contact."""
+    """Change the speed by `height` for `length` from `start` [s]; downward, an observer sees a contact."""
 
     def added(time: np.ndarray, values: np.ndarray) -> np.ndarray:
         values[(time >= start) & (time < start + length), 0] += height
@@ -148,7 +148,7 @@ def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number
         gone = (series.time > 4.0) & (series.time < 4.021)
         parts[name] = replace(series, time=series.time[~gone], values=series.values[~gone])
     lost = replace(clean, channels=parts)
-    # An alarm that comes 10 ms after the gap whatever the signal is: every sample from there on is outside.
+    # An alarm 10 ms after the gap, independent of the signal: every later sample is outside.
     after = int(np.searchsorted(lost["torque"].time, 4.031))
     low = changed(lost, "torque", lambda _, values: values)
     file = machine("gate")
@@ -192,14 +192,14 @@ def test_without_impact_free_runs_the_comparison_and_its_reason_are_stated(absen
     assert item.absent is absent and item.runs == 0
     text = " ".join(words(item))
     assert "No impact-free runs to compare with: " in text and "this log's own past" in text and told in text
-    # Nothing was learned, so nothing is called normal, and the next step is named.
+    # Nothing was learned, so nothing is called normal, and the next step is given.
     assert "usual range" not in text and "normal" not in text.replace("has no normal motion", "")
     assert item.cause.kind is CauseKind.CONTACT and "Likely cause: a contact: speed of gate" in text
     assert "learn" in text.partition("No impact-free runs to compare with")[2]
 
 
 def test_a_drifting_speed_within_its_band_departs_at_the_bend(gate):
-    # The speed is up to half of its limit off for 60 ms before this contact, and falls from 35 ms after it on.
+    # The speed deviates by up to half of its limit for 60 ms before this contact, and falls 35 ms after it.
     item = explained("gate", log("gate", "stiff/04.csv"), gate, 300.0)
     speed = next(each for each in item.moved if each.channel == "speed")
     assert 0.03 <= speed.time - 5.939 <= 0.05

@@ -1,4 +1,4 @@
-"""Why an alarm came and why a contact was missed: figures that can be worked out by hand."""
+"""Why an alarm was raised and why a contact was missed, with numbers that can be calculated by hand."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def detection(
     threshold: Any = None,
     activation: Activation = NINE,
 ) -> Detection:
-    """A statistic (n,) or (n, J) against hand-set limits, judged as the pipeline does."""
+    """A statistic (n,) or (n, J) with limits set by hand, assessed as in the pipeline."""
     columns = values.reshape(len(time), -1)
     joints = ("hip", "knee")[: columns.shape[1]]
     given = {"torque": columns, **{name: np.column_stack([part] * len(joints)) for name, part in channels.items()}}
@@ -56,7 +56,7 @@ def matching(item: Detection, *contacts: Contact) -> Matching:
 
 
 def pulse(start: int, count: int, height: float = 1.5, rest: float = 0.2) -> np.ndarray:
-    """Samples start to start + count - 1 at a height, all others at rest."""
+    """Samples start to start + count - 1 at a height, all others at zero."""
     values = np.full(len(TIME), rest)
     values[start : start + count] = height
     return values
@@ -64,7 +64,7 @@ def pulse(start: int, count: int, height: float = 1.5, rest: float = 0.2) -> np.
 
 @dataclass(frozen=True)
 class Upper:
-    """A one-sided band: 2 + k * 0.5 above, nothing below."""
+    """A one-sided band: 2 + k * 0.5 above, unlimited below."""
 
     safety_factor: float = 4.0
 
@@ -104,7 +104,7 @@ def test_a_sample_not_assessable_has_no_margin_but_a_reason():
 
 def test_an_alarm_is_traced_to_the_last_exit_from_the_band():
     values = pulse(3020, 200)
-    values[3010:3013] = 1.5  # three samples outside, then back: not yet for good
+    values[3010:3013] = 1.5  # three samples outside, then inside again: not the last exit
     item = detection(values)
     (alarm,) = item.verdict.alarms
     found = explain_alarm(item, alarm, NINE, CONTACT)
@@ -121,7 +121,7 @@ def test_missing_samples_are_skipped_as_the_activation_skips_them():
     found = explain_alarm(item, alarm, NINE)
     assert (found.left, found.skipped) == (pytest.approx(3.020), 2)
     assert alarm.time == pytest.approx(3.030)
-    status[3025] = Status.NOT_APPLICABLE  # breaks the succession
+    status[3025] = Status.NOT_APPLICABLE  # interrupts the sequence
     item = detection(pulse(3020, 200), status=status)
     found = explain_alarm(item, item.verdict.alarms[0], NINE)
     assert (found.left, found.skipped) == (pytest.approx(3.026), 0)
@@ -144,7 +144,7 @@ def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(s
 
 
 def test_the_margin_is_given_at_fixed_times_before_the_alarm_and_at_the_onset():
-    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is that at 3.080
+    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is at 3.080 s
     (alarm,) = item.verdict.alarms
     found = explain_alarm(item, alarm, NINE, CONTACT)
     after = [round(1e3 * (moment.time - alarm.time)) for moment in found.moments]

@@ -1,4 +1,4 @@
-"""Which channel moved first: on channels whose steps are known, and on the simulated gate."""
+"""The first channel to move, on channels with known steps and on the simulated gate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ONSET = 3.0
 
 
 def kink(at: float, slope: float, noise: float, seed: int) -> np.ndarray:
-    """Noise on a slow line whose slope changes at a known time."""
+    """Noise on a slow ramp whose slope changes at a known time."""
     rng = np.random.default_rng(seed)
     return 0.3 * TIME + slope * np.clip(TIME - at, 0.0, None) + noise * rng.normal(size=len(TIME))
 

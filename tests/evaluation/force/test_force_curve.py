@@ -1,6 +1,6 @@
-"""The force of a contact over time, against closed forms.
+"""The force of a contact over time, compared with closed forms.
 
-A rigid leaf of 620 kg that meets a spring of 500 N/mm at 0.2 m/s presses with a half sine F = v sqrt(k m) sin(w t).
+A rigid leaf of 620 kg that hits a spring of 500 N/mm at 0.2 m/s exerts a half sine F = v sqrt(k m) sin(w t).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def recording(force: FloatArray, **channels: Series) -> Recording:
 
 
 def moving(direction: float = 1.0, clock: FloatArray = TIME) -> dict[str, Series]:
-    """Speed and acceleration of the leaf, before and while it presses, on a clock of their own."""
+    """Speed and acceleration of the leaf, before and during the contact, on a separate clock."""
     speed = np.where(clock < ONSET, SPEED, np.where(clock < CONTACT.end, SPEED * np.cos(RATE * (clock - ONSET)), 0.0))
     acceleration = -half_sine(clock) / MASS
     return {
@@ -41,7 +41,7 @@ def moving(direction: float = 1.0, clock: FloatArray = TIME) -> dict[str, Series
 
 
 def missing_share(curve):
-    """Share of the time from the onset to the record's end in which samples are missing."""
+    """Return the share of the time from the onset to the record's end in which samples are missing."""
     begins, ends = curve.holes()
     return float(np.sum(ends - begins)) / curve.end
 
@@ -86,8 +86,8 @@ def test_a_stronger_pull_long_after_the_contact_does_not_turn_its_sign():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_inertia_before_the_cell_is_given_back(direction, sign):
     mass = 60.0
-    clock = np.arange(0.0, 8.0, 0.7e-3) + 0.21e-3  # the accelerometer has a clock of its own
-    cell = half_sine(TIME) * (1.0 - mass / MASS)  # the contact force less M times the deceleration
+    clock = np.arange(0.0, 8.0, 0.7e-3) + 0.21e-3  # the accelerometer has its own clock
+    cell = half_sine(TIME) * (1.0 - mass / MASS)  # the contact force minus M times the deceleration
     part = recording(sign * cell, **moving(direction, clock))
     assert force_time_curve(part, CONTACT).peak == pytest.approx(PEAK * (1.0 - mass / MASS), rel=1e-3)
     curve = force_time_curve(part, CONTACT, mass)

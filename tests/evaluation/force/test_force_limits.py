@@ -1,4 +1,4 @@
-"""The file of force limits: what ships, and what is refused."""
+"""The file of force limits: its shipped content, and refused content."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Force curves that were kept belong to their contact's verdict, from the beginning of the contact on."""
+"""Stored force curves match their contact's verdict, from the beginning of the contact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pass, fail and not assessable: one test, and several at one point."""
+"""Pass, fail and not assessable, for one test and for several at one point."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def leaf(scale: float = 1.0) -> ForceTimeCurve:
 
 
 def pressing(first: float, then: float = 0.0, last: float = 0.0) -> ForceTimeCurve:
-    """A push of constant force in each step of the gate's profiles."""
+    """A constant force in each step of the gate's profiles."""
     return curve(np.select([TIME < 0.75, TIME < 5.0], [first, then], last))
 
 

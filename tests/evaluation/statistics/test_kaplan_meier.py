@@ -1,7 +1,7 @@
-"""Quantiles of latencies of which some are missed, against R 4.2.2 with survival 3.5-3.
+"""Quantiles of latencies with missed contacts, compared with R 4.2.2 with survival 3.5-3.
 
-R: s <- survfit(Surv(time, event) ~ 1, conf.type = "log-log"); quantile(s, p); s$surv, s$lower, s$upper. Where R gives
-NA for a limit that is never passed, the interval is open (infinite).
+R: s <- survfit(Surv(time, event) ~ 1, conf.type = "log-log"); quantile(s, p); s$surv, s$lower, s$upper. If R returns NA
+for a limit that is never crossed, the interval is open (infinite).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Comparisons of detectors and builds, against R 4.2.2 (calls named beside the figures) and Fisher's own figure."""
+"""Comparisons of detectors and builds, checked with R 4.2.2 (calls next to the numbers) and Fisher's own result."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.paired import fisher_p, holm, mcnemar_p, paired_difference, unpaired_difference
 
-# Darwin's maize: height of the crossed less that of the self-fertilised plant of a pair, eighths of an inch
+# Darwin's maize: height of the crossed minus that of the self-fertilised plant of a pair, eighths of an inch
 # (Fisher, The Design of Experiments, 1935): 863 of the 32768 sign patterns give a sum as large; two-sided twice that.
 DARWIN = [49, -67, 8, 16, 6, 23, 28, 41, 14, 29, 56, 24, 75, 60, -48]
 DARWIN_P = 1726 / 32768
-# R's data set `sleep` (Student 1908): hours gained with the second drug less those with the first.
+# R's data set `sleep` (Student 1908): hours gained with the second drug minus those with the first.
 SLEEP = [1.2, 2.4, 1.3, 1.3, 0.0, 1.0, 1.8, 0.8, 4.6, 1.4]
 UNTIED = [1.1, -2.3, 3.9, 5.2, 0.4, 6.1, 2.7, -0.8]
 # Recordings of several contacts: sums 8, 3, 6, 4, -1, 18.
@@ -60,7 +60,7 @@ def test_signed_ranks_are_rs():
 
 
 def test_the_contacts_of_a_recording_change_sign_together():
-    # 2 of the 2^6 sign patterns of the sums reach 38 (themselves, and with -1 turned round); both sides: 4 of 64.
+    # 2 of the 2^6 sign patterns of the sums reach 38 (themselves, and with -1 inverted); both sides: 4 of 64.
     values, recording = flat(RECORDINGS)
     found = paired_difference(values, recording)
     assert found.p == 4 / 64

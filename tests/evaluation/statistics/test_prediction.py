@@ -1,4 +1,4 @@
-"""The predicted chance of the next maximum: against Student's closed form, and right on average."""
+"""The predicted probability of the next maximum: Student's closed form, and correct on average."""
 
 from __future__ import annotations
 

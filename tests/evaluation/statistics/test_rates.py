@@ -1,4 +1,4 @@
-"""Exact intervals of rare events, against R 4.2.2: poisson.test and binom.test, for "at most" alternative = "less"."""
+"""Exact intervals of rare events, compared with R 4.2.2: poisson.test and binom.test, one-sided with "less"."""
 
 from __future__ import annotations
 

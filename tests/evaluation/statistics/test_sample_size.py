@@ -1,4 +1,4 @@
-"""How large a test must be, against R 4.2.2: power.t.test(delta, sd, power, type, strict = TRUE)$n, rounded up."""
+"""Sample sizes, compared with R 4.2.2: power.t.test(delta, sd, power, type, strict = TRUE)$n, rounded up."""
 
 from __future__ import annotations
 

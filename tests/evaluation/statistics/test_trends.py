@@ -1,4 +1,4 @@
-"""Drift, step or neither: rank tests against closed forms, and how often steady values show something."""
+"""Drift, step or neither: rank tests compared with closed forms, and the false-positive rate on steady values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def noise(seed: int, n: int = 40) -> np.ndarray:
 def test_a_line_has_its_slope_and_the_least_p_of_so_few_runs():
     trend = trend_of(3.0 + 0.5 * np.arange(6.0), np.arange(6))
     assert (trend.slope.value, trend.slope.low, trend.slope.high) == pytest.approx((0.5, 0.5, 0.5))
-    assert trend.p == pytest.approx(2.0 / 720.0)  # one order of 6 runs rises all along, one falls
+    assert trend.p == pytest.approx(2.0 / 720.0)  # one order of 6 runs only rises, one only falls
     assert trend.at(4.0) == pytest.approx(5.0)
 
 
@@ -36,7 +36,7 @@ def test_a_missing_run_neither_shifts_the_slope_nor_the_step():
 
 def test_pettitts_statistic_is_that_of_all_pairs():
     values = noise(4, 25)
-    signs = np.sign(values[np.newaxis, :] - values[:, np.newaxis])  # of each later less each earlier
+    signs = np.sign(values[np.newaxis, :] - values[:, np.newaxis])  # each later minus each earlier value
     pairs = [abs(signs[:t, t:].sum()) for t in range(1, 25)]
     largest = max(pairs)
     assert pettitt_p(values) == pytest.approx(min(1.0, 2.0 * np.exp(-6.0 * largest**2 / (25**3 + 25**2))))

@@ -1,4 +1,4 @@
-"""What is left of a series after decimation draws as the whole would."""
+"""A decimated series draws the same as the whole one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Traces: what is kept of an operation, which operations, and the file beside results.json."""
+"""Traces: stored data, selection of operations, and the file next to results.json."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings about a load cell as the truth: it follows the torque without lag, or its rest level wandered."""
+"""Warnings about a load cell as ground truth: it follows the torque without lag, or its rest level drifted."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_a_force_next_to_nothing_that_stays_to_the_end_of_the_log_is_named():
 @needs_data("ur10e")
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
-    """UR10e pushed by hand, 10 and 12 ms a sample: the "force" is what shoulder or elbow say themselves."""
+    """UR10e pushed by hand, one sample per 10 and 12 ms: the "force" is the shoulder's or elbow's own torque."""
     table = np.loadtxt(data("ur10e") / "ur-static.csv", delimiter=",")
     time, current = table[:, 0] - table[0, 0], table[:, 13:19]
     force = 10.0 * current[:, joint] + np.random.default_rng(1).normal(0.0, 0.5, len(time))
@@ -89,7 +89,7 @@ def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
     recording = Recording("ur-static", "", tuple("abcdef"), channels)
     found = find_contacts(recording, OnsetRule(8.0, 4.0))
     assert found and not any(item.in_progress for item in found)
-    assert found[0].start == pytest.approx(3.3, abs=0.3)  # the first push, by the observer: 3.4 s
+    assert found[0].start == pytest.approx(3.3, abs=0.3)  # first push according to the observer: 3.4 s
     name, r = follows_torque(recording, found)
     assert (name, r) == ("abcdef"[joint], pytest.approx(1.0, abs=0.02))
 

@@ -1,4 +1,4 @@
-"""A contact that is in progress when the recording begins: never detected or missed, and its alarms are not false."""
+"""A contact in progress at the start of a recording: never detected or missed, and its alarms are not false."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contacts from load cells that drift, jump, read coarsely, slowly or with jitter, and from logs that begin in one."""
+"""Contacts on load cells with drift, jumps, coarse steps, slow sampling or jitter, and logs that begin in a contact."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ END = 8.0
 
 
 def clock(rate: float, jitter: float = 0.0, seed: int = 0) -> FloatArray:
-    """Times of a cell of so many samples a second, each late by up to a share of its period."""
+    """Times of a cell at that sample rate, each delayed by up to a share of its period."""
     rng = np.random.default_rng(seed)
     return (np.arange(int(END * rate)) + jitter * rng.uniform(0.0, 1.0, int(END * rate))) / rate
 
@@ -64,7 +64,7 @@ def test_the_drift_before_the_onset_is_reported():
 def test_a_drifting_cell_without_a_contact_shows_none(drift, sigma):
     for seed in range(5):
         assert contacts(T, noise(T, sigma, seed) + DRIFTS[drift]) == []
-    if drift != "step at rest":  # by eight deviations of the noise a step of 12 N is a contact
+    if drift != "step at rest":  # with a level of eight deviations of the noise, a step of 12 N is a contact
         assert contacts(T, noise(T, sigma) + DRIFTS[drift], OnsetRule()) == []
 
 
@@ -85,9 +85,9 @@ def test_a_log_that_begins_in_contact_has_it_in_progress_and_its_release_is_no_c
 @pytest.mark.parametrize(
     "course",
     [
-        lambda t: 800.0 * np.exp(-t / 0.15) * (t < 0.6),  # from the peak on, falling
+        lambda t: 800.0 * np.exp(-t / 0.15) * (t < 0.6),  # falling from the peak
         lambda t: np.where(t < 0.5, 100.0 + 1200.0 * t, 0.0),  # still rising
-        lambda t: np.where(t < 0.4, 500.0, np.where(t < 2.0, 150.0, 0.0)),  # a shock, then a steady push
+        lambda t: np.where(t < 0.4, 500.0, np.where(t < 2.0, 150.0, 0.0)),  # an impact, then a steady push
     ],
     ids=["falling", "rising", "in two levels"],
 )
@@ -182,7 +182,7 @@ def test_missing_samples_and_gaps_are_skipped_and_a_hole_before_the_onset_is_in_
     (found,) = contacts(T, force)
     assert found.start - found.uncertainty <= 6.0 < found.start
     assert found.resolution > 0.06
-    kept = (T < 2.0) | (T > 3.5)  # rows that are not there at all
+    kept = (T < 2.0) | (T > 3.5)  # rows that do not exist
     assert contacts(T[kept], (pulse(T, 6.0) + noise(T))[kept])[0].start == pytest.approx(6.001, abs=1.1e-3)
 
 
@@ -226,12 +226,12 @@ def test_a_rebound_within_the_separation_is_the_same_contact_whatever_the_cell_r
     force = noise(T) + pulse(T, 3.0, 0.1) + pulse(T, 3.6, 0.1, 400.0) + 20.5 * ((T > 3.1) & (T < 3.6))
     (found,) = contacts(T, force)
     assert (found.start, found.end) == (pytest.approx(3.001, abs=1.1e-3), pytest.approx(3.7, abs=3e-3))
-    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from what had begun before
+    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from a contact that began before
     assert begun.in_progress and begun.end == pytest.approx(1.3, abs=3e-3)
 
 
 def test_a_shift_of_rest_during_a_contact_is_not_a_contact_in_progress():
-    """The pushes of the UR10e: friction keeps a part of what was felt."""
+    """The pushes of the UR10e: friction keeps part of the measured force."""
     for before, after in ((-29.0, -25.0), (30.0, 20.0)):
         (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
         assert not found.in_progress and found.start == pytest.approx(3.003, abs=5e-3)
@@ -282,7 +282,7 @@ def test_a_cell_that_is_not_tared_is_at_rest_where_the_log_ends_in_a_contact_aga
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("offset", [200.0, 291.0, 400.0])
 def test_a_touch_held_before_the_impact_is_not_a_release(offset, sign):
-    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, and then hit."""
+    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, then hit."""
     felt = np.interp(T, [6.0, 6.1, 6.35, 6.7, 7.2], [0.0, 290.0, 290.0, 2466.0, 600.0])
     kept = T < 7.2
     for rule in (OnsetRule(), GATE):

@@ -23,7 +23,7 @@ def alarm(time: float) -> Alarm:
 
 
 def match(alarms: list[Alarm], contacts: list[Contact], signal: Signal) -> Matching:
-    """Every alarm is a crossing."""
+    """A detection in which every alarm is a crossing."""
     return match_verdict(Verdict("alarm", tuple(alarms), crossings=tuple(alarms)), contacts, signal)
 
 

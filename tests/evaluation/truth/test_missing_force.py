@@ -1,4 +1,4 @@
-"""Load-cell samples that are missing where a contact begins or presses: no latency and no force that nobody saw."""
+"""Missing load-cell samples at the beginning of or during a contact: no unmeasured latency or force is reported."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_rebound_after_a_hole_over_the_first_touch_is_not_the_onset(own_clock)
     assert contact.start == pytest.approx(ONSET + 0.4, abs=3e-3)
     assert contact.hole == pytest.approx(0.24, abs=2e-3)
     assert contact.start - contact.uncertainty <= ONSET
-    # A hole in which no contact of this kind fits says nothing about the onset.
+    # A hole too short for a contact of this kind does not affect the onset.
     (whole,) = find_contacts(recording(bump(TIME), ONSET - 0.4, ONSET - 0.38, own_clock), RULE)
     assert whole.hole == 0.0 and whole.uncertainty < 2e-3
 
@@ -123,7 +123,7 @@ def test_a_measured_violation_counts():
 
 
 def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
-    # 300 N until 0.70 s after the onset: allowed until 0.75 s, but the onset may lie 0.1 s earlier.
+    # 300 N until 0.70 s after the onset: allowed until 0.75 s, but the onset may be 0.1 s earlier.
     force = np.where((TIME >= ONSET) & (TIME < ONSET + 0.8), 300.0, 0.0)
     one = recording(force, ONSET - 0.01, ONSET + 0.09, True)
     (contact,) = find_contacts(one, RULE)

@@ -1,4 +1,4 @@
-"""The onset rule on load-cell curves whose onset is known."""
+"""The onset rule on load-cell curves with a known onset."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_noise_alone_is_no_contact():
 @pytest.mark.parametrize("offset", [0.0, 312.7])
 def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset):
     force = np.full(4000, offset)
-    force[2000:2010] += step  # the only one: the noise, by its median, is 0
+    force[2000:2010] += step  # the only step: the median noise is 0
     assert find_contacts(recording(force), OnsetRule()) == []
     force[3000:3010] -= step
     assert find_contacts(recording(force), OnsetRule()) == []
@@ -59,10 +59,10 @@ def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset)
 
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
 def test_without_noise_a_contact_begins_above_eight_deviations_of_the_rounding(step):
-    heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms from 2 s on
+    heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms after 2 s
     (contact,) = find_contacts(recording(heights), OnsetRule())
     assert 8.0 / np.sqrt(12.0) == pytest.approx(2.309, abs=1e-3)
-    # Upper level 2.31 steps, first above it at 3; lower level 1.15 steps, left where the reading comes to 2.
+    # Upper level 2.31 steps, first exceeded at 3; lower level 1.15 steps, exceeded where the reading reaches 2.
     assert contact.start == pytest.approx(2.020)
     assert contact.uncertainty == pytest.approx(0.0005 + 0.010)
     assert contact.peak_force == pytest.approx(50 * step)

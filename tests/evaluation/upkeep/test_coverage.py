@@ -1,4 +1,4 @@
-"""Coverage: runs judged by all the others, the chance that the next one alarms, where there is no limit."""
+"""Coverage: runs checked against all others, the probability of the next alarm, and sections without a limit."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs()
     gap, *others = check_coverage(blind, RULE, ACTIVATION).gaps
     travel = blind[0][0].recording["position"].values[:, 0]
     assert gap.axis == "travel" and gap.share == pytest.approx(9 / 14)
-    # The first sample behind it stands for the last two grid points before it.
+    # The first sample after it counts for the last two grid points before it.
     assert gap.start == pytest.approx(travel[2400] - travel[402], abs=0.003)
     assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
     assert "valid in at most 64 % of the runs; 80 % are needed" in gap.described
@@ -107,7 +107,7 @@ def test_while_accelerating_a_part_without_a_limit_is_a_time():
     assert (gap.axis, gap.share) == ("time", 0.0)
     assert (gap.start, gap.end) == (pytest.approx(0.2, abs=0.02), pytest.approx(0.3 - 2 * 0.01, abs=0.015))
     assert "s after the motion began" in gap.described
-    # Without the runs it is not known where time stops to count: both curves are looked at.
+    # Without the runs, the end of the time-based part is unknown: both curves are checked.
     assert {item.axis for item in gaps_of(learned(blind))} == {"time", "travel"}
 
 

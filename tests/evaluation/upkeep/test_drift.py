@@ -1,4 +1,4 @@
-"""The audit of a season: what drifts, where it grows, what is a step, and how long the margin lasts."""
+"""The audit of a season: drift, local growth, steps, and the runs left."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def audited(change=None, count: int = 40, seed: int = 1, **settings: object):
 
 
 def near(travel: np.ndarray, place: float) -> np.ndarray:
-    """1 within 3 cm of a place, 1 cm of travel behind where the axis began to move."""
+    """Return 1 within 3 cm of a position, measured 1 cm after the start of the motion."""
     return (np.abs(travel - place - 0.01) < 0.03).astype(float)
 
 
@@ -63,7 +63,7 @@ def test_a_drift_of_the_whole_stroke_is_reported_with_slope_and_runs_left():
 
 
 def test_the_predicted_runs_left_are_right():
-    """A season that goes on: a typical run alarms about when the first half said it would."""
+    """A season that continues: a typical run alarms about when the first half predicted it."""
 
     def change(number: int, _: np.ndarray) -> float:
         return 0.06 * number

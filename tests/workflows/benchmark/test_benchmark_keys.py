@@ -1,4 +1,4 @@
-"""Keys of a benchmark file beyond the plain ones, each by what it does to results."""
+"""Special keys of a benchmark file and their effect on results."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def test_identical_files_under_two_names_are_not_scored_twice(gate):
 
 
 def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
-    """Two labelled contacts in one log: the second one's force is none of the first's."""
+    """Two labelled contacts in one log: the force of the second does not count for the first."""
     done = run(gate, HEAD, LEARN, ONSET, STIFF)
     first = done.results.contacts[0]
     with (gate / "two.csv").open("w", newline="") as stream:

@@ -1,4 +1,4 @@
-"""[onset] counts in seconds; settings in samples are read with a stated meaning, or refused with the way to migrate."""
+"""[onset] is in seconds; settings in samples are converted with a note, or refused with a hint to migrate."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def test_samples_are_read_at_1_khz_with_a_hint_to_migrate(samples):
 
 
 def test_unreadable_settings_are_refused_with_a_hint_to_migrate():
-    with pytest.raises(ConfigurationError, match=r"onset\.samples: is 200: the onset rule counts in seconds") as found:
+    with pytest.raises(
+        ConfigurationError, match=r"onset\.samples: is 200: the onset rule now counts in seconds"
+    ) as found:
         read(samples=200)
     assert found.value.hint == "set hold_s, at most 0.1"
     with pytest.raises(ConfigurationError, match=r"onset\.samples: cannot be combined with hold_s"):

@@ -34,7 +34,7 @@ def test_a_table_is_unchanged_bit_for_bit_through_any_two_containers(there, back
     first = convert(log, tmp_path / f"first{there}", machine=machine)
     second = convert(first.files[0], tmp_path / f"second{back}", machine=first.machine_files[0])
     original = logged(log, machine)
-    # A message's time in MCAP is a whole number of nanoseconds; its exact time goes on to the next container.
+    # A message's time in MCAP is an integer number of nanoseconds; its exact time is passed on to the next container.
     assert_same(original, logged(first.files[0], first.machine_files[0]), exact_time=there != ".mcap")
     assert_same(original, logged(second.files[0], second.machine_files[0]), exact_time=back != ".mcap")
 

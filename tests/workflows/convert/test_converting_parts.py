@@ -58,7 +58,7 @@ def test_the_channels_of_all_parts_are_read_back_as_those_of_the_log(suffix, tmp
     needs(suffix)
     folder, known = bag(tmp_path / "bag"), machine(tmp_path)
     done = convert(folder, tmp_path / f"out{suffix}", machine=known)
-    # On the load side already: the machine takes load coordinates as they are, and derives a position only.
+    # Already on the load side: the machine accepts load coordinates unchanged, and derives only a position.
     whole = read_recording(folder, read_machine_file(known))
     whole = replace(whole, channels={name: whole[name] for name in ("speed", "force")})
     assert_same(whole, logged(done.files[0], done.machine_files[0]), exact_time=suffix != ".mcap")

@@ -1,4 +1,4 @@
-"""Where a log begins since 1970 is known of its converted file, too, and of what is made of that."""
+"""The start of a log since 1970 is kept in its converted file, and in files converted from that."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tests.formats.containers import assert_same, logged, machine_file, two_cloc
 from tests.workflows.convert.kinds import KINDS, needs
 
 EPOCH = 1_700_000_000.25
-ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # whose start is a date in whole microseconds
+ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # its start is a date in whole microseconds
 
 
 def dated(path: Path) -> Path:
-    """A table whose clock counts from 1970, in ms, and begins on a quarter of a second."""
+    """A table whose clock counts from 1970, in ms, and begins at a quarter of a second."""
     rows = "\n".join(f"{EPOCH * 1e3 + k * 2.5!r},{float(np.sin(k))!r},{float(np.cos(k))!r}" for k in range(200))
     path.write_text(f"time [ms],torque [N m],speed [rad/s]\n{rows}\n")
     return path

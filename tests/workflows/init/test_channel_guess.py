@@ -1,4 +1,4 @@
-"""`cdtool init`: which column is taken for which channel, by its name and in spite of its course."""
+"""`cdtool init`: the column guessed for each channel, by its name and despite its values."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_the_smoother_of_two_equally_named_columns_is_the_set_value(tmp_path):
 
 @pytest.mark.parametrize("cell", ["loadcell_N", "load cell", "Kraftmessdose", "Waegezelle", "F_cell", "Kraft", "F"])
 def test_a_load_cell_never_becomes_the_torque(tmp_path, cell):
-    """Its course is that of a drive here, so that only the name keeps it out."""
+    """Its values are those of a drive here, so that only the name excludes it."""
     run = stroke()
     draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, cell: run.torque * 100.0})
     assert column(draft, "force") == cell and "torque" not in draft.channels

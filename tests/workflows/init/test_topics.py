@@ -1,4 +1,4 @@
-"""`cdtool init` on topics: only types of messages that are known to be in SI units are said to be so."""
+"""`cdtool init` on topics: SI units are assumed only for known types of messages."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.workflows.init.units import is_si
 from tests.workflows.init.drafts import RPM, drafted, stroke
 
-LEAD = 1.5e-3  # m of travel per rad of the motor
+LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
 
 def write_json(path, topics):
-    """Messages in JSON of types that nobody knows; `topics`: topic -> field -> values at 1 kHz."""
+    """Messages in JSON of unknown types; `topics`: topic -> field -> values at 1 kHz."""
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
@@ -85,7 +85,7 @@ def test_a_known_type_whose_numbers_are_not_in_si_units_is_marked(tmp_path):
 
 
 def test_a_force_sensor_is_never_the_torque(tmp_path):
-    """Its torque moves here, and is named so."""
+    """Its torque moves here, and has that name."""
     run = stroke()
     path = tmp_path / "a.mcap"
     cell = {"wrench.torque.x": run.torque, "wrench.force.x": run.force}

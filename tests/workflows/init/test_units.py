@@ -1,4 +1,4 @@
-"""`cdtool init`: which units are told, which are marked, and what the ratio of position to speed says."""
+"""`cdtool init`: stated units, marked guesses, and the ratio of position to speed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdtool.units import find_unit
 from tests.data_folder import data, needs_data
 from tests.workflows.init.drafts import RPM, drafted, drafted_columns, stroke, write
 
-LEAD = 1.5e-3  # m of travel per rad of the motor
+LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
 
 @pytest.mark.parametrize("rate", [2500, 4000, 10000])

@@ -1,4 +1,4 @@
-"""The accelerometer against the derivative of the speed: what is wrong is found, and vibration is no evidence."""
+"""The accelerometer compared with the derivative of the speed: errors are found, and vibration is no evidence."""
 
 from __future__ import annotations
 

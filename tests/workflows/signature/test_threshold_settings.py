@@ -34,7 +34,7 @@ def door(tmp_path_factory) -> Path:
 
 def written(folder: Path, text: str) -> Path:
     file = folder / "benchmark.toml"
-    # A key of the file itself stands before its first table.
+    # A key of the file itself precedes its first table.
     key, table = (text, "") if text.startswith("threshold") else ("", text)
     file.write_text(HEAD + key + LOGS + table, encoding="utf-8")
     return file
@@ -54,7 +54,7 @@ def test_contacts_in_both_directions_are_found_whatever_the_threshold(door, text
     results = cdtool.benchmark(written(door, text)).results
     assert [row.outcome for row in results.contacts] == ["detected"] * 3
     assert all(5.0 < row.latency_ms < 200.0 for row in results.contacts)
-    # Obstacles oppose the motion: below where it goes backward (strokes 1 and 5), above where it goes forward.
+    # Obstacles oppose the motion: below the band in backward strokes (1 and 5), above it in forward ones.
     if "combined" not in text:
         assert [row.side for row in results.contacts] == ["below", "above", "below"]
 
