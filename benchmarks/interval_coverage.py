@@ -251,7 +251,7 @@ def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: 
     print(f"\nbelow {FEWEST} contacts: what is shown (- no interval), and the bootstrap of the mean, which is not")
     table(("", "mean", "median", "P95", "mean, not shown"), lines)
     error = math.sqrt(NOMINAL * (1.0 - NOMINAL) / repetitions)
-    text = f"only the median has an interval, with 6 contacts or more; it holds in {percent(NOMINAL)} (least {percent(least)})"
+    text = f"only the median has one, with 6 contacts or more; it holds in {percent(NOMINAL)} (least {percent(least)})"
     return said(text, sound and least >= NOMINAL - 3.0 * error)
 
 

@@ -4,11 +4,11 @@
     python benchmarks/lost_samples.py --learn 30 --judge 30 --machines gate --detectors friction_ekf
 
 Each threshold is learned from simulated impact-free runs; its safety factor is that of one alarming operation in 100
-(or one of those learned from, if they are fewer), set on each half of them with the other half. Other impact-free runs are
-tested twice: unchanged, and with 10 faults each (lost rows, repeated stamps, NaN or lost samples of one channel, 1 to
-50 samples long). Counted are the runs that alarm only with their faults, and only without: a one-sided exact test shows
-whether faults add alarms, and Holm's method keeps all tests of a call together at 5 %. Each cell is tested with the
-default debounce and without.
+(or one of those learned from, if they are fewer), set on each half of them with the other half. Other impact-free
+runs are tested twice: unchanged, and with 10 faults each (lost rows, repeated stamps, NaN or lost samples of one
+channel, 1 to 50 samples long). Counted are the runs that alarm only with their faults, and only without: a one-sided
+exact test shows whether faults add alarms, and Holm's method keeps all tests of a call together at 5 %. Each cell is
+tested with the default debounce and without.
 
 Contacts: a fault within half a second of the onset, or at the onset (before, across and after it), may cost its own
 length and 20 ms of latency. If the contact itself was in the fault, the evidence is lost, and if the whole log's alarm
