@@ -138,7 +138,7 @@ def _bare_app() -> tuple[str, int, int]:
         "",
         "@app.callback()",
         f"def root({_parameters(2)}) -> None:",
-        '    """How fast, how surely and at which force does it notice that it has hit something?"""',
+        '    """Measure how quickly, how reliably and at which force a collision is detected."""',
     ]
     commands = options = 0
     for name, command in _members(typer.main.get_command(app)):

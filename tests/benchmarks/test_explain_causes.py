@@ -37,7 +37,7 @@ def test_causes_and_first_movers_of_a_dozen_alarms_are_right(script):
     assert causes >= 11 and first >= 11, [(item.case.cause, item.cause, item.first) for item in told]
 
 
-def test_a_score_below_the_bar_ends_with_1(script, capsys):
+def test_a_score_below_the_bar_exits_with_1(script, capsys):
     (case,) = script.score(70, 1)
     wrong = script.Told(script.replace(case.case, cause="lost samples"), case.explanation)
     assert not script.report(70, [wrong])

@@ -28,7 +28,7 @@ def script() -> ModuleType:
     return module
 
 
-def test_no_hole_gives_a_wrong_onset_without_a_mark_or_a_pass_that_nobody_saw(script):
+def test_no_hole_causes_an_unmarked_wrong_onset_or_an_unmeasured_pass(script):
     counts, wrong = script.score(31, 12, 12)
     assert wrong == []
     assert sum(count.marked for count in counts.values()) > 10

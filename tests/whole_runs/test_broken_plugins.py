@@ -126,11 +126,11 @@ def test_the_others_are_listed_despite_an_unusable_package(install):
     install("import no_such_module")
     listed = cdtool("list", "detectors", "--json")
     assert listed.status == 3 and [entry["name"] for entry in json.loads(listed.out)] == DETECTORS.names()
-    assert "left out: odd: detector plug-in 'odd' of package 'odd-things' does not load" in listed.err
+    assert "left out: odd: detector plug-in 'odd' of package 'odd-things' cannot be loaded" in listed.err
     unknown = detect("momentun")
     assert unknown.status == 2 and "unknown detector 'momentun'; " in unknown.err
     assert "(did you mean momentum" in unknown.err
-    assert "package 'odd-things' does not load" in unknown.err
+    assert "package 'odd-things' cannot be loaded" in unknown.err
 
 
 def test_a_name_of_cdtool_itself_is_refused_and_cdtools_own_is_used(install):
@@ -324,7 +324,7 @@ def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path)
     assert cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt").status == 0
     (tmp_path / "list.txt").write_text("my own", encoding="utf-8")
     refused = cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt")
-    assert refused.status == 2 and "holds no list of cdtool" in refused.err
+    assert refused.status == 2 and "contains no list of cdtool" in refused.err
     listed = json.loads(cdtool("list", "writers", "--json").out)
     assert listed[-1]["name"] == "odd" and listed[-1]["suffixes"] == [".txt"]
 

@@ -66,7 +66,7 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
 
 
 def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:
-    """Return the recording that each name of a file means, None if there is none.
+    """Return the recording that each name of a file means, or None.
 
     Raises ConfigurationError for a file name that matches several.
     """
