@@ -18,9 +18,38 @@ def compare(
     significance: float = SIGNIFICANT,
     relevant_change: float = RELEVANT_CHANGE,
 ) -> BuildComparison:
-    """Compare the results of two builds, each given as the path of results.json or as `Results`.
+    """Compare the results of two builds.
 
-    Raises RecordingError if a file is not a results file; otherwise as `compare_builds`.
+    Parameters
+    ----------
+    old, new : str, Path or Results
+        A results.json, or the results in memory.
+    significance : float, optional
+        Family-wise error rate of "worse" and "better".
+    relevant_change : float, optional
+        The smallest change for the worse that matters, as a share; see `compare_builds`.
+
+    Returns
+    -------
+    BuildComparison
+        One row per detector and group, and the verdict over all of them.
+
+    Raises
+    ------
+    RecordingError
+        A file is not a results file.
+    ConfigurationError
+        A setting differs that defines the results.
+    UsageError
+        The two results have no detector and group in common, or a share is outside its range.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> results = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml").evaluated.results
+    >>> comparison = cdtool.compare(results, results)
+    >>> comparison.verdict, len(comparison.rows)
+    ('no change shown', 3)
     """
     return compare_builds(_results(old), _results(new), significance, relevant_change)
 

@@ -67,11 +67,39 @@ class Detected:
 
 
 def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
-    """Run one detector over one log with a signature file or fixed limits (one, or one per joint).
+    """Run one detector over a log, with a signature or with fixed limits.
 
-    The settings are those of `DetectionOptions`; `cdtool.detect` takes its fields as keywords. Raises UsageError unless
-    exactly one threshold is given, SignatureError if the signature does not belong to machine and log, and
-    RecordingError if the log cannot be read.
+    Parameters
+    ----------
+    log : str or Path
+        The log.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    Detected
+        The recording, the signal, band and alarms of each operation, and the contacts if the log has a ground truth.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or two are.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        The log cannot be read, or has no channel that the detector needs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found.detections[0].verdict.outcome, found.detections[0].statistic.unit
+    ('alarm', 'N')
+    >>> latency = found.detections[0].verdict.alarms[0].time - found.contacts[0].start
+    >>> 0.0 < latency < 0.2                                             # s
+    True
     """
     if benchmark := options.prepared():
         return _detect_prepared(Path(log), benchmark)

@@ -15,15 +15,30 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
 @dataclass(frozen=True)
 class DetectionOptions:
-    """The machine and the threshold, or a benchmark file with these and all other settings.
+    """The machine and the threshold, or a benchmark file that contains them and every other setting.
 
-    `signature` or `limit` (one number, or one per joint) is the threshold; a limit requires `detector`. With a limit,
-    `joints` are the joints to monitor (default: all); a signature monitors the joints it was learned for.
-    `operations`: whole, motion or trigger. `activation`: settings that differ from the signature's or the default.
-    `rules`: when contacts begin, and for how long an alarm belongs to a contact.
-
-    With `benchmark`, all of these come from the benchmark file; `detector` then selects one of its detectors, and a
-    signature file replaces the threshold.
+    Parameters
+    ----------
+    machine : str, Path or MachineFile, optional
+        The machine file; not with `benchmark`.
+    benchmark : str, Path or PreparedBenchmark, optional
+        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
+        `signature`, which replaces its threshold.
+    signature : str or Path, optional
+        A signature file, which contains detector, threshold and activation.
+    detector : str, optional
+        Name or short name of the detector; needed with `limit`.
+    limit : sequence of float, optional
+        Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
+    joints : sequence of str, optional
+        With `limit`, the joints to monitor; all by default. A signature monitors those that it was learned for.
+    operations : str, optional
+        How the log is cut into operations: whole, motion or trigger.
+    activation : ActivationSettings, optional
+        Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
+        hysteresis [share], latch.
+    rules : ScoringRules, optional
+        The onset rule of contacts, and how long after it an alarm belongs to a contact.
     """
 
     machine: str | Path | MachineFile | None = None

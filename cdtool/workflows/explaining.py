@@ -28,7 +28,7 @@ class Explained:
 
 
 def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
-    """Explain the cause of each alarm of one detector in one log, and why each missed contact was missed.
+    """Explain why a detector raised each alarm in a log, and why each contact was missed.
 
     Options and errors are those of `cdtool.workflows.detection.detect_log`.
     """

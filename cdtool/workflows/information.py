@@ -59,9 +59,34 @@ class Info:
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
-    """Survey a log piece by piece. With a machine file, map and cut it and check the accelerometer instead.
+    """Survey a log: channels, units, sample rates, gaps and findings.
 
-    The mapped channels are then kept in memory. Raises RecordingError.
+    Parameters
+    ----------
+    log : str or Path
+        The log, or a folder with its parts.
+    machine : str, Path or MachineFile, optional
+        With a machine file the mapped channels are surveyed on the load side, cut into operations, and checked against
+        each other; they are held in memory. Without one, the columns as logged, piece by piece.
+
+    Returns
+    -------
+    Info
+        One entry per channel or column, and the findings, the most severe first.
+
+    Raises
+    ------
+    RecordingError
+        The log cannot be read.
+    ConfigurationError
+        The machine file is wrong.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> survey = cdtool.info("sample_logs/gate/stiff/03.csv")
+    >>> survey.format, survey.channels[0].name, survey.channels[0].samples
+    ('csv', 't', 7200)
     """
     if machine is None:
         return _survey(Path(log))

@@ -1,4 +1,4 @@
-"""Call a workflow that takes an options object with the fields of that object: the Python API."""
+"""Turn a function of an options value into one of keywords: the Python API."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def by_keywords(
 def by_keywords(options: Callable[..., Any], run: Callable[..., Any]) -> Callable[..., Any]:
     """Return `run` as a function of the fields of its options: `detect(log, machine, detector="gm")`.
 
-    The options are the last parameter of `run`; the parameters before it are passed on unchanged.
+    The options are the last parameter of `run`; the parameters before it stay. In the docstring, the entry of the
+    options is replaced by those of their fields.
     """
     *others, _ = inspect.signature(run).parameters.values()
     signature = inspect.Signature([*others, *inspect.signature(options).parameters.values()])

@@ -63,11 +63,27 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True)
 class Questions:
-    """What to plan a test for: at least one of `difference_ms`, `missed_at_most`, `false_alarms_at_most`.
+    """What a test is planned for; at least one of `difference_ms`, `missed_at_most` and `false_alarms_at_most`.
 
-    `std_ms`: standard deviation of the differences within pairs, or within a set if `unpaired`; given, or from
-    `measured_std`. `missed_at_most` as 5% or 0.05; `false_alarms_at_most` as 1/1000op or 0.1/h. Answers are given for
-    no miss or false alarm and for `allowed` of them; None: one.
+    Parameters
+    ----------
+    difference_ms : float, optional
+        Difference of the mean latency of two detectors that the test has to show [ms].
+    std_ms : float or Measured, optional
+        Standard deviation of the differences within pairs, or within a group if `unpaired` [ms]: a number, or the
+        result of `measured_std`.
+    unpaired : bool, optional
+        The two detectors are tested on different impacts.
+    power : float, optional
+        Chance that the test shows the difference.
+    missed_at_most : str, optional
+        Share of missed contacts that the test has to exclude, as "5%" or "0.05".
+    false_alarms_at_most : str, optional
+        Rate of false alarms that the test has to exclude, as "1/1000op" or "0.1/h".
+    allowed : int, optional
+        Number of misses or false alarms to plan for as well as for none; by default one.
+    significance : float, optional
+        Chance of a wrong conclusion.
     """
 
     difference_ms: float | None = None
@@ -81,9 +97,33 @@ class Questions:
 
 
 def answer(questions: Questions) -> Plan:
-    """Return the number of impacts for a difference or a missed share, and the exposure for a false-alarm rate.
+    """Compute how many impacts, operations or hours a test needs.
 
-    The parameters are the fields of `Questions`. Raises UsageError without a question or for an incomplete one.
+    Parameters
+    ----------
+    questions : Questions
+        What the test has to show.
+
+    Returns
+    -------
+    Plan
+        One answer per question, in words and numbers.
+
+    Raises
+    ------
+    UsageError
+        No question is given, or one is incomplete or outside its range.
+
+    Notes
+    -----
+    `cdtool.evaluation.statistics.sample_size` has the equations.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> plan = cdtool.plan(missed_at_most="5%")
+    >>> [(need.amount, need.unit, need.allowed) for need in plan.answers[0].needs]
+    [(59, 'impacts', 0), (93, 'impacts', 1)]
     """
     difference_ms, std_ms, allowed = questions.difference_ms, questions.std_ms, questions.allowed
     check_significance(questions.significance)

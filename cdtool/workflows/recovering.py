@@ -44,12 +44,44 @@ class Recovered:
 def recover(
     source: Path, output: Path, unverified: bool = False, *, force: bool = False, progress: Progress | None = None
 ) -> Recovered:
-    """Write the readable messages of an MCAP file to a clean one.
+    """Write the remainder of a damaged MCAP file as a clean one.
 
-    Messages are copied byte for byte. Messages without a CRC (lost, or never written) are left out or, with
-    `unverified`, written to chunks without a CRC, so that damaged data never gets a valid checksum. The metadata record
-    `cdtool.recovered` states the source's SHA-256, what was lost and what is unverified. `force` overwrites another
-    existing file, never the source. Raises RecordingError if no message can be recovered, UsageError for wrong names.
+    Parameters
+    ----------
+    source : Path
+        The damaged file.
+    output : Path
+        The file to write, ending in .mcap.
+    unverified : bool, optional
+        Keep messages without a CRC (it is lost, or the recorder wrote none), in chunks without a CRC; else they are
+        left out. Damaged data is never marked as verified.
+    force : bool, optional
+        Replace an existing file, but never the source.
+    progress : callable, optional
+        Called with the number of messages written and the total.
+
+    Returns
+    -------
+    Recovered
+        The number of messages, and the findings. Messages are copied byte for byte; the metadata record
+        `cdtool.recovered` contains the SHA-256 of the source, and what was lost and what is unverified.
+
+    Raises
+    ------
+    RecordingError
+        The file is not an MCAP file, or no message can be recovered.
+    UsageError
+        The output already exists, or is not the name of an MCAP file.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from pathlib import Path
+    >>> whole = Path("sample_logs/gate/stiff/01.mcap").read_bytes()
+    >>> _ = Path("cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    >>> recovered = cdtool.recover(Path("cut.mcap"), Path("clean.mcap"), unverified=True)
+    >>> recovered.whole, recovered.messages > 0
+    (False, True)
     """
     from cdtool.formats.mcap import Mcap
     from cdtool.formats.mcap.container.log import Log

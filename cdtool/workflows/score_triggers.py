@@ -52,10 +52,41 @@ def score(
 ) -> Score:
     """Score the trigger times of any program against the contacts of a benchmark file's recordings.
 
-    `clock`: whether trigger times are seconds on the recording's clock, as cdtool shows it, or on the source's (for
-    example since an epoch). A recording without a row for a detector counts as monitored without an alarm;
-    `listed_only` leaves it out. Of the file's [limits], those on `*` and on the trigger file's detectors are checked.
-    Raises ConfigurationError for a wrong file, RecordingError if nothing could be scored.
+    Parameters
+    ----------
+    triggers : str or Path
+        A CSV file with the columns recording, time_s and, optionally, detector and blind_until_s.
+    benchmark : str or Path
+        The benchmark file with groups, onset rule, windows and limits.
+    clock : {"recording", "source"}, optional
+        Whether the times are those of the recording, as cdtool shows them, or of the log's own clock, an epoch for
+        example [s].
+    listed_only : bool, optional
+        Leave out a recording without a row for a detector; else it counts as monitored without an alarm.
+    jobs : int, optional
+        Number of logs processed at a time; the results do not depend on it.
+    progress : callable, optional
+        Called after each log with the number done and the total.
+
+    Returns
+    -------
+    Score
+        The results and their statistics. Of the file's limits, those on `*` and on detectors of the trigger file are
+        checked.
+
+    Raises
+    ------
+    ConfigurationError
+        The benchmark file or the trigger file is wrong.
+    RecordingError
+        No log could be scored.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> scored = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml")
+    >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
+    [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
     given = read_triggers(Path(triggers))
     names = tuple(given.rows)

@@ -66,9 +66,31 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
 
 
 def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:
-    """Return the recording that each name of a file means, or None.
+    """Return which recording each name of a file means.
 
-    Raises ConfigurationError for a file name that matches several.
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    names : iterable of str
+        Names in the file: paths relative to the benchmark file, or only file names.
+    recordings : collection of str
+        Paths of the recordings, relative to the benchmark file.
+
+    Returns
+    -------
+    dict of str to str or None
+        For each name its recording, or None.
+
+    Raises
+    ------
+    ConfigurationError
+        A file name fits several recordings.
+
+    Examples
+    --------
+    >>> by_recording(Path("triggers.csv"), ["01.csv", "stiff/02.csv", "09.csv"], {"soft/01.csv", "stiff/02.csv"})
+    {'01.csv': 'soft/01.csv', 'stiff/02.csv': 'stiff/02.csv', '09.csv': None}
     """
     found: dict[str, str | None] = {}
     for name in names:

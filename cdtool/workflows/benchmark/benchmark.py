@@ -63,16 +63,45 @@ def benchmark(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Benchmark:
-    """Learn the threshold of every detector, run the detectors over all groups and match alarms with contacts.
+    """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
 
-    `detectors`: detectors instead of the file's; a single "all" stands for every registered detector that can learn
-    from these logs, and the others are reported in `results.findings`. `false_alarm_budget`, as 1/1000op or 0.1/h,
-    sets each detector's safety factor on the runs learned from and overrides the file's.
+    Parameters
+    ----------
+    file : str, Path or BenchmarkFile
+        The benchmark file.
+    detectors : sequence of str, optional
+        Detectors in place of the file's. Only "all": every registered detector that can learn from these logs; the
+        others are listed in `results.findings`.
+    false_alarm_budget : str, optional
+        As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
+    jobs : int, optional
+        Number of logs processed at a time; the results do not depend on it.
+    progress : callable, optional
+        Called after each log with the number done and the total.
 
-    A log that cannot be read or scored is left out and listed in `results.skipped`. So is a detector without a
-    required channel; none of its contacts is assessable. Raises ConfigurationError for a wrong file, SignatureError
-    if nothing can be learned, RecordingError if nothing could be scored, UsageError if there are too few runs for the
-    budget.
+    Returns
+    -------
+    Benchmark
+        The results and their statistics. Logs that cannot be read or scored are listed in `results.skipped`; so is a
+        detector without one of its channels, all contacts of which are not assessable.
+
+    Raises
+    ------
+    ConfigurationError
+        The benchmark file or the machine file is wrong; the message names the key.
+    SignatureError
+        Nothing can be learned.
+    RecordingError
+        No log could be scored.
+    UsageError
+        There are too few runs for the false-alarm budget.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> done = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
+    >>> [(row.group, row.detected, row.missed) for row in done.evaluated.summaries]
+    [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
     limits = len(setup.limits)

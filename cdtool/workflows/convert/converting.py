@@ -58,12 +58,42 @@ def convert(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Converted:
-    """Write a log's mapped channels (as logged, SI), or without a machine file all numeric columns, to `output`.
+    """Write the mapped channels of a log, or without a machine file all its numeric columns, to another container.
 
-    A folder of parts, as written by rosbag2, is one log. Nothing is resampled: each channel keeps its own clock. A CSV
-    table has only one clock: with several, each is written to a separate file, `output` with `.1`, `.2` before the
-    suffix. Values are float64, bit for bit. With a machine file, a machine file for the converted log is written next
-    to each file. Raises UsageError for an unknown suffix and if a file already exists.
+    Parameters
+    ----------
+    source : str or Path
+        The log, or a folder with its parts, as rosbag2 writes it.
+    output : str or Path
+        The file to write; its suffix selects the container. A CSV table has only one clock: if there are several, each
+        is written to its own file, with `.1`, `.2` before the suffix.
+    machine : str, Path or MachineFile, optional
+        Maps the channels; they are written as logged, in SI units, with a machine file for each file written.
+    force : bool, optional
+        Replace existing files.
+    progress : callable, optional
+        Called with the number of rows written and the total.
+
+    Returns
+    -------
+    Converted
+        The files written, the number of columns and clocks, and the findings. Values are float64, bit for bit; each
+        channel keeps its own clock.
+
+    Raises
+    ------
+    UsageError
+        The suffix is unknown, or a file already exists.
+    RecordingError
+        The log cannot be read, or has none of the mapped channels.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> machine = "sample_logs/gate/machine.toml"
+    >>> converted = cdtool.convert("sample_logs/gate/stiff/03.csv", "stiff-03.mcap", machine=machine)
+    >>> converted.files, converted.columns
+    (('stiff-03.mcap',), 7)
     """
     log, target = Path(source), Path(output)
     writer = _writer(target)

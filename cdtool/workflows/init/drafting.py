@@ -40,10 +40,36 @@ class Drafted:
 
 
 def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
-    """Write a draft machine file for a log, so that `cdtool info` runs with it. Raises CdtoolError.
+    """Write a draft of a machine file for a log.
 
-    A channel whose guess the log contradicts is written as a comment; if no channel is recognised, all columns are
-    written as comments. An existing file is overwritten only with `force`.
+    Parameters
+    ----------
+    log : str or Path
+        The log, or a folder with its parts.
+    output : str or Path, optional
+        The file to write.
+    force : bool, optional
+        Replace an existing file.
+
+    Returns
+    -------
+    Drafted
+        The text, in which CHECK marks what is uncertain; the channels mapped; those in it only as comments, because the
+        log contradicts the guess; and the findings of `cdtool info` with the draft.
+
+    Raises
+    ------
+    UsageError
+        The file already exists.
+    RecordingError
+        The log cannot be read.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> draft = cdtool.init("sample_logs/gate/stiff/03.csv", "draft.toml")
+    >>> "[machine]" in draft.text, "CHECK" in draft.text, "speed" in draft.channels
+    (True, True, True)
     """
     target = Path(output)
     if target.exists() and not force:

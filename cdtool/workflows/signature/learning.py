@@ -39,10 +39,28 @@ class Learned:
 class LearningOptions:
     """The machine, the detector and how its threshold is learned.
 
-    `rule` is any threshold rule with its settings (safety factor, sides, alignment, force ...); None: a signature.
-    `joints` are the joints to monitor (default: all); `operations`: whole, motion or trigger; `activation` are settings
-    that differ from the default. `false_alarm_budget`, as 1/300op or 0.1/h, sets the safety factor on these runs by
-    cross-validation. A run in which the load cell shows a contact by the `onset` rule is left out.
+    Parameters
+    ----------
+    machine : str, Path or MachineFile
+        The machine file.
+    detector : str
+        Name or short name of the detector.
+    rule : Threshold, optional
+        Any threshold with its settings; by default a `Signature`.
+    joints : sequence of str, optional
+        The joints to monitor; all by default.
+    operations : str, optional
+        How the logs are cut into operations: whole, motion or trigger.
+    activation : ActivationSettings, optional
+        Settings of the activation that replace the default: debounce [samples], rearm [s], hysteresis [share], latch.
+    false_alarm_budget : str, optional
+        As "1/300op" or "0.1/h": sets the safety factor by cross-validation on these runs.
+    onset : OnsetRule, optional
+        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    jobs : int, optional
+        Number of logs read at a time.
+    progress : callable, optional
+        Called after each log with the number done and the total.
     """
 
     machine: str | Path | MachineFile
@@ -61,8 +79,36 @@ class LearningOptions:
 def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     """Learn one detector's threshold from impact-free logs: a signature for each class of motion, or another rule.
 
-    The options are those of `LearningOptions`. Raises SignatureError for too few runs, UsageError for too few for the
-    budget, CdtoolError if nothing can be read. Write the result with `cdtool.signature_store.write_signature`.
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        Impact-free logs.
+    options : LearningOptions
+        The machine, the detector and how its threshold is learned.
+
+    Returns
+    -------
+    Learned
+        The content of a signature file, with one threshold per class of motion if the rule distinguishes classes, and
+        the runs left out. `cdtool.signature_store.write_signature` writes it.
+
+    Raises
+    ------
+    SignatureError
+        There are too few runs, or the detector is not assessable in them.
+    UsageError
+        There are too few runs for the false-alarm budget, or the safety factor is set twice.
+    CdtoolError
+        No log can be read.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from pathlib import Path
+    >>> free = sorted(Path("sample_logs/gate/free").iterdir())
+    >>> learned = cdtool.learn_signature(free, "sample_logs/gate/machine.toml", "momentum")
+    >>> [(motion.described, runs) for motion, runs in learned.runs]
+    [('forward at 0.201 m/s', 10)]
     """
     machine, joints, operations = options.machine, options.joints, options.operations
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)

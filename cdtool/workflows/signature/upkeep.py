@@ -95,8 +95,20 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
 class SeasonOptions:
     """Impact-free logs of a machine, and how they are read.
 
-    `operations`: how logs are cut; None: as for learning. A run in which the load cell shows a contact by the `onset`
-    rule is left out.
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        Impact-free logs in order of time; those that the signature was learned from are recognised by content.
+    machine : str, Path or MachineFile
+        The machine file.
+    operations : str, optional
+        How the logs are cut into operations; only the way used for learning is possible, and it is the default.
+    onset : OnsetRule, optional
+        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    jobs : int, optional
+        Number of logs read at a time.
+    progress : callable, optional
+        Called after each log with the number done and the total.
     """
 
     logs: Sequence[str | Path]
@@ -120,17 +132,29 @@ class SeasonOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions(SeasonOptions):
-    """`target`: the false-alarm probability per operation that the runs must demonstrate."""
+    """How a signature is checked.
+
+    Parameters
+    ----------
+    target : float, optional
+        The chance of a false alarm per operation that the runs have to show.
+    """
 
     target: float = TARGET
 
 
 @dataclass(frozen=True, kw_only=True)
 class UpdateOptions(SeasonOptions):
-    """`forget`: effective number of runs; None: all have equal weight.
+    """How runs are added to a signature.
 
-    The deviation of a run is limited to `cap` spreads; no run may move a limit more than `reserve` spreads from its
-    first learned value.
+    Parameters
+    ----------
+    forget : float, optional
+        Effective number of runs, above 1: older runs are forgotten. By default all runs count equally.
+    cap : float, optional
+        The deviation of a run counts up to this many spreads.
+    reserve : float, optional
+        No run may move a limit further than this many spreads from where it was first learned.
     """
 
     forget: float | None = None
@@ -139,12 +163,40 @@ class UpdateOptions(SeasonOptions):
 
 
 def check_by(path: str | Path, options: CheckOptions) -> Checked:
-    """Check a signature with impact-free logs: those it was learned from, and those of a later season.
+    """Check a signature against impact-free logs: do its runs suffice, and has the machine drifted since?
 
-    Each run learned from is checked against a signature of all the others; `target` is what these runs must
-    demonstrate. Later runs, in the given order, are checked for drift. Logs are identified by their content. The
-    options are those of `CheckOptions` and `SeasonOptions`. Raises SignatureError if the file does not belong or
-    contains no signature, or logs are cut differently; CdtoolError if nothing can be read.
+    Parameters
+    ----------
+    path : str or Path
+        The signature file.
+    options : CheckOptions
+        The logs, the machine and the target.
+
+    Returns
+    -------
+    Checked
+        For each class of motion the coverage (each run learned from is assessed by a signature of the others), the
+        drift in the other logs, and advice.
+
+    Raises
+    ------
+    SignatureError
+        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+    UsageError
+        The target is not a chance.
+    CdtoolError
+        No log can be read.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from cdtool.signature_store import write_signature
+    >>> from pathlib import Path
+    >>> free, machine = sorted(Path("sample_logs/gate/free").iterdir()), "sample_logs/gate/machine.toml"
+    >>> write_signature("gate.gm.json", cdtool.learn_signature(free, machine, "momentum").signature)
+    >>> coverage = cdtool.check_signature("gate.gm.json", free, machine).classes[0].coverage
+    >>> len(coverage.runs), coverage.alarms, coverage.enough
+    (10, 0, True)
     """
     target = options.target
     if not LEAST_TARGET <= target < 1.0:
@@ -208,11 +260,42 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
 
 
 def update_by(path: str | Path, options: UpdateOptions) -> Updated:
-    """Add impact-free runs to a signature file, by Welford's method or with forgetting.
+    """Add impact-free runs to a signature file.
 
-    A run is refused if it moves a limit too far, has an alarm, shows a contact on the load cell, is in the signature
-    already, ends early, or is not assessable. The options are those of `UpdateOptions` and `SeasonOptions`. Raises
-    SignatureError if the file does not belong.
+    Parameters
+    ----------
+    path : str or Path
+        The signature file; it is replaced.
+    options : UpdateOptions
+        The logs, the machine and how the runs count.
+
+    Returns
+    -------
+    Updated
+        The new content, the runs added, and those refused with the reason: a run that moves a limit too far, has an
+        alarm or a contact, is already in the signature, ends early or is not assessable.
+
+    Raises
+    ------
+    SignatureError
+        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+    UsageError
+        A setting is outside its range.
+
+    Notes
+    -----
+    Mean and variance are updated by Welford's recursion, or with `forget` by exponential forgetting.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from cdtool.signature_store import write_signature
+    >>> from pathlib import Path
+    >>> free, machine = sorted(Path("sample_logs/gate/free").iterdir()), "sample_logs/gate/machine.toml"
+    >>> write_signature("season.json", cdtool.learn_signature(free, machine, "momentum").signature)
+    >>> updated = cdtool.update_signature("season.json", ["sample_logs/gate/holdout/03.csv", free[0]], machine)
+    >>> len(updated.added), [skipped.reason for skipped in updated.refused]
+    (1, ['this run is in the signature already'])
     """
     forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:

@@ -35,12 +35,43 @@ def study_sensors(
     factor: float = 5.0,
     options: Mapping[str, float] | None = None,
 ) -> SensorStudy:
-    """Rank the sensors of a machine by how early they detect an impact (thesis figure 4.10).
+    """Rank the sensors of a machine by how early they respond to an impact.
 
-    `study` is a TOML file with the tables [impact], [drive], [controller], [sensors.NAME]; `options` by their keys,
-    such as {"impact.speed": 0.2}, override it. `factor` is the k of k sigma. For an arm or a robot, one joint is
-    studied while the others are at rest. Raises ConfigurationError or UsageError for missing inertias of load and
-    motor, and for meaningless values.
+    Parameters
+    ----------
+    machine : str or Path
+        The machine file.
+    study : str or Path, optional
+        A TOML file with the tables [impact], [drive], [controller] and [sensors.NAME].
+    joint : str, optional
+        The joint of an arm or robot that is hit while the others are at rest.
+    factor : float, optional
+        k: a sensor has responded when its value exceeds k standard deviations of its noise.
+    options : mapping of str to float, optional
+        Values by key, such as {"impact.speed": 0.2}; they take precedence over the file.
+
+    Returns
+    -------
+    SensorStudy
+        The ranking, whether the load counts as rigid, and the assumptions.
+
+    Raises
+    ------
+    ConfigurationError
+        The machine file or the study file is wrong.
+    UsageError
+        The machine file does not give the inertias of load and motor, or a value is outside its range.
+
+    Notes
+    -----
+    Thesis figure 4.10, computed by simulating the impact: 4.20, or 4.21 and 4.23 corrected (docs/errata.md).
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> study = cdtool.study_sensors("sample_logs/gate/machine.toml", "docs/examples/gate_study.toml")
+    >>> [sight.sensor.name for sight in study.ranking.sights]
+    ['load_cell', 'accelerometer', 'torque_sensor', 'motor_position', 'motor_speed', 'motor_torque']
     """
     file = read_machine_file(machine)
     found = read_study(file, study, joint, options)
