@@ -26,7 +26,7 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 # Prefix of the reason for a log that is used although part of it is lost.
-DAMAGED = "damaged, intact part used: "
+DAMAGED = "damaged, used as far as it goes: "
 # Called after each piece of work with the amount done and the total.
 Progress = Callable[[int, int], None]
 

@@ -66,7 +66,7 @@ def test_losses_come_first(tmp_path):
 
 def test_many_warnings_do_not_hide_a_loss_on_screen(capsys):
     warnings = [Skipped(f"free/{i:02d}.csv", f"time: the sample period varies by {i} % (std)") for i in range(46)]
-    lost = [Skipped("free/07.csv", "damaged, intact part used: time: 3 time stamps run backward")]
+    lost = [Skipped("free/07.csv", "damaged, used as far as it goes: time: 3 time stamps run backward")]
     print_skipped(lost, warnings)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2 and lines[0].startswith("loss: free/07.csv: time: 3")
