@@ -64,7 +64,7 @@ def show_table(evaluated: Evaluated) -> None:
 
 
 def show_conclusion(evaluated: Evaluated) -> None:
-    """Print the conclusion, then limits, force profiles and contacts with a problem."""
+    """The first lines on screen: the conclusion, then what of limits, force profiles and contacts is not good."""
     from cdtool.report.verdict_words import counts_words, verdict_words
 
     conclusion = evaluated.results.conclusion
@@ -115,7 +115,7 @@ def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
 
 
 def _latency(item: Summary, column: LatencyColumn) -> str:
-    """Return a latency with its interval; quantiles have theirs only if they replace the mean."""
+    """A figure of the latency; the intervals of quantiles only where they stand for that of a mean."""
     from cdtool.report.few_contacts import latency_figure
 
     if column == "range":

@@ -34,7 +34,7 @@ NAMES = [
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is not a package."""
+    """docs/make_diagrams.py with the drawings of make_impact_diagrams.py; docs is no package."""
     for name in ("make_diagrams", "make_impact_diagrams"):
         spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
         assert spec and spec.loader

@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
-# Pages and the minimum number of commands they show; a page that loses its commands is noticed.
+# Pages and how many commands they show at least; a page that loses its commands is noticed.
 COMMANDS = {
     "README.md": 4,
     "docs/quick-start.md": 6,

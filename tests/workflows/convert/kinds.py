@@ -15,7 +15,7 @@ SEVERAL_CLOCKS = KINDS[1:]
 
 
 def needs(*suffixes: str) -> None:
-    """Skip, by name, if a container's library is missing."""
+    """Skip, by name, where a container's library is absent."""
     for suffix in suffixes:
         if suffix in LIBRARIES:
             pytest.importorskip(LIBRARIES[suffix])
