@@ -23,7 +23,7 @@ def benchmark(
     ] = None,
     false_alarm_budget: Annotated[
         str | None,
-        typer.Option("--false-alarm-budget", help="Set each safety factor for 1/1000op (operations) or 0.1/h."),
+        typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
     ] = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,

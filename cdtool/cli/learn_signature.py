@@ -42,7 +42,7 @@ def learn_signature(
     ] = None,
     false_alarm_budget: Annotated[
         str | None,
-        typer.Option("--false-alarm-budget", help="Set the safety factor for 1/300op or 0.1/h; needs many runs."),
+        typer.Option("--false-alarm-budget", help="Set the safety factor for this rate, as 1/300op or 0.1/h."),
     ] = None,
     operations: OperationsOption = "whole",
     rule: Annotated[

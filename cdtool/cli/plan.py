@@ -35,7 +35,7 @@ def plan(
     ] = False,
     power: Annotated[float, typer.Option("--power", help="Probability of detecting a difference of that size.")] = 0.8,
     missed_at_most: Annotated[
-        str, typer.Option("--missed-at-most", help="Upper bound of missed contacts to show, as 5%.")
+        str, typer.Option("--missed-at-most", help="Upper bound of the missed share to show, as 5%.")
     ] = "",
     false_alarms_at_most: Annotated[
         str,

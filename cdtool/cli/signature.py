@@ -93,7 +93,7 @@ def check(
     Runs in the signature are checked against a signature of all the others (leave one out). Other runs are treated as a
     season, in the given order.
 
-    Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
+    Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.workflows.signature.normal_runs import notes_on
