@@ -23,7 +23,7 @@ Key = tuple[str, int]
 def check_significance(level: float) -> None:
     """Raise UsageError where a significance level is not between 1e-9 and 0.5."""
     if not _LEAST_LEVEL <= level < 0.5:
-        hint = "a share of at least 0.000000001 and below 0.5, such as 0.05"
+        hint = "give a share of at least 0.000000001 and below 0.5, such as 0.05"
         raise UsageError(f"significance level is {level:g}", hint)
 
 

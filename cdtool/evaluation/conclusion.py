@@ -225,7 +225,7 @@ def _reasons(
                 text = f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"
                 yield plain(text)
     for each in missed:
-        why = "where a force profile is set" if each in forbidden else "and no limit says how many may be"
+        why = "where a force profile is set" if each in forbidden else "and no limit on misses is set"
         yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
     for each in blind:
         yield plain(f"{each.detector}, {each.group}: {_why_blind(results, each)}")

@@ -110,7 +110,7 @@ def test_false_alarms_are_counted_in_groups_without_contacts():
     [
         ('"gmm.stiff.mean_ms" = { max = 1 }', "unknown detector 'gmm'.*gm"),
         ('"gm.stif.mean_ms" = { max = 1 }', "unknown group 'stif'.*stiff"),
-        ('"gm.stiff.mean" = { max = 1 }', "unknown figure 'mean'.*mean_ms"),
+        ('"gm.stiff.mean" = { max = 1 }', "unknown metric 'mean'.*mean_ms"),
         ('"gm" = { max = 1 }', "does not name a metric"),
         ('"gm.stiff.mean_ms" = { }', "has no bound"),
         ('"gm.stiff.mean_ms" = 5', "a table"),
@@ -125,12 +125,12 @@ def test_a_wrong_limit_is_one_line_that_names_its_key(text, said):
 
 
 def test_a_figure_of_contacts_in_a_group_without_any_is_an_error():
-    with pytest.raises(ConfigurationError, match="no such figure"):
+    with pytest.raises(ConfigurationError, match="not available in these results"):
         check('"gm.holdout.p95_ms" = { max = 1 }')
 
 
 def test_a_detector_that_was_not_run_is_an_error():
-    with pytest.raises(ConfigurationError, match="no such figure"):
+    with pytest.raises(ConfigurationError, match="not available in these results"):
         check_limits(
             rules('"gm.stiff.p95_ms" = { max = 1 }'), [item for item in SUMMARIES if item.detector != "momentum"]
         )
@@ -141,7 +141,7 @@ def test_without_monitored_time_a_limit_on_false_alarms_does_not_pass():
     summaries = [item for item in summarise(blind) if item.detector == "friction_ekf" and item.group == "holdout"]
     for figure in ("false_alarms", "false_alarms_per_operation_at_most", "false_alarms_per_hour"):
         (limit,) = check_limits(rules(f'"feekf.holdout.{figure}" = {{ max = 9 }}'), summaries)
-        assert limit.outcome == "not_assessable" and limit.reason == "nothing was watched"
+        assert limit.outcome == "not_assessable" and limit.reason == "nothing was monitored"
     assert FIGURES["operations"](summaries[0]) == 0
 
 

@@ -101,9 +101,9 @@ def _steps(table: Table) -> tuple[ForceStep, ...]:
         if not steps and step.from_s != 0.0:
             raise row.fault("from_s", f"is {step.from_s:g}", "the first step begins with the contact, at 0")
         if steps and step.from_s <= steps[-1].from_s:
-            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times have to increase")
+            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times must increase")
         if any(step.name == earlier.name for earlier in steps):
-            raise row.fault("name", f"'{step.name}' names two steps", "a name of its own for each step")
+            raise row.fault("name", f"'{step.name}' names two steps", "give each step a different name")
         steps.append(step)
     return tuple(steps)
 

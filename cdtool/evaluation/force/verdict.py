@@ -171,9 +171,7 @@ def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
     earlier = (curve.time >= step.from_s - curve.uncertainty) & (curve.time < step.from_s)
     largest = float(np.max(curve.force[earlier], initial=0.0))
     if step.from_s > 0.0 and largest > step.at_most_n:
-        return (
-            f"the onset may lie up to {1e3 * curve.uncertainty:.0f} ms earlier, and then {largest:.4g} N are too much"
-        )
+        return f"the onset may be up to {1e3 * curve.uncertainty:.0f} ms earlier, and {largest:.4g} N are then too high"
     return ""
 
 

@@ -67,9 +67,12 @@ def _take(row: NamedRow, said: Triggered) -> None:
     time, until = row.seconds("time_s"), row.seconds("blind_until_s")
     if until is not None:
         if time is None:
-            raise row.fault(f"blind_until_s is {until:g}, time_s is missing", "time_s: from when on it could not judge")
+            raise row.fault(
+                f"blind_until_s is {until:g}, time_s is missing",
+                "give time_s, the beginning of the time that is not assessable",
+            )
         if until < time:
-            raise row.fault(f"blind from {time:g} until {until:g}", "time_s is the begin, and comes first")
+            raise row.fault(f"blind from {time:g} until {until:g}", "time_s must be before blind_until_s")
         said.blind.append((time, until))
     elif time is not None:
         said.alarms.append(time)

@@ -179,7 +179,7 @@ def test_if_even_all_misses_would_show_nothing_this_is_stated():
 
 def test_a_detector_without_monitored_time_has_no_false_alarms_to_compare():
     found = compare_builds(single(latencies(), hours=1.0), single(latencies(), hours=0.0))
-    assert asked(found, "false_alarms").reason == "nothing was watched in one of them"
+    assert asked(found, "false_alarms").reason == "nothing was monitored in one of them"
 
 
 def test_operations_not_assessable_in_one_build_count_without_contacts():

@@ -132,7 +132,7 @@ def test_five_thousand_contacts_take_little_memory():
     ("values", "clusters", "statistic", "said"),
     [
         ([1.0, 2.0], [0, 1], "avarage", "unknown statistic 'avarage'"),
-        ([1.0, 2.0], [0], "mean", "do not fit"),
+        ([1.0, 2.0], [0], "mean", "do not match"),
         ([1.0, math.nan], [0, 1], "mean", "missing or infinite"),
         ([1.0, math.inf], [0, 1], "mean", "missing or infinite"),
     ],

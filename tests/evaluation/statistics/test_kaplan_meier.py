@@ -173,10 +173,10 @@ def test_a_detection_that_becomes_a_miss_makes_no_quantile_earlier(pairs, which)
 @pytest.mark.parametrize(
     ("latency", "missed", "share", "level", "said"),
     [
-        ([1.0, 2.0], [False], 0.5, 0.95, "do not fit"),
+        ([1.0, 2.0], [False], 0.5, 0.95, "do not match"),
         ([1.0, math.nan], [False, True], 0.5, 0.95, "missing or below 0"),
         ([-1.0], [False], 0.5, 0.95, "missing or below 0"),
-        ([1.0], [False], 95, 0.95, "quantile asked for is 95"),
+        ([1.0], [False], 95, 0.95, "quantile is 95"),
         ([1.0], [False], 0.5, 95, "confidence level is 95"),
     ],
 )

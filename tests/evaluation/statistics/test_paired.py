@@ -167,7 +167,7 @@ def test_holms_correction_keeps_the_order_and_lies_between_p_and_bonferroni(p_va
     ("call", "said"),
     [
         (lambda: paired_difference([1.0, math.nan], [0, 1]), "missing or infinite"),
-        (lambda: paired_difference([1.0], [0, 1]), "do not fit"),
+        (lambda: paired_difference([1.0], [0, 1]), "do not match"),
         (lambda: unpaired_difference([1.0], [math.inf], [0], [0]), "missing or infinite"),
         (lambda: unpaired_difference([1.0], [1.0], [0], [0], level=5.0), "confidence level is 5"),
         (lambda: mcnemar_p(-1, 2), "only_first is -1"),

@@ -88,7 +88,7 @@ def test_a_missed_contact_is_later_than_all_in_the_upper_bound_and_counts_from_i
 def test_correlated_contacts_of_few_recordings_have_no_interval():
     found = median_of(np.arange(30) + 20.0, [False] * 30, np.arange(30) % 5)
     assert math.isnan(found.low) and found.value == 34.5
-    assert "there are 5, and contacts of one recording are alike" in found.reason
+    assert "there are 5, and contacts of one recording are correlated" in found.reason
     assert not math.isnan(median_of(np.arange(30) + 20.0, [False] * 30, np.arange(30) % 10).low)
 
 

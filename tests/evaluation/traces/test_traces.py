@@ -119,7 +119,7 @@ def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
     assert {7, 507, 1007, 1507, 2007, 2507} <= set(numbers)
     slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
     assert set(slowest) <= set(numbers)
-    assert sum(item.chosen == "taken evenly from all" for item in kept) == 20
+    assert sum(item.chosen == "evenly sampled from all" for item in kept) == 20
 
 
 def test_misses_beyond_the_maximum_are_counted():

@@ -60,4 +60,4 @@ def test_it_is_counted_separately_and_in_no_other_result():
     assert len(results.scored_contacts) == 3 and len(latencies(rows)[0]) == 3
     alone = summarise(Results({}, ("gm",), ("stiff",), rows[:1], (), ()))[0]
     assert alone.contacts == 0 and np.isnan(alone.mean_ms)
-    assert alone.why_undefined("missed") == "1 of 1 contacts had begun when the recording did"
+    assert alone.why_undefined("missed") == "1 contact was in progress when the recording began"

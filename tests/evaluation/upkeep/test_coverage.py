@@ -95,7 +95,7 @@ def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs()
     # The first sample after it counts for the last two grid points before it.
     assert gap.start == pytest.approx(travel[2400] - travel[402], abs=0.003)
     assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
-    assert "valid in at most 64 % of the runs; 80 % are needed" in gap.described
+    assert "valid in at most 64 % of the runs; 80 % are required" in gap.described
     assert not others
 
 
@@ -119,7 +119,7 @@ def test_an_unassessable_run_is_named_and_not_counted():
 
 
 def test_too_few_runs_and_an_invalid_target_are_refused():
-    with pytest.raises(SignatureError, match="2 runs to judge by the others"):
+    with pytest.raises(SignatureError, match="2 runs to check against the others"):
         check_coverage(RUNS[:2], replace(RULE, force=True), ACTIVATION)
     with pytest.raises(SignatureError, match="9 impact-free runs"):
         check_coverage(RUNS[:9], RULE, ACTIVATION)

@@ -157,7 +157,7 @@ def test_each_run_has_its_critical_factor_and_its_alarm():
         assert run.alarm == (detection.verdict.outcome == "alarm")
     assert found.alarms == (7,) and joint.runs[7].local_at == pytest.approx(0.4, abs=0.03)
     assert verdicts(joint)[0] == "an alarm in 1 of 12 runs, first in run 8 (run7)"
-    assert advice(None, found) == "look at the alarms with cdtool explain: no drift is shown"
+    assert advice(None, found) == "analyse the alarms with cdtool explain: no drift is shown"
 
 
 def test_joints_are_audited_separately():
@@ -191,7 +191,7 @@ def test_few_runs_show_nothing_and_an_unassessable_run_is_named():
     assert found.names == tuple(f"run{i}" for i in range(9) if i != 4)
     ((name, reason),) = found.not_assessable
     assert name == "run4" and "not applicable" in reason
-    assert "8 runs: too few to show a drift; at least 10 are needed" in verdicts(found.joints[0])
+    assert "8 runs: too few to show a drift; at least 10 are required" in verdicts(found.joints[0])
     with pytest.raises(SignatureError, match=r"no run to compare with the signature.*not applicable"):
         audit_drift(FITTED, [late[4]], ACTIVATION)
 

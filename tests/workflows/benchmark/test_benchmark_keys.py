@@ -159,7 +159,7 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofile = "yard"\nfile = "yard.toml"\n', "force.file: unknown key"),
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
         ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*also in 'a'"),
-        ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown figure"),
+        ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown metric"),
     ],
 )
 def test_a_wrong_key_is_one_line_that_names_it(gate, text, said):
