@@ -65,7 +65,7 @@ def test_a_reason_of_some_detectors_names_them():
     left_out = LeftOut()
     left_out.add("pure_inertia", [Skipped("a.csv", "no acceleration"), Skipped("b.csv", "another class")])
     left_out.add("momentum", [Skipped("b.csv", "another class")])
-    assert left_out.said_once() == [
+    assert left_out.combined() == [
         Skipped("a.csv", "pure_inertia: no acceleration"),
         Skipped("b.csv", "another class"),
     ]

@@ -75,7 +75,7 @@ def learn_thresholds(
                 )
             )
         learned.thresholds[detector.name] = thresholds
-    learned.skipped.extend(left_out.said_once())
+    learned.skipped.extend(left_out.combined())
     learned.unused.update(set.intersection(*unused) if unused else ())
     if learned.unusable and len(learned.unusable) == len(detectors):
         raise _none_usable(learned.unusable, known=bool(operations))

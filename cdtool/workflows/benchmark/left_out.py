@@ -20,7 +20,7 @@ class LeftOut:
         for item in skipped:
             self._reasons.setdefault(item, {})[detector] = None
 
-    def said_once(self) -> list[Skipped]:
+    def combined(self) -> list[Skipped]:
         """Return each run with each reason once."""
         return [
             item

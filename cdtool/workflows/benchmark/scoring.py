@@ -91,7 +91,7 @@ def detect_with(
             left_out.add(detector.name, failed)
             for of_operation, detection in zip(found, made, strict=not failed):
                 of_operation.append(detection)
-        scored.skipped += left_out.said_once()
+        scored.skipped += left_out.combined()
         return found
 
     return detect
