@@ -50,7 +50,7 @@ def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_move
     assert done.status == 0 and done.err == ""
     told = " ".join(done.out.split())
     assert "ms after the contact (onset at" in told and "load cell)" in told
-    assert "gate: above its upper limit" in told and "needs 9 consecutive samples outside" in told
+    assert "gate: above its upper limit" in told and "debounce: 9 consecutive samples outside" in told
     assert "Moved first: acceleration down" in told
     assert "Likely cause: a contact: speed of gate" in told and "N (normal:" in told
     assert "Compared with 11 impact-free runs at the same position in the motion." in told
@@ -174,7 +174,7 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
         # The figure's folder is checked before the log.
-        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "make")),
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "create")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),
         ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
