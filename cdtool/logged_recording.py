@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cdtool.dynamics import Machine
 from cdtool.plausible import PlausibleRanges
@@ -12,11 +12,17 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class LoggedRecording:
-    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers."""
+    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers.
+
+    `format`, `details` and, of a table of text, `dialect` are what its files state.
+    """
 
     recording: Recording
     factors: Mapping[str, tuple[float, ...]]
     speed_low_pass: float
+    format: str = ""
+    details: Mapping[str, str] = field(default_factory=dict)
+    dialect: str = ""
 
     def on_load_side(
         self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False

@@ -22,7 +22,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
 from cdtool.report.plots.detection_plot import plot_detected
 from cdtool.report.plots.figures import drawing, new_figure, save
-from cdtool.report.plots.trigger_plot import most_telling, plot_triggers
+from cdtool.report.plots.trigger_plot import most_informative, plot_triggers
 from cdtool.signature_store import write_signature
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
@@ -193,7 +193,7 @@ def triggers(done: dict[str, Benchmark]) -> None:
         ("arm2", "soft"): "6_10b",
     }
     for (machine, group), number in names.items():
-        trace = most_telling([trace for trace in done[machine].traces if trace.group == group])
+        trace = most_informative([trace for trace in done[machine].traces if trace.group == group])
         plot_triggers(trace, IMAGES / f"reproduction_{number}.png")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdtool.detectors.momentum import Momentum
 from cdtool.errors import ConfigurationError
 from cdtool.machine_file import fingerprint, read_machine_file
 
@@ -55,7 +56,7 @@ def test_the_example_of_the_documentation_is_read(tmp_path):
     assert file.columns.time.factor == 1e-3
     assert [source.topic for source in file.topics.sources] == ["/joint_states"]
     assert file.detector("feekf").minimum_speed == 0.02
-    assert file.detector("gm").bandwidth == 10.0
+    assert file.detector("gm") == Momentum()
 
 
 @pytest.mark.parametrize(

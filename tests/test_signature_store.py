@@ -20,19 +20,20 @@ from cdtool.signature_store import read_signature, update_signature, write_signa
 from cdtool.thresholds.normal_motion import learn_normal_motion
 from cdtool.thresholds.signature import Signature
 
+DETECTOR = Momentum(10.0)
 RULE = Signature(position_step=0.02, position_window=0.1)
 
 
 @pytest.fixture(scope="module")
 def learned(gate, simulated) -> SignatureFile:
     recordings = [simulated("none", seed) for seed in range(10, 22)]
-    fitted = RULE.fit([(item, Momentum().signal(item, gate)) for item in recordings])
+    fitted = RULE.fit([(item, DETECTOR.signal(item, gate)) for item in recordings])
     runs = tuple(LearnedRun(item.name, item.digest) for item in recordings)
     return SignatureFile(
         machine="gate",
         machine_fingerprint=fingerprint(gate),
         detector="momentum",
-        gains={"bandwidth": 10.0},
+        gains={"bandwidth": DETECTOR.bandwidth},
         unit="N",
         joints=fitted.joints,
         rule=RULE,
@@ -91,11 +92,11 @@ def test_invalid_normal_motions_are_a_damaged_file(tmp_path, learned):
 
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
-    learned.check(gate, Momentum())
+    learned.check(gate, DETECTOR)
     with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, but the machine file has 12\.0"):
         learned.check(gate, Momentum(12.0))
     with pytest.raises(SignatureError, match="another machine"):
-        learned.check(replace(gate, load_inertia=(621.0,)), Momentum())
+        learned.check(replace(gate, load_inertia=(621.0,)), DETECTOR)
     from cdtool.detectors.pure_torque import PureTorque
 
     with pytest.raises(SignatureError, match="learned with momentum"):

@@ -58,14 +58,15 @@ def compare(
     Example: cdtool compare old.json new.json -o compare.md
     """
     from cdtool.foreign_files import refuse_inputs
-    from cdtool.report.build_report import check_outputs, to_json, write_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.writers.comparison_json import to_json
     from cdtool.workflows.comparing import compare as run
 
     targets = output or []
     refuse_inputs(targets, (old, new))
-    check_outputs(targets, force=force)
+    check_outputs(targets, force=force, subject="comparison")
     found = run(old, new, significance=level, relevant_change=relevant_change)
-    write_outputs(found, targets)
+    write_outputs(found, targets, force=True, inputs=(old, new), subject="comparison")
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:
@@ -77,9 +78,9 @@ def compare(
 
 def _show(found: BuildComparison) -> None:
     """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict."""
-    from cdtool.report.build_report import both, contacts_of, ranges_of
+    from cdtool.report.comparison_model import both, contacts_of, ranges_of
     from cdtool.report.few_contacts import EXPLAINED
-    from cdtool.report.figure_text import NOTHING
+    from cdtool.report.number_text import NOTHING
 
     for which, names in (("old", found.only_old), ("new", found.only_new)):
         for name in names:

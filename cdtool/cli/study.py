@@ -118,7 +118,7 @@ def _show(done: SensorStudy) -> None:
     ]
     columns += [("limited by", "left"), ("what helps most", "left")]
     rows = []
-    for item in ranking.sights:
+    for item in ranking.responses:
         time = NOT_SEEN if item.time is None else f"{1e3 * item.time:.1f}"
         saving = "" if item.saving is None else f": {1e3 * item.saving:.1f} ms earlier"
         cells = (item.sensor.name, item.sensor.place, number(item.threshold), item.sensor.unit, time)
@@ -159,7 +159,7 @@ def _as_dict(done: SensorStudy) -> dict[str, Any]:
             "remedy": item.remedy,
             "saving_ms": None if item.saving is None else 1e3 * item.saving,
         }
-        for item in ranking.sights
+        for item in ranking.responses
     ]
     rigidity = ranking.rigidity
     return {

@@ -65,11 +65,11 @@ def show_table(evaluated: Evaluated) -> None:
 
 def show_conclusion(evaluated: Evaluated) -> None:
     """The first lines on screen: the conclusion, then what of limits, force profiles and contacts is not good."""
-    from cdtool.report.verdict_words import counts_words, verdict_words
+    from cdtool.report.model import counts_text
 
     conclusion = evaluated.results.conclusion
-    say(verdict_words(evaluated))
-    say(counts_words(evaluated), indent="  ")
+    say(conclusion.headline)
+    say(counts_text(evaluated), indent="  ")
     for reason in conclusion.reasons[:_SHOWN]:
         say(reason, indent="  ")
     if len(conclusion.reasons) > _SHOWN:
@@ -116,11 +116,11 @@ def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
 
 def _latency(item: Summary, column: LatencyColumn) -> str:
     """A figure of the latency; the intervals of quantiles only where they stand for that of a mean."""
-    from cdtool.report.few_contacts import latency_figure
+    from cdtool.report.few_contacts import latency_interval
 
     if column == "range":
         return _range(item)
-    figure = latency_figure(item, column)
+    figure = latency_interval(item, column)
     if figure is None:
         return "-"
     if column == "std":

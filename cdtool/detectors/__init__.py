@@ -1,11 +1,11 @@
-"""Detectors: a recording and what is known of its machine -> a collision detection signal. One file a detector."""
+"""Detectors: from a recording and the model of its machine to a collision detection signal. One file per detector."""
 
 from __future__ import annotations
 
 from cdtool.detectors.look import Look
 from cdtool.registry import Registry
 
-# Name: (short name, class). A short name is repeated here so that `-d kmo` imports one detector, not all of them: the
+# Name: (short name, class). The short name is repeated here so that `-d kmo` imports one detector, not all: the
 # kernels of every imported module are compiled before work begins.
 _TABLE = {
     "pure_torque": ("pt", "cdtool.detectors.pure_torque:PureTorque"),

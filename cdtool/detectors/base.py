@@ -1,4 +1,4 @@
-"""What every detector is, and what several share: gains with units, held samples, the momentum observer's recursion."""
+"""The contract of a detector, and what several share: gains, held samples, the momentum observer's recursion."""
 
 from __future__ import annotations
 
@@ -20,17 +20,32 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 
-# A filter goes on over a gap up to this long [s] even where its memory is shorter: no start-up behind it.
+# A filter bridges a gap up to this long [s] even if its memory is shorter, without a start-up after it.
 BRIDGED = 0.15
 
 AnyDetector = TypeVar("AnyDetector", bound="DataclassInstance")
 
 
 class Detector(Protocol):
-    """The contract: a frozen dataclass of gains, the channels it needs, a unit, and `signal(recording, machine)`.
+    """The contract of a detector: a frozen dataclass whose fields are its gains, made by `gain`.
 
-    `signal` is causal: its output up to sample k does not change when the samples after k do. It never reads the load
-    cell or a label.
+    Attributes
+    ----------
+    name : str
+        Name in files and reports, and of the entry point of a plug-in.
+    short_name : str
+        Short name on the command line; unique.
+    title : str
+        Name in figures and tables.
+    needs : tuple of str
+        Channels that `signal` reads; the load cell and labels are never among them.
+    signed : bool
+        True if the sign of the signal follows the axis, False if positive always opposes the motion.
+
+    Notes
+    -----
+    Optional attributes are `look` (`cdtool.detectors.look.Look`) and `contact_torque`: False if a signal in N or N m is
+    not the contact torque. docs/own-detector.md has a complete example.
     """
 
     name: ClassVar[str]
@@ -40,49 +55,210 @@ class Detector(Protocol):
     signed: ClassVar[bool]
 
     def unit(self, machine: Machine) -> str:
-        """Unit of the signal for that machine."""
+        """Return the unit of the signal for that machine."""
         ...
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """The collision detection signal of a recording on the load side; raises RecordingError."""
+        """Return the collision detection signal of a recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            A recording on the load side, without load cell and label.
+        machine : Machine
+            The model of its machine; used by its methods, never by its type.
+
+        Returns
+        -------
+        Signal
+            Times (n,) s, values and status (n, J), J joints. Causal: the output up to a sample does not depend on later
+            samples. Missing samples are marked in the status, not filled.
+
+        Raises
+        ------
+        RecordingError
+            A channel in `needs` is missing.
+        ConfigurationError
+            The machine file does not give an inertia that the detector needs, or a gain has another number of joints.
+        """
         ...
 
 
 def gain(default: float, unit: str, meaning: str) -> Any:
-    """A gain of a detector: its default, unit and meaning stand here and nowhere else."""
+    """Return the dataclass field of a gain, with its unit and meaning as metadata.
+
+    Parameters
+    ----------
+    default : float
+        Default value; a machine file may replace it by one number, or by one number per joint.
+    unit : str
+        Unit for a linear axis, for example "rad/s"; "1" for a ratio.
+    meaning : str
+        What the gain sets, as `cdtool list detectors` shows it.
+
+    Returns
+    -------
+    dataclasses.Field
+        The default value of the field.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass, fields
+    >>> from cdtool.dynamics import Gain
+    >>> @dataclass(frozen=True)
+    ... class TorqueRate:
+    ...     cutoff: Gain = gain(2.0, "Hz", "cut-off frequency of the low-pass")
+    >>> fields(TorqueRate)[0].default, fields(TorqueRate)[0].metadata["unit"]
+    (2.0, 'Hz')
+    """
     return field(default=default, metadata={"unit": unit, "meaning": meaning})
 
 
 def require_positive(detector: object, *names: str) -> None:
-    """Raise ConfigurationError, naming the gain, where one is not a finite number above zero, or one a joint."""
+    """Check that gains are finite and above 0, for each joint.
+
+    Parameters
+    ----------
+    detector : object
+        The detector whose gains are checked.
+    *names : str
+        Names of the gains.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0; the message names it.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.momentum import Momentum
+    >>> require_positive(Momentum(bandwidth=(80.0, 60.0)), "bandwidth")
+    """
     for name in names:
         value = getattr(detector, name)
         numbers = np.atleast_1d(value)
         if not (numbers.size and np.all(np.isfinite(numbers) & (numbers > 0.0))):
-            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one a joint")
+            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one per joint")
 
 
 def per_joint(value: Gain, joints: int) -> FloatArray:
-    """(J,): one number for all joints, or each joint's own; raises ConfigurationError where their number is another."""
+    """Return a gain as an array with one value per joint.
+
+    Parameters
+    ----------
+    value : float or tuple of float
+        One number for all joints, or one per joint.
+    joints : int
+        Number of joints J.
+
+    Returns
+    -------
+    ndarray of float, shape (J,)
+        The value for each joint, in the unit of the gain.
+
+    Raises
+    ------
+    ConfigurationError
+        A tuple has another number of values than there are joints.
+
+    Examples
+    --------
+    >>> per_joint(10.0, 3).tolist()
+    [10.0, 10.0, 10.0]
+    >>> per_joint((80.0, 60.0), 2).tolist()
+    [80.0, 60.0]
+    """
     if isinstance(value, tuple) and len(value) != joints:
         many = "the whole machine" if joints == 1 else f"{joints} joints"
-        raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one a joint")
+        raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one per joint")
     return np.array(np.broadcast_to(value, joints), dtype=np.float64)
 
 
 def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
-    """The detector with the gains of one joint alone; raises ConfigurationError as `per_joint` does."""
+    """Return the detector with the gains of a single joint.
+
+    Parameters
+    ----------
+    detector : Detector
+        A detector whose gains are numbers or one number per joint.
+    joint : int
+        Index of the joint, from 0.
+    joints : int
+        Number of joints J.
+
+    Returns
+    -------
+    Detector
+        A copy in which every gain is one number.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain has another number of values than there are joints.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.momentum import Momentum
+    >>> of_joint(Momentum(bandwidth=(80.0, 60.0)), joint=1, joints=2)
+    Momentum(bandwidth=60.0)
+    """
     gains = {item.name: getattr(detector, item.name) for item in fields(detector)}
     return replace(detector, **{name: float(per_joint(value, joints)[joint]) for name, value in gains.items()})
 
 
 def single(value: Gain) -> float:
-    """A gain that is one number; raises ConfigurationError where it has one a joint (see `of_joint`)."""
+    """Return a gain that must be one number.
+
+    Parameters
+    ----------
+    value : float or tuple of float
+        The gain; a tuple may have one value only (see `of_joint`).
+
+    Returns
+    -------
+    float
+        The number, in the unit of the gain.
+
+    Raises
+    ------
+    ConfigurationError
+        The gain has several values.
+
+    Examples
+    --------
+    >>> single((80.0,))
+    80.0
+    """
     return float(per_joint(value, 1)[0])
 
 
 def require_channels(detector: Detector, recording: Recording, *more: str) -> None:
-    """Raise RecordingError, naming the channel, where one that the detector needs (or one of `more`) is absent."""
+    """Check that a recording has the channels that a detector needs.
+
+    Parameters
+    ----------
+    detector : Detector
+        The detector; its `needs` are checked.
+    recording : Recording
+        The recording.
+    *more : str
+        Further channels that are needed.
+
+    Raises
+    ------
+    RecordingError
+        A channel is missing; the message names it and lists those that are mapped.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.pure_torque import PureTorque
+    >>> from cdtool.recording import Recording, Series
+    >>> recording = Recording("run.csv", "run.csv", ("axis",), {"torque": Series([0.0, 0.1], [5.0, 5.0], "N")})
+    >>> require_channels(PureTorque(), recording)
+    >>> require_channels(PureTorque(), recording, "speed")
+    Traceback (most recent call last):
+    cdtool.errors.RecordingError: run.csv: pure_torque needs the channel 'speed'...
+    """
     for channel in (*detector.needs, *more):
         if channel not in recording:
             raise RecordingError(
@@ -93,11 +269,21 @@ def require_channels(detector: Detector, recording: Recording, *more: str) -> No
 
 @dataclass(frozen=True)
 class Drive:
-    """Torque, position and speed (n, J) on the speed's clock, with the last value held where one is missing.
+    """Torque, position and speed (n, J) on the speed's clock, the last value held where a sample is missing.
 
-    `missing` (n, J) tells where anything has no sample; `speed_missing` where the motion is not known. Of a coupled
-    machine all joints' motion is missing where one joint's is, since each feels the others. A machine that is not
-    coupled needs no position: it is 0 there. `coupled`: the balances depend on the pose.
+    Attributes
+    ----------
+    time : ndarray of float, shape (n,)
+        Times of the speed samples [s].
+    torque, position, speed : ndarray of float, shape (n, J)
+        Load side [N, m, m/s] or [N m, rad, rad/s]. Without coupling no position is needed: it is 0.
+    missing : ndarray of bool, shape (n, J)
+        Where any of the three has no sample.
+    speed_missing : ndarray of bool, shape (n, J)
+        Where the motion is unknown: the speed, or with coupled joints the position, has no sample. With coupled joints
+        a missing motion of one joint counts for all, because each affects the others.
+    coupled : bool
+        Whether the force balances depend on the pose.
     """
 
     time: FloatArray
@@ -110,14 +296,46 @@ class Drive:
 
     @property
     def interrupted(self) -> BoolArray:
-        """(n, J): where a filter of balances waits: the motion is missing, or a torque that there was before."""
+        """(n, J): where a filter of force balances waits: no motion, or no torque after there was one."""
         return self.speed_missing | (self.missing & (np.cumsum(~self.missing, axis=0) > 0))
 
 
 def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Drive:
-    """What a detector with a model starts from; raises RecordingError or ConfigurationError where something is lacking.
+    """Return the inputs of a detector that uses a model of the machine.
 
-    Of a coupled machine the position is needed too: M, C and g depend on the pose.
+    Parameters
+    ----------
+    detector : Detector
+        The detector; its `needs` are checked, and for coupled joints also the position, because M, C and g depend on
+        it.
+    recording : Recording
+        A recording on the load side.
+    machine : Machine
+        The model of its machine.
+
+    Returns
+    -------
+    Drive
+        Torque, position and speed on the speed's clock.
+
+    Raises
+    ------
+    RecordingError
+        A channel is missing.
+    ConfigurationError
+        The machine file does not give the inertia of a joint.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.momentum import Momentum
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> torque, speed = Series([0.0, 0.3], [5.0, 7.0], "N"), Series([0.1, 0.2, 0.3], [0.2, 0.2, 0.2], "m/s")
+    >>> drive = drive_of(Momentum(), Recording("run", "", ("axis",), {"torque": torque, "speed": speed}), axis)
+    >>> drive.time.tolist(), drive.torque[:, 0].tolist()
+    ([0.1, 0.2, 0.3], [5.0, 5.0, 7.0])
     """
     require_channels(detector, recording, *(("position",) if machine.coupled else ()))
     machine.require_inertia(detector.name)
@@ -125,7 +343,24 @@ def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Driv
 
 
 def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
-    """Everything by previous value on the clock of the speed: held between its samples, never interpolated."""
+    """Return torque, position and speed on the clock of the speed.
+
+    Parameters
+    ----------
+    recording : Recording
+        A recording on the load side with torque and speed, and for coupled joints also position.
+    machine : Machine
+        The model of its machine.
+
+    Returns
+    -------
+    Drive
+        Each value is held until the next sample of its channel, never interpolated across a later one.
+
+    Examples
+    --------
+    See `drive_of`, which also checks that everything needed is present.
+    """
     speed = recording["speed"]
     torque = previous_value(recording["torque"], speed.time)
     torque_missing = ~np.isfinite(torque)
@@ -133,7 +368,7 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
     position: FloatArray = np.broadcast_to(0.0, torque.shape)
     if machine.coupled:
         angles = previous_value(recording["position"], speed.time)
-        # A pose that is held for a sample that did not come would be one of another instant than the speed.
+        # A pose held for a missing sample would belong to another time than the speed.
         late = lost_samples(recording, ("position",), speed.time)
         lost = ~np.isfinite(angles) if late is None else late | ~np.isfinite(angles)
         position = hold_last(angles, lost)
@@ -150,12 +385,49 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
 
 
 def for_every_joint(missing: BoolArray) -> BoolArray:
-    """(n, J): True for all joints of a sample where it is for one."""
+    """Mark all joints of a sample that is missing for one of them.
+
+    Parameters
+    ----------
+    missing : ndarray of bool, shape (n, J)
+        Where each joint has no sample.
+
+    Returns
+    -------
+    ndarray of bool, shape (n, J)
+        True for all joints wherever it is True for one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> for_every_joint(np.array([[False, True], [False, False]])).tolist()
+    [[True, True], [False, False]]
+    """
     return np.repeat(np.any(missing, axis=1, keepdims=True), missing.shape[1], axis=1)
 
 
 def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
-    """The last present value held where one is missing (0 before the first)."""
+    """Hold the last present value where one is missing.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n, J)
+        Values, in any unit.
+    missing : ndarray of bool, shape (n, J)
+        Where a value is missing.
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        The values; 0 before the first present one. Without a missing value it is `values` itself, not a copy.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> values = np.array([[np.nan], [2.0], [np.nan], [3.0]])
+    >>> hold_last(values, np.isnan(values))[:, 0].tolist()
+    [0.0, 2.0, 2.0, 3.0]
+    """
     if not missing.any():
         return values
     rows = np.where(missing, -1, np.arange(len(values))[:, np.newaxis])
@@ -168,13 +440,58 @@ def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
 def observe_momentum(
     drive: Drive, net_force: FloatArray, momentum: FloatArray, bandwidth: Gain, ready: FloatArray
 ) -> tuple[FloatArray, StatusArray]:
-    """Residual and status (n, J) of the generalized momentum observer (thesis 2.18-2.19 corrected).
+    """Return residual and status of the generalised momentum observer, joint by joint.
 
-    res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k), a = exp(-K T_k): exact for a piecewise
-    constant force and any T_k. Over missing samples it waits: the next step is longer. Where only the speed is missing
-    the force goes on; where the torque is, or the pose of coupled joints, a straight line stands for it. It restarts
-    behind a gap longer than 3/K and 0.15 s. `ready` (J,) is the time from which the residual may be judged. `momentum`
-    is used up: the residual is written over it, since on long logs fresh memory costs as much as the filter.
+    Parameters
+    ----------
+    drive : Drive
+        Times [s], and where samples are missing.
+    net_force : ndarray of float, shape (n, J)
+        What changes the momentum, tau - beta [N, N m].
+    momentum : ndarray of float, shape (n, J)
+        p = M(q) v [N s, N m s]. It is overwritten: the result is stored in it, because on long logs a new array costs
+        as much as the filter.
+    bandwidth : float or tuple of float
+        Observer gain K [rad/s].
+    ready : ndarray of float, shape (J,)
+        Time [s] before which the residual is marked as start-up.
+
+    Returns
+    -------
+    residual : ndarray of float, shape (n, J)
+        Estimate of tau_c [N, N m].
+    status : ndarray of uint8, shape (n, J)
+        A `Status` for each value.
+
+    Raises
+    ------
+    ConfigurationError
+        The number of gains is not that of the joints.
+
+    Notes
+    -----
+    Thesis 2.18 and 2.19 in the corrected form (docs/errata.md): d(phat)/dt = tau - beta - res, res = K (phat - p), with
+    phat(0) = p(0). Sampled with the measured step T_k:
+
+        res_k = a res_{k-1} + (1 - a) (mean net force - (p_k - p_{k-1}) / T_k),   a = exp(-K T_k)
+
+    This is exact for a net force and a contact that are constant between samples. Over missing samples the observer
+    waits, and the next step is longer: if only the speed is missing, the impulse of the force is accumulated; if the
+    torque is missing, or the pose of coupled joints, the force is interpolated by a straight line. After a gap longer
+    than 3/K and 0.15 s it restarts, and for 3/K the status is start-up.
+
+    Examples
+    --------
+    A mass at rest that is pushed against an obstacle by 30 N: after 1/K the residual is 63 % of it.
+
+    >>> import numpy as np
+    >>> time = np.arange(2001) * 1e-3
+    >>> no, still = np.zeros((2001, 1), dtype=bool), np.zeros((2001, 1))
+    >>> push = np.where(time >= 1.0, 30.0, 0.0)[:, np.newaxis]
+    >>> drive = Drive(time, push, still, still, no, no)
+    >>> residual, status = observe_momentum(drive, push, still.copy(), 10.0, np.array([-np.inf]))
+    >>> residual[[1000, 1100, 2000], 0].round(1).tolist()
+    [0.1, 19.0, 30.0]
     """
     residual = momentum
     status = np.empty(net_force.shape, dtype=np.uint8)
@@ -228,7 +545,7 @@ def _observe(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
             elapsed += step
         seen = seen or not missing[k]
         if speed_missing[k] or (missing[k] and seen):
-            # p or its rate is unknown: the residual waits for the next whole sample.
+            # p or its rate is unknown: the residual waits for the next complete sample.
             bridged = bridged or coupled or not speed_missing[k]
             residual[k] = value
             status[k] = Status.GAP
@@ -245,7 +562,7 @@ def _observe(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         else:
             x = bandwidth * elapsed
             if x < 0.02:
-                # 1 - exp(-x) to the last bit, without the call of exp.
+                # 1 - exp(-x) to the last bit, without calling exp.
                 tail = 1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))
                 weight = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * tail)))
             else:

@@ -1,4 +1,4 @@
-"""A detector's signal, held against the contract: the mistake of a plug-in becomes one line, not a wrong figure."""
+"""Check a detector's signal against the contract: an error in a plug-in becomes one line, not a wrong result."""
 
 from __future__ import annotations
 
@@ -16,7 +16,39 @@ from cdtool.recording import Recording
 
 
 def checked_signal(detector: Detector, recording: Recording, machine: Machine) -> Signal:
-    """`detector.signal` of a recording; raises RecordingError where it fails or breaks the contract."""
+    """Return the signal of a detector after checking it against the contract.
+
+    Parameters
+    ----------
+    detector : Detector
+        Any detector; may come from a plug-in.
+    recording : Recording
+        A recording on the load side.
+    machine : Machine
+        The model of its machine.
+
+    Returns
+    -------
+    Signal
+        What `detector.signal` returned.
+
+    Raises
+    ------
+    RecordingError
+        The detector fails, or its signal has wrong shapes, types, times, joints or status codes, or values that are not
+        finite and yet valid.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.pure_torque import PureTorque
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> recording = Recording("run.csv", "run.csv", ("axis",), {"torque": Series([0.0, 0.1], [5.0, 6.0], "N")})
+    >>> checked_signal(PureTorque(), recording, axis).values[:, 0].tolist()
+    [5.0, 6.0]
+    """
     try:
         signal = detector.signal(recording, machine)
     except CdtoolError:
@@ -31,31 +63,31 @@ def checked_signal(detector: Detector, recording: Recording, machine: Machine) -
 
 
 def _breach(signal: Any, recording: Recording) -> str:
-    """What is wrong with a signal; empty where it keeps the contract."""
+    """Return what is wrong with a signal; empty if it meets the contract."""
     if not isinstance(signal, Signal):
-        return f"gives {type(signal).__name__}, no Signal"
+        return f"returns {type(signal).__name__}, not a Signal"
     time, values, status = signal.time, signal.values, signal.status
     if not all(isinstance(item, np.ndarray) and item.ndim for item in (time, values, status)):
-        return "gives a signal whose times, values or status are no array"
+        return "returns a signal whose times, values or status are not arrays"
     shape = (len(time), len(signal.joints or recording.joints))
     if values.shape != shape or status.shape != shape:
-        return f"gives values {values.shape} and status {status.shape}: {shape} are needed, samples by joints"
+        return f"returns values {values.shape} and status {status.shape}: {shape} are needed, samples by joints"
     wanted = time.dtype == np.float64 and values.dtype == np.float64 and status.dtype == np.uint8
     if not wanted or time.ndim != 1:
         kinds = f"times as {time.ndim}-dimensional {time.dtype}, values as {values.dtype}, status as {status.dtype}"
-        return f"gives {kinds}: a row of float64, float64 and uint8 are needed"
+        return f"returns {kinds}: a row of float64, float64 and uint8 are needed"
     if np.any(status > max(Status)):
-        return f"gives a status of {int(status.max())}: 0 to {max(Status):d} are known"
+        return f"returns a status of {int(status.max())}: 0 to {max(Status):d} are known"
     if len(set(signal.joints)) < len(signal.joints):
         return f"names a joint twice: {', '.join(signal.joints)}"
     if len(time) > 1 and not np.all(np.diff(time) > 0.0):
-        return "gives times that do not strictly increase"
-    blind = int(np.count_nonzero(~np.isfinite(values) & (status == Status.VALID)))
-    # NaN is above no limit: it would be a detector that sees nothing and does not say so.
-    return f"gives {blind} values that are not finite and yet valid" if blind else ""
+        return "returns times that do not strictly increase"
+    unusable = int(np.count_nonzero(~np.isfinite(values) & (status == Status.VALID)))
+    # NaN exceeds no limit: the detector would detect nothing without reporting it.
+    return f"returns {unusable} values that are marked as valid but not finite" if unusable else ""
 
 
 def _fault(detector: Detector, recording: Recording, problem: str) -> RecordingError:
     return RecordingError(
-        f"{recording.name}: detector {detector.name} {problem}", "a fault of the detector: see docs/own-detector.md"
+        f"{recording.name}: detector {detector.name} {problem}", "an error in the detector: see docs/own-detector.md"
     )

@@ -1,4 +1,4 @@
-"""Derivation from desired dynamics: the torque given against the torque that the reference motion would need."""
+"""Derivation from desired dynamics: the measured torque compared with the torque that the reference motion needs."""
 
 from __future__ import annotations
 
@@ -15,20 +15,52 @@ from cdtool.detectors.look import GREY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import BoolArray, FloatArray, Recording
 
-# The reference's rates come from a cubic through this many of its last samples.
+# The rates of the reference are those of a cubic through this many of its last samples.
 _SAMPLES = 21
 
 
 @dataclass(frozen=True)
 class DesiredDynamics:
-    """res = LP{tau - M(q_ref) a_ref - C v_ref - g(q_ref) - friction(v_ref)} (thesis 2.8, friction added).
+    """res = LP{tau - M(q_ref) a_ref - C v_ref - g(q_ref) - friction(v_ref)}: the model driven by the reference motion.
 
-    v_ref and a_ref come from the reference alone: a causal cubic through its last samples. Needs: torque, position,
-    reference_position (a reference_speed is used where it is logged). Unit N or N m, positive where the contact opposes
-    positive travel. The tracking error q_ref - q is told with the signal; where it exceeds `tracking_limit` the method
-    is not applicable, since q_ref no longer stands for q (2.7). Start-up: the low-pass, as for the direct derivation.
-    Fails: a soft controller or an elastic drive, whose real acceleration is not the reference's: every start and stop
-    shows; after a contact the error grows, and the method goes blind when it exceeds the limit.
+    Parameters
+    ----------
+    cutoff : float or tuple of float
+        Cut-off frequency of the low-pass [Hz], one number or one per joint.
+    tracking_limit : float or tuple of float
+        Tracking error |q_ref - q| above which the method is not applicable, because q_ref no longer represents q [m];
+        rad for robots.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 2.7 and 2.8 with friction added. v_ref and a_ref are derived from the reference only, by a causal cubic
+    through its last samples; a logged reference_speed is used as it is. The rms and the largest tracking error are
+    among the notes of the signal.
+
+    * Needs: torque, position, reference_position.
+    * Unit: N or N m, positive if the contact opposes positive travel.
+    * Start-up: that of the low-pass, as for the direct derivation.
+    * Fails: with a soft controller or an elastic drive the acceleration is not that of the reference, and every start
+      and stop appears in the signal; after a contact the error grows, and above `tracking_limit` nothing is detected.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, travel = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, 0.2 * time, "m")
+    >>> channels = {"torque": torque, "position": travel, "reference_position": travel}
+    >>> signal = DesiredDynamics(cutoff=5.0).signal(Recording("run", "", ("axis",), channels), axis)
+    >>> abs(signal.values[[999, 2000], 0]).round(1).tolist()
+    [0.0, 30.0]
     """
 
     cutoff: Gain = gain(5.0, "Hz", "cut-off frequency of the low-pass")
@@ -46,11 +78,11 @@ class DesiredDynamics:
         require_positive(self, "cutoff", "tracking_limit")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return machine.force_unit
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Residual (n, J) on the reference's clock; raises RecordingError where a channel is absent."""
+        """Return the residual (n, J) on the reference's clock; see `Detector.signal`."""
         require_channels(self, recording)
         machine.require_inertia(self.name)
         reference = recording["reference_position"]
@@ -68,7 +100,7 @@ class DesiredDynamics:
         held = hold_last(torque, ~np.isfinite(torque))
         balance = machine.force_balance(held, pose, speed) - machine.inertia_times(pose, acceleration)
         cutoff = per_joint(self.cutoff, len(machine.joints))
-        # A torque that there was before and is missing interrupts the low-pass as a missing reference does.
+        # A torque that is missing after it was present interrupts the low-pass, like a missing reference.
         torque_missing = ~np.isfinite(torque)
         waits = motion_missing | (torque_missing & (np.cumsum(~torque_missing, axis=0) > 0))
         residual, _ = low_pass(time, balance, waits, cutoff)
@@ -83,7 +115,7 @@ class DesiredDynamics:
 
 
 def _rates(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """The reference's speed and acceleration (n, J) on the reference position's clock."""
+    """Return speed and acceleration of the reference (n, J) on the clock of the reference position."""
     reference = recording["reference_position"]
     if "reference_speed" not in recording:
         return polynomial_rates(reference.time, reference.values, _SAMPLES)

@@ -1,4 +1,4 @@
-"""Direct derivation: the contact torque straight from the equation of motion, every term through one low-pass."""
+"""Direct derivation: the contact torque from the equation of motion, with every term through the same low-pass."""
 
 from __future__ import annotations
 
@@ -23,13 +23,42 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class Direct:
-    """res = LP{tau - C v - g - friction} - M(q) s LP{v} (thesis 2.6, friction added).
+    """res = LP{tau - C v - g - friction} - M(q) s LP{v}: the equation of motion solved for the contact.
 
-    Every term goes through the same second-order Butterworth low-pass, and the acceleration is that filter's own rate:
-    nothing is differenced. With a first-order low-pass and a constant M this is the momentum observer. Needs: torque,
-    speed (and position, where joints are coupled). Unit N or N m, positive where the contact opposes positive travel.
-    Start-up 3 over the real part of the filter's poles. Fails: noise of the speed grows with `cutoff` times the
-    inertia; where M changes within the filter's memory the terms no longer match.
+    Parameters
+    ----------
+    cutoff : float or tuple of float
+        Cut-off frequency of the low-pass [Hz], one number or one per joint.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 2.6 with friction added (docs/errata.md). LP is a second-order Butterworth low-pass; every term passes
+    through it, and the acceleration is the rate of that filter, so that nothing is differentiated numerically. With a
+    first-order low-pass and a constant M it would be the momentum observer.
+
+    * Needs: torque, speed; position if joints are coupled.
+    * Unit: N or N m, positive if the contact opposes positive travel.
+    * Start-up: 3 over the real part of the filter's poles.
+    * Fails: noise of the speed is amplified by `cutoff` times the inertia; if M changes within the filter's memory, the
+      terms no longer match.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed})
+    >>> Direct(cutoff=5.0).signal(run, axis).values[[999, 2000], 0].round(1).tolist()
+    [0.0, 30.0]
     """
 
     cutoff: Gain = gain(5.0, "Hz", "cut-off frequency of the low-pass")
@@ -46,11 +75,11 @@ class Direct:
         require_positive(self, "cutoff")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return machine.force_unit
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        """Return the residual (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         cutoff = per_joint(self.cutoff, len(machine.joints))

@@ -22,20 +22,56 @@ from cdtool.detectors.look import OLIVE, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.recording import Recording
 
-# A gap as long as a period of the drive's vibration hides its power: what was guessed has mostly decayed by then [s].
+# A gap as long as a period of the drive's vibration hides its power; by then the estimate has mostly decayed [s].
 _LONGEST_UNSETTLED = 0.015
 
 
 @dataclass(frozen=True)
 class Energy:
-    """Residual res = k / (s + k) v'tau_c of the machine's energy (thesis 2.9, 2.10 with the sign put right).
+    """Residual res = k / (s + k) v'tau_c of the machine's energy.
 
-    res = k [int (v'(tau - friction) - res) dt - (E - E(0))]: as printed, 2.9 tends to minus the contact's power. Needs:
-    torque, speed (and position, where joints are coupled). Unit W, positive where the contact takes power. One signal
-    for the whole machine; joints that are not coupled have one each. Start-up 3 / k. Not applicable below
-    `minimum_speed` (the norm of all speeds): a contact takes no power from a machine at rest. Fails: a force across the
-    motion; a slow joint beside fast ones; friction that the machine file does not know. Behind a gap of coupled joints
-    the power of the gap is a guess: as long as the gap was, at most 15 ms, the signal rests on it (`Signal.lost`).
+    Parameters
+    ----------
+    bandwidth : float or tuple of float
+        Observer gain k [rad/s]: the residual follows the power with time constant 1/k.
+    minimum_speed : float or tuple of float
+        Speed below which the observer is not applicable [m/s]; with coupled joints the norm of all speeds. A contact
+        takes no power from a machine at rest.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 2.9 and 2.10 with the signs of 2.4 (docs/errata.md; as printed, 2.9 tends to minus the contact's power):
+
+        res = k [int (v'(tau - friction) - res) dt - (E - E(0))],   E = kinetic + potential energy
+
+    * Needs: torque, speed; position if joints are coupled.
+    * Unit: W, positive if the contact takes power. One signal for the whole machine; uncoupled joints have one each.
+    * Start-up: 3/k.
+    * After a gap of coupled joints the power during the gap is an estimate: for the length of the gap, at most 15 ms,
+      the signal is based on it (`Signal.lost`).
+    * Fails: a force across the motion takes no power; a slow joint next to fast ones; friction that is not in the
+      machine file.
+
+    Examples
+    --------
+    At 0.2 m/s a contact of 30 N takes 6 W.
+
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed})
+    >>> power = Energy(bandwidth=10.0).signal(run, axis)
+    >>> power.values[[999, 1100, 2000], 0].round(1).tolist(), power.unit
+    ([0.0, 3.8, 6.0], 'W')
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
@@ -53,15 +89,15 @@ class Energy:
         require_positive(self, "bandwidth", "minimum_speed")
 
     def unit(self, machine: Machine) -> str:  # noqa: ARG002 - the contract hands the machine over
-        """W."""
+        """Return "W"."""
         return "W"
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Power taken by a contact (n, 1), or (n, J) of uncoupled joints; raises RecordingError."""
+        """Return the power taken by a contact (n, 1), or (n, J) if joints are not coupled; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         power = machine.drive_power(drive.torque, drive.speed)
         energy = machine.energy(drive.position, drive.speed)
-        # From the first sample on: a potential energy may be large, and only its changes count.
+        # Relative to the first sample: a potential energy may be large, and only its changes count.
         energy = energy - energy[:1]
         speed = np.abs(drive.speed)
         missing, motion_missing = drive.missing, drive.speed_missing

@@ -21,24 +21,87 @@ _MOST_PIECES = 10_000
 
 
 def settling_time(cutoff: FloatArray | float) -> FloatArray:
-    """How long after a start a low-pass of `cutoff` [Hz] is not to be trusted [s]: 3 over its poles' real part."""
+    """Return the time that a low-pass needs to settle after a start: 3 over the real part of its poles.
+
+    Parameters
+    ----------
+    cutoff : float or ndarray of float
+        Cut-off frequency [Hz].
+
+    Returns
+    -------
+    ndarray of float
+        Settling time [s], in the shape of `cutoff`: 3 sqrt(2) / (2 pi cutoff) for the Butterworth filter of `low_pass`.
+
+    Examples
+    --------
+    >>> settling_time(5.0).round(3).item()
+    0.135
+    """
     return np.asarray(_SETTLE / (2.0 * math.pi * cutoff), dtype=np.float64)
 
 
 def longest_gap(cutoff: FloatArray | float) -> FloatArray:
-    """The longest gap over which a low-pass of `cutoff` [Hz] goes on [s]: a longer one restarts it."""
+    """Return the longest gap that a low-pass bridges; a longer one restarts it.
+
+    Parameters
+    ----------
+    cutoff : float or ndarray of float
+        Cut-off frequency [Hz].
+
+    Returns
+    -------
+    ndarray of float
+        The longer of the settling time and 0.15 s [s].
+
+    Examples
+    --------
+    >>> longest_gap(5.0).item(), longest_gap(1.0).round(3).item()
+    (0.15, 0.675)
+    """
     return np.maximum(settling_time(cutoff), BRIDGED)
 
 
 def low_pass(
     time: FloatArray, values: FloatArray, missing: BoolArray, cutoff: FloatArray | float
 ) -> tuple[FloatArray, FloatArray]:
-    """Low-pass (n, J) of `values` (n, J) and its rate of change: y and s y with the same states, so that they match.
+    """Return a low-passed signal and its rate of change, from the same filter states.
 
-    Second-order Butterworth, w^2 / (s^2 + sqrt(2) w s + w^2), w = 2 pi `cutoff` [Hz] (one, or one a joint), bilinear
-    with the measured step and prewarped for it; nothing is differenced afterwards. A missing sample is skipped: over
-    the longer step the value runs straight, and the filter takes it in steps of the usual length. After a gap longer
-    than `longest_gap` it starts again, from rest at the first value.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    values : ndarray of float, shape (n, J)
+        The signal, in any unit.
+    missing : ndarray of bool, shape (n, J)
+        Where the signal has no sample.
+    cutoff : float or ndarray of float, shape (J,)
+        Cut-off frequency [Hz].
+
+    Returns
+    -------
+    filtered : ndarray of float, shape (n, J)
+        The low-passed signal, in its unit.
+    rate : ndarray of float, shape (n, J)
+        Its rate of change, in its unit per s.
+
+    Notes
+    -----
+    Second-order Butterworth filter, w^2 / (s^2 + sqrt(2) w s + w^2) with w = 2 pi cutoff, bilinear with the measured
+    step and prewarped for it; the rate is a state of the filter, so that nothing is differentiated numerically. Causal.
+    A missing sample is skipped: over the longer step the signal is a straight line, which the filter processes in steps
+    of the usual length. After a gap longer than `longest_gap` it restarts, at rest at the first value.
+
+    Examples
+    --------
+    The rate of a ramp of 2 N/s:
+
+    >>> import numpy as np
+    >>> time = np.arange(2001) * 1e-3
+    >>> ramp = 2.0 * time[:, np.newaxis]
+    >>> filtered, rate = low_pass(time, ramp, np.zeros((2001, 1), dtype=bool), 5.0)
+    >>> rate[-1, 0].round(6).item()
+    2.0
     """
     filtered, rate = np.empty(values.shape), np.empty(values.shape)
     corners = np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1])
@@ -51,7 +114,7 @@ def low_pass(
 
 
 def _pieces(time: FloatArray) -> npt.NDArray[np.int64]:
-    """(n,): into how many usual steps the step to each sample is cut: 1 up to 5 of them, where no row is lost."""
+    """Return for each sample (n,) into how many usual steps its step is cut: 1 up to 5 of them, if no row is lost."""
     pieces = np.ones(len(time), dtype=np.int64)
     if len(time) > 2:
         steps = np.diff(time)
@@ -62,7 +125,24 @@ def _pieces(time: FloatArray) -> npt.NDArray[np.int64]:
 
 
 def usual_steps(time: FloatArray) -> FloatArray:
-    """(n,): the median of the last 9 steps up to each sample [s]; infinite at the first."""
+    """Return the median of the last 9 steps up to each sample.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+        The usual step [s]; infinite at the first sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> usual_steps(np.array([0.0, 0.25, 0.5, 1.5])).tolist()
+    [inf, 0.25, 0.25, 0.25]
+    """
     usual = np.full(len(time), np.inf)
     if len(time) > 1:
         steps = np.diff(time)
@@ -71,9 +151,31 @@ def usual_steps(time: FloatArray) -> FloatArray:
 
 
 def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
-    """Where a filter has not settled yet behind a gap (n, J): for as long as the gap was, at most `longest` [s].
+    """Mark where a filter has not yet settled after a gap.
 
-    A gap is a step of more than 2.5 usual ones between samples that were not `lost` (n, J): two lost ones or more.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    lost : ndarray of bool, shape (n, J)
+        Where a sample is lost.
+    longest : float
+        Longest time that is marked [s].
+
+    Returns
+    -------
+    ndarray of bool, shape (n, J)
+        True after a gap for as long as the gap was, at most `longest`. A gap is a step of more than 2.5 usual ones
+        between samples that are not lost: two lost samples or more.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(12) * 0.01
+    >>> lost = np.zeros((12, 1), dtype=bool)
+    >>> lost[4:7] = True
+    >>> np.flatnonzero(unsettled(time, lost, longest=0.02)).tolist()
+    [7, 8]
     """
     result = np.zeros(lost.shape, dtype=bool)
     if len(time) < 3:
@@ -82,7 +184,7 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
     usual = np.concatenate((steps[:1], steps[:1], recent_medians(steps, float(steps[0]))[:-1]))
     for j in range(lost.shape[1]):
         known = np.where(lost[:, j], np.nan, time)
-        # How long before each sample the last one was that was not lost.
+        # Time since the last sample that was not lost.
         since = time - np.fmax.accumulate(np.concatenate(([time[0]], known[:-1])))
         ends = time + np.minimum(since - usual, longest)
         behind = (since > GAP_PERIODS * usual) & ~lost[:, j]
@@ -91,10 +193,27 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
 
 
 def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
-    """(n, J): for each sample when its filter last started [s]; infinite before the first sample.
+    """Return for each sample when its filter last started.
 
-    A filter starts with the first sample and again with the first one after a gap longer than `longest_gap` [s], one or
-    one a joint.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    missing : ndarray of bool, shape (n, J)
+        Where there is no sample.
+    longest_gap : float or ndarray of float, shape (J,)
+        A filter restarts with the first sample after a longer gap than this [s].
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        Time of the last start [s]; infinite before the first sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> started_at(np.array([0.0, 1.0, 2.0, 9.0]), np.array([[True], [False], [False], [False]]), 5.0)[:, 0].tolist()
+    [inf, 1.0, 1.0, 9.0]
     """
     starts = np.empty(missing.shape)
     longest = np.broadcast_to(longest_gap, missing.shape[1])
@@ -111,10 +230,34 @@ def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | f
 
 
 def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
-    """First and second time derivative (n, J) of `values` at each sample, from a cubic through the last `samples`.
+    """Return the first and second time derivative of a signal, by a causal least-squares cubic.
 
-    Least squares over the samples so far with their own times: Savitzky and Golay's filter (order 3) at its newest end,
-    for any sampling. NaN where fewer than 5 samples are known or a sample is missing.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s], with any sampling.
+    values : ndarray of float, shape (n, J)
+        The signal, in any unit.
+    samples : int
+        Number of last samples to which the cubic is fitted.
+
+    Returns
+    -------
+    first, second : ndarray of float, shape (n, J)
+        The derivatives at each sample, in its unit per s and per s2; NaN with fewer than 5 samples, or where one of
+        them is missing.
+
+    Notes
+    -----
+    The filter of Savitzky and Golay (order 3), evaluated at its newest sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(30) * 0.01
+    >>> first, second = polynomial_rates(time, (time**2)[:, np.newaxis], 21)
+    >>> first[-1, 0].round(6).item(), second[-1, 0].round(6).item()
+    (0.58, 2.0)
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
     equations = np.empty((4, 5))

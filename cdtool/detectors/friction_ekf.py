@@ -1,4 +1,4 @@
-"""Friction-estimating extended Kalman filter (FEEKF): a contact seen as a sudden virtual friction."""
+"""Friction-estimating extended Kalman filter (FEEKF): a contact appears as a sudden virtual friction."""
 
 from __future__ import annotations
 
@@ -30,19 +30,20 @@ from cdtool.recording import FloatArray, Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 10.0
-# An accelerometer that has been silent for longer than this leaves the estimate without its fast input [s].
+# After a longer silence of the accelerometer the estimate has no fast input [s].
 _ACCELERATION_HOLD = 0.05
 # A speed that falls below the minimum for no longer than this is a glitch, not a stop: no new start-up [s].
 _GLITCH = 0.02
-# The covariance has grown over a gap: what comes behind it moves the estimate at once, for at most this time [s].
+# The covariance has grown over a gap: the samples after it move the estimate at once, for at most this time [s].
 _LONGEST_UNSETTLED = 0.01
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is measured of one joint: `speed` and `position` (n,) at `time`, NaN = no sample, `acceleration` at its own.
+    """The measurements of one joint.
 
-    `missing` (n,): any input has no sample.
+    `speed` and `position` (n,) are at `time` (n,) [s], NaN where there is no sample; `acceleration` (m,) is at its own
+    `acceleration_time` (m,) [s]. `missing` (n,) uint8: not 0 where any input has no sample.
     """
 
     time: FloatArray
@@ -55,15 +56,66 @@ class Motion:
 
 @dataclass(frozen=True)
 class FrictionEkf:
-    """Virtual viscous friction d from m a = F - d v, state x = (d, a, v), measured (a, v) (thesis 5.5-5.8 corrected).
+    """Virtual viscous friction d of m a = F - d v, estimated with the state (d, a, v) from measured a and v.
 
-    A planar arm's joint has its angle as a fourth state, measured too (6.34-6.44 corrected); for a joint of another
-    robot the other joints' coupling is a known input. Needs: torque, speed, acceleration (and position, where joints
-    are coupled). Unit: N s/m (linear) or N m s/rad (rotary), positive where something opposes the
-    motion. Load-side units, sequential scalar updates in Joseph form, no matrix inverse. Not applicable below
-    `minimum_speed`: there the friction cannot be observed; after re-entry it is starting up until the integral of its
-    bandwidth over time reaches 3. Its bandwidth falls in proportion to the speed. After the speed changes sign the
-    estimate's sign is wrong: only the first crossing counts.
+    Parameters
+    ----------
+    sigma_acceleration : float or tuple of float
+        Standard deviation of the noise of the accelerometer, vibration of the structure included [m/s2].
+    sigma_speed : float or tuple of float
+        Standard deviation of the noise of the speed [m/s].
+    friction_drift : float or tuple of float
+        How fast the friction may change [N s/m per sqrt(s)]; its square is q_d.
+    drift_acceleration : float or tuple of float
+        Standard deviation of the unmodelled force divided by the mass [m/s2 per sample].
+    drift_speed : float or tuple of float
+        Standard deviation of the unmodelled speed [m/s per sample].
+    sigma_position : float or tuple of float
+        Planar arm only: standard deviation of the noise of the angle [rad].
+    drift_position : float or tuple of float
+        Planar arm only: standard deviation of the unmodelled angle [rad per sample].
+    minimum_speed : float or tuple of float
+        Speed below which the filter is not applicable [m/s]; 15 % of the nominal speed is usual.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 5.1 to 5.8 in the corrected form (docs/errata.md), on the load side. Prediction, all three from the old
+    state:
+
+        d_{k+1} = d_k,   a_{k+1} = (F_k - d_k v_k) / m,   v_{k+1} = v_k + T a_k
+
+    with Q = diag(q_d T, q_a, q_v); then one scalar update in Joseph form per measurement, each accelerometer sample at
+    its own time. No matrix is inverted. A joint of a planar arm has its measured angle as a fourth state (6.34 to 6.44
+    corrected); for a joint of another robot the coupling with the other joints is a known input.
+
+    * Needs: torque, speed, acceleration; position if joints are coupled.
+    * Unit: N s/m (linear axis) or N m s/rad (rotary axis), positive if something opposes the motion.
+    * Not applicable: below `minimum_speed`, where the friction is unobservable. Above it again, the status is start-up
+      until the integral of the bandwidth over time reaches 3.
+    * Fails: the bandwidth falls in proportion to the speed. After the speed changes sign, as in a rebound, the estimate
+      has the wrong sign: only the first crossing of a limit counts.
+
+    Examples
+    --------
+    A drive force of 30 N at 0.2 m/s is a friction of 150 N s/m; an obstacle that takes another 60 N makes it 450 N s/m.
+
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 30.0, 90.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> steady = Series(time, np.zeros(2001), "m/s2")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed, "acceleration": steady})
+    >>> friction = FrictionEkf().signal(run, axis)
+    >>> friction.values[[999, 2000], 0].round().tolist(), friction.unit
+    ([150.0, 450.0], 'N s/m')
     """
 
     sigma_acceleration: Gain = gain(0.1, "m/s2", "noise of the accelerometer, structure included (standard deviation)")
@@ -97,11 +149,11 @@ class FrictionEkf:
         )
 
     def unit(self, machine: Machine) -> str:
-        """N s/m or N m s/rad."""
+        """Return "N s/m" or "N m s/rad"."""
         return f"{machine.force_unit} s/{machine.load_units['position']}"
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Virtual friction (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        """Return the virtual friction (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         acceleration = recording["acceleration"]
         others = previous_value(acceleration, drive.time)
@@ -128,7 +180,7 @@ class FrictionEkf:
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
     def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
-        """One joint: friction (n,) and status (n,); every accelerometer sample is used once, at its own time."""
+        """Return friction and status (n,) of one joint; each accelerometer sample is used once, at its own time."""
         friction = np.zeros(len(motion.time))
         status = np.zeros(len(motion.time), dtype=np.uint8)
         samples = Samples(
@@ -169,9 +221,43 @@ class FrictionEkf:
         return friction, status
 
     def steady_state(self, inertia: float, speed: float, friction: float, period: float) -> tuple[FloatArray, float]:
-        """Estimator poles [rad/s], slowest first, and predicted variance of d in the steady state at a constant speed.
+        """Return the poles of the estimator and the predicted variance of d in the steady state at constant speed.
 
-        From the discrete algebraic Riccati equation with F, Q and R frozen; raises nothing for speed > 0.
+        Parameters
+        ----------
+        inertia : float
+            m, load and reflected motor [kg, kg m2].
+        speed : float
+            Constant speed, not 0: there the friction is unobservable [m/s, rad/s].
+        friction : float
+            d [N s/m, N m s/rad].
+        period : float
+            Uniform sample period [s].
+
+        Returns
+        -------
+        poles : ndarray of float, shape (3,)
+            Magnitudes of the poles [rad/s], the slowest first.
+        variance : float
+            Predicted variance of d, element P11 [(N s/m)^2].
+
+        Raises
+        ------
+        ConfigurationError
+            A gain has several values; see `of_joint`.
+
+        Notes
+        -----
+        Discrete algebraic Riccati equation with the Jacobian of thesis 5.6 and constant Q and R.
+
+        Examples
+        --------
+        At half the speed the slowest pole is less than half as fast.
+
+        >>> fast, _ = FrictionEkf().steady_state(inertia=1154.4, speed=0.2, friction=900.0, period=1e-3)
+        >>> slow, _ = FrictionEkf().steady_state(inertia=1154.4, speed=0.1, friction=900.0, period=1e-3)
+        >>> print(f"{fast[0]:.1f} rad/s, {slow[0]:.1f} rad/s")
+        22.0 rad/s, 8.7 rad/s
         """
         from scipy.linalg import solve_discrete_are
 

@@ -1,4 +1,4 @@
-"""The friction-estimating EKF of a planar arm's joint: four states, scalars unrolled (thesis 6.34-6.44 put right).
+"""The friction-estimating EKF of a planar arm's joint: four states, scalars unrolled (thesis 6.34 to 6.44 corrected).
 
 State (d, a, v, q). Predict, all from the old state: d, f, v + T a, q + T v, with
 
@@ -26,7 +26,7 @@ _FOUR = "UniTuple(float64, 4)"
 
 
 class Link(NamedTuple):
-    """One joint of the arm: its angle (n,), which may hold NaN, and its terms of `dynamics.Pendulum`, all n known.
+    """One joint of the arm: its angle (n,), which may contain NaN, and its terms of `dynamics.Pendulum`, all n known.
 
     `inertia` and `coupling` [kg m2], `gravity` [N m], `viscous` [N m s/rad]: the friction to start from.
     """
@@ -81,9 +81,9 @@ def update_covariance(
     k: State,
     innovation: float,
 ) -> Covariance:
-    """Joseph form P - k c' - c k' + k k' S: c is P's column of the measured state, S the innovation's variance.
+    """Joseph form P - k c' - c k' + k k' S: c is P's column of the measured state, S the variance of the innovation.
 
-    It holds for any k, also for one whose first part is forced to zero.
+    It holds for any k, also for one whose first element is forced to zero.
     """
     p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = p
     c1, c2, c3, c4 = column
@@ -106,7 +106,7 @@ def update_covariance(
 def correct(
     state: State, p: Covariance, column: State, innovation: float, surprise: float, applicable: bool
 ) -> tuple[State, Covariance]:
-    """State and covariance after one scalar measurement; where the friction cannot be observed, d is left alone."""
+    """Return state and covariance after one scalar measurement; d is unchanged where the friction is unobservable."""
     k1 = column[0] / innovation if applicable else 0.0
     k = (k1, column[1] / innovation, column[2] / innovation, column[3] / innovation)
     d, a, v, q = state
@@ -124,7 +124,7 @@ def run_arm_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (n,), zeros before, of one joint of the arm."""
+    """Fill `friction` and `status` (n,) of one joint of the arm, zeros before."""
     time, force, speed, missing, acceleration_time, acceleration = samples
     position, other_position, other_speed, other_acceleration, inertia, viscous, gravity, coupling = link
     q_d, q_a, q_v, r_a, r_v, initial_variance = variances
@@ -146,7 +146,7 @@ def run_arm_filter(
     for k in range(len(time)):
         seen = math.isfinite(speed[k]) and math.isfinite(position[k])
         if started and time[k] - last_speed_time > 1.0:
-            started = False  # a long gap: nothing of the old state is worth keeping
+            started = False  # a long gap: the old state is useless
         if not started:
             while next_sample < last_sample and acceleration_time[next_sample] <= time[k]:
                 if math.isfinite(acceleration[next_sample]):
@@ -171,7 +171,7 @@ def run_arm_filter(
             status[k] = Status.START_UP if applicable else Status.NOT_APPLICABLE
             continue
         while True:
-            # The next event: an accelerometer sample of its own time, else the speed's time.
+            # The next event: an accelerometer sample at its own time, else the time of the speed.
             own_sample = next_sample < last_sample and acceleration_time[next_sample] <= time[k]
             until = acceleration_time[next_sample] if own_sample else time[k]
             step = until - now
@@ -206,7 +206,7 @@ def run_arm_filter(
         held = k
         friction[k] = d
         if not math.isfinite(d + a + v + q):
-            # Steps too long for the speed: the linearised model has run away, and restarts.
+            # The steps are too long for this speed: the linearised model has diverged, and restarts.
             started = False
             friction[k] = viscous
             status[k] = Status.START_UP

@@ -21,10 +21,10 @@ _SIX = "UniTuple(float64, 6)"
 
 
 class Samples(NamedTuple):
-    """What is known of one joint at `time` (n,) s, and its accelerometer at `acceleration_time` (m,) s.
+    """The samples of one joint at `time` (n,) [s], and of its accelerometer at `acceleration_time` (m,) [s].
 
-    `speed` and `acceleration` may hold NaN (no sample), `force` may not. `missing` (n,) uint8: not 0 where the status
-    is to be GAP, whatever is finite.
+    `speed` and `acceleration` may contain NaN (no sample), `force` may not. `missing` (n,) uint8: not 0 where the
+    status is to be GAP, even if all values are finite.
     """
 
     time: FloatArray
@@ -47,9 +47,9 @@ class Variances(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """`minimum_speed`: below it the friction cannot be observed [m/s, rad/s].
+    """Limits of the filter: `minimum_speed` [m/s, rad/s], below which the friction is unobservable.
 
-    `acceleration_hold` [s]: how long an accelerometer may be silent. `glitch` [s]: a shorter stop is none.
+    `acceleration_hold` [s]: how long an accelerometer may be silent. `glitch` [s]: a shorter stop does not count.
     """
 
     minimum_speed: float
@@ -125,11 +125,11 @@ def progress_of_settling(
     forward: bool,
     last_applicable: float,
 ) -> tuple[float, int, bool, float]:
-    """How far the estimate has settled: (settled, against, forward, last_applicable) after one more sample.
+    """Return (settled, against, forward, last_applicable) after one more sample: how far the estimate has settled.
 
-    `settled` is the integral of the rough bandwidth over time, `gained` this step's part: ready once it reaches 3. It
-    restarts after a stop longer than `glitch` and after a rebound, when the estimate has the wrong sign for a while;
-    fewer than 3 consecutive samples of the other sign are wild ones.
+    `settled` is the integral of the approximate bandwidth over time, `gained` the part of this step; the estimate is
+    ready when it reaches 3. It restarts after a stop longer than `glitch`, and after a rebound, when the estimate has
+    the wrong sign for a while; fewer than 3 consecutive samples of the other sign are outliers.
     """
     if applicable:
         against = against + 1 if moves_forward != forward else 0
@@ -149,9 +149,9 @@ def run_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (n,), zeros before, of one joint.
+    """Fill `friction` and `status` (n,) of one joint, zeros before.
 
-    `inertia` (n,), or (1,) where it is constant [kg, kg m2]; `viscous` [N s/m, N m s/rad]: the friction to start from.
+    `inertia` (n,), or (1,) if it is constant [kg, kg m2]; `viscous` [N s/m, N m s/rad]: the friction to start from.
     """
     time, force, speed, missing, acceleration_time, acceleration = samples
     q_d, q_a, q_v, r_a, r_v, initial_variance = variances
@@ -172,14 +172,14 @@ def run_filter(
     last_applicable = -math.inf
     forward = True
     against = 0
-    # A constant inertia is looked up once; of one that changes with the pose the last one holds, like the force.
+    # A constant inertia is read once; one that changes with the pose is held between samples, like the force.
     varies = len(inertia) > 1
     inverse_inertia = 1.0 / inertia[0] if len(inertia) else 0.0
     bandwidth_scale = math.sqrt(q_d / (r_a + q_a))
     for k in range(len(time)):
         seen = math.isfinite(speed[k])
         if started and time[k] - last_speed_time > 1.0:
-            started = False  # a long gap: nothing of the old state is worth keeping
+            started = False  # a long gap: the old state is useless
         if not started:
             while next_sample < last_sample and acceleration_time[next_sample] <= time[k]:
                 if math.isfinite(acceleration[next_sample]):
@@ -208,7 +208,7 @@ def run_filter(
             status[k] = Status.START_UP if applicable else Status.NOT_APPLICABLE
             continue
         while True:
-            # The next event: an accelerometer sample of its own time, else the speed's time.
+            # The next event: an accelerometer sample at its own time, else the time of the speed.
             own_sample = next_sample < last_sample and acceleration_time[next_sample] <= time[k]
             until = acceleration_time[next_sample] if own_sample else time[k]
             step = until - now
@@ -255,7 +255,7 @@ def run_filter(
             inverse_inertia = 1.0 / inertia[k]
         friction[k] = d
         if not math.isfinite(d + a + v):
-            # Steps too long for the speed: the linearised model has run away, and restarts.
+            # The steps are too long for this speed: the linearised model has diverged, and restarts.
             started = False
             friction[k] = viscous
             status[k] = Status.START_UP

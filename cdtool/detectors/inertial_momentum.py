@@ -1,4 +1,4 @@
-"""Inertial generalized momenta (IGM): the momentum observer on a speed that the accelerometer has made faster."""
+"""Inertial generalised momenta (IGM): the momentum observer on a speed that the accelerometer makes faster."""
 
 from __future__ import annotations
 
@@ -29,19 +29,57 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 # The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
 _STANDSTILL_WINDOW = 0.3
 _STANDSTILL_AT_LEAST = 0.1
-# Over a longer gap than this [s] vibration makes a straight line of the acceleration worse than the speed's change.
+# Over a longer gap than this [s], because of vibration, the change of the speed is better than a straight line.
 _LONGEST_LINE = 0.02
 
 
 @dataclass(frozen=True)
 class InertialMomentum:
-    """Complementary filter w = (s a + (k1 s + k2) v) / (s2 + k1 s + k2) a joint, then the momentum observer on w.
+    """The momentum observer on the fused speed w = (s a + (k1 s + k2) v) / (s^2 + k1 s + k2).
 
-    Source: thesis 6.3-6.5 and 6.27-6.32, whose left sides are speeds and of which the latter lack one 1/s; k1 = 2 zeta
-    w_c, k2 = w_c^2. Needs: torque, speed, acceleration (and position, where joints are coupled). Unit: N or N m.
-    Start-up: the longer of 3/K and, without a standstill at the start that shows the accelerometer's bias, 3 over the
-    filter's slowest pole. Fails: w_c above the drive's resonance pulls the estimate back to the late motor speed; w_c
-    below 3 rad/s lets the bias drift in.
+    Parameters
+    ----------
+    bandwidth : float or tuple of float
+        Observer gain K [rad/s].
+    crossover : float or tuple of float
+        w_c [rad/s]: the fused speed follows the measured speed below it and the accelerometer above it; k2 = w_c^2.
+    damping : float or tuple of float
+        zeta of the complementary filter, 0.7 to 1; k1 = 2 zeta w_c.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 6.3 to 6.5 and 6.27 to 6.32 in the corrected form (docs/errata.md: the left sides are speeds, and 6.27 and
+    6.30 have one factor s too many). As states: w' = a + k1 (v - w) + z, z' = k2 (v - w), bilinear with the measured
+    step. The filters of a and v add up to 1, and a constant bias of the accelerometer decays completely. w replaces v
+    in the momentum observer (`Momentum`).
+
+    * Needs: torque, speed, acceleration; position if joints are coupled.
+    * Unit: N or N m, positive if the contact opposes positive travel.
+    * Start-up: the longer of 3/K and 3 over the slowest pole of the filter; without the latter if a standstill at the
+      beginning shows the bias.
+    * Fails: w_c above the resonance of the drive pulls the estimate back to the late motor speed; w_c below 3 rad/s
+      lets the drift of the bias through.
+
+    Examples
+    --------
+    A constant bias of the accelerometer, here 0.03 m/s2, does not change the result.
+
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> bias = Series(time, np.full(2001, 0.03), "m/s2")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed, "acceleration": bias})
+    >>> InertialMomentum().signal(run, axis).values[2000, 0].round(1).item()
+    30.0
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain K")
@@ -60,15 +98,15 @@ class InertialMomentum:
         require_positive(self, "bandwidth", "crossover", "damping")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return str(machine.force_unit)
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        """Return the residual (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         acceleration = previous_value(recording["acceleration"], drive.time)
         lost = ~np.isfinite(acceleration)
-        # Before the first sample of the accelerometer nothing is lost.
+        # Before the first accelerometer sample no sample is lost.
         unknown = lost & (np.cumsum(~lost, axis=0) > 0)
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
@@ -98,11 +136,28 @@ class InertialMomentum:
         standstill_speed: float,
         lost: BoolArray | None = None,
     ) -> tuple[FloatArray, float]:
-        """Fused speed (n,) of one joint, and the time from which it may be trusted [s].
+        """Return the fused speed of one joint, and the time from which it can be used.
 
-        `missing` and `lost` (n,): where speed and acceleration have no sample. While the speed is missing the
-        acceleration is integrated; a gap in the acceleration is bridged by a straight line up to 20 ms (or 5 periods of
-        a slower clock), by the change of the speed where it is longer.
+        Parameters
+        ----------
+        time : ndarray of float, shape (n,)
+            Times [s].
+        speed, acceleration : ndarray of float, shape (n,)
+            Finite, the last value held where one is missing [m/s, m/s2] or [rad/s, rad/s2].
+        missing : ndarray of bool, shape (n,)
+            Where the speed has no sample; there the acceleration is integrated.
+        standstill_speed : float
+            Speed up to which the joint is at rest: at the beginning the bias is then averaged [m/s, rad/s].
+        lost : ndarray of bool, shape (n,), optional
+            Where the acceleration has no sample. A gap of up to 20 ms, or 5 periods of a slower clock, is bridged by a
+            straight line, a longer one by the change of the speed.
+
+        Returns
+        -------
+        fused : ndarray of float, shape (n,)
+            The fused speed [m/s, rad/s].
+        ready : float
+            Time from which it can be used [s].
         """
         crossover = single(self.crossover)
         k1, k2 = 2.0 * single(self.damping) * crossover, crossover**2
@@ -116,7 +171,7 @@ class InertialMomentum:
 
 
 def _longest_line(time: FloatArray) -> FloatArray:
-    """At each sample (n,) the longest gap in the acceleration that a straight line bridges [s]."""
+    """Return for each sample (n,) the longest gap in the acceleration that a straight line bridges [s]."""
     steps = np.diff(time)
     usual = recent_medians(steps, float(steps[0])) if len(steps) else steps
     return np.maximum(_LONGEST_LINE, HOLD_PERIODS * np.concatenate((usual[:1], usual[:1], usual[:-1])))[: len(time)]
@@ -142,7 +197,7 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
     at_least: float,
     fused: FloatArray,
 ) -> float:
-    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns when it may be trusted [s]."""
+    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns the time from which w can be used [s]."""
     w = 0.0
     z = 0.0
     started = False
@@ -173,7 +228,7 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
                 total += acceleration[k]
                 count += 1
                 if time[k] - begin >= at_least:
-                    trusted = min(trusted, time[k])  # from here on the bias is known, and not before
+                    trusted = min(trusted, time[k])  # only now the bias is known
                 w = speed[k]
                 z = -total / count
                 fused[k] = w

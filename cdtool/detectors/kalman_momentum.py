@@ -25,24 +25,56 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 
 # The filter starts with the uncertainty of the contact torque that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 1.0
-# A step longer than this many usual ones is a gap.
+# A step longer than this many usual steps is a gap.
 _USUAL = 1.5
-# A longer gap leaves nothing of the old state worth keeping [s].
+# After a longer gap the old state is useless [s].
 _LONGEST_GAP = 1.0
 
 
 @dataclass(frozen=True)
 class KalmanMomentum:
-    """State (p, tau_c) a joint: dp/dt = tau - beta - tau_c, tau_c a random walk, measured p = M(q) v.
+    """Kalman estimate of tau_c per joint: dp/dt = tau - beta - tau_c, tau_c a random walk, p = M(q) v measured.
 
-    Beyond the thesis; after Wahrburg, Boes, Listmann, Dai, Matthias and Ding, "Motor-current-based estimation of
+    Parameters
+    ----------
+    sigma_speed : float or tuple of float
+        Standard deviation of the noise of the speed [m/s]; that of the measured momentum is the nominal inertia times
+        it.
+    sigma_torque : float or tuple of float
+        Standard deviation of the error of torque and model, white from sample to sample [N].
+    contact_drift : float or tuple of float
+        How fast the contact torque may change [N per sqrt(s)].
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Not in the thesis; after Wahrburg, Boes, Listmann, Dai, Matthias and Ding, "Motor-current-based estimation of
     cartesian contact forces and torques for robotic manipulators and its application to force control", IEEE Trans.
-    Automation Science and Engineering 15(2), 2018, 879-886, here joint by joint. beta as for the momentum observer.
-    Needs: torque, speed (and position, where joints are coupled). Unit N or N m, positive where the contact opposes
-    positive travel. The measured momentum's noise is the nominal inertia times `sigma_speed`. Bandwidth, roughly: the
-    smaller of (q_c / R)^(1/4) and (q_c / S)^(1/2), with q_c = contact_drift^2, R and S the noise of momentum and torque
-    times the step. Start-up: until the integral of it reaches 3. Fails as the momentum observer does, and where the
-    noise is not what the gains say.
+    Automation Science and Engineering 15(2), 2018, 879-886, here for each joint separately. beta is that of `Momentum`.
+    Approximate bandwidth [rad/s]: the smaller of (q_c / R)^(1/4) and (q_c / S)^(1/2), where q_c = contact_drift^2, and
+    R and S are the variances of momentum and torque times the step. `steady_state` computes the poles.
+
+    * Needs: torque, speed; position if joints are coupled.
+    * Unit: N or N m, positive if the contact opposes positive travel.
+    * Start-up: until the integral of the bandwidth over time reaches 3.
+    * Fails: like the momentum observer, and if the noise differs from the gains.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed})
+    >>> KalmanMomentum().signal(run, axis).values[[999, 2000], 0].round(1).tolist()
+    [0.0, 30.0]
     """
 
     sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
@@ -61,11 +93,11 @@ class KalmanMomentum:
         require_positive(self, "sigma_speed", "sigma_torque", "contact_drift")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return machine.force_unit
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Contact torque (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        """Return the contact torque (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         net_force, momentum = machine.momentum_balance(drive.torque, drive.position, drive.speed, drive.speed)
         estimate = np.empty(momentum.shape)
@@ -94,7 +126,33 @@ class KalmanMomentum:
         return Signal(drive.time, estimate, status, self.unit(machine), self.signed)
 
     def steady_state(self, inertia: float, period: float) -> FloatArray:
-        """Estimator poles [rad/s], slowest first, for a uniform `period` [s], from the algebraic Riccati equation."""
+        """Return the poles of the estimator in the steady state, from the discrete algebraic Riccati equation.
+
+        Parameters
+        ----------
+        inertia : float
+            Inertia on the load side [kg, kg m2].
+        period : float
+            Uniform sample period [s].
+
+        Returns
+        -------
+        ndarray of float, shape (2,)
+            Magnitudes of the poles [rad/s], the slowest first.
+
+        Raises
+        ------
+        ConfigurationError
+            A gain has several values; see `of_joint`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> slow, fast = KalmanMomentum().steady_state(inertia=600.0, period=1e-3)
+        >>> slower, _ = KalmanMomentum(contact_drift=5.0).steady_state(inertia=600.0, period=1e-3)
+        >>> bool(slower < slow <= fast)
+        True
+        """
         from scipy.linalg import solve_discrete_are
 
         transition = np.array([[1.0, -period], [0.0, 1.0]])
@@ -132,14 +190,14 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     estimate: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Predict p + (mean force - tau_c) T over each step, exactly; correct with p as measured, in Joseph form.
+    """Predict p + (mean force - tau_c) T over each step, exactly; correct with the measured p, in Joseph form.
 
-    A gap of at most 0.15 s is gone through in steps of the `usual` length (n,), with the momentum on a straight line
-    and the mean force: the estimate is then where it would have been, and goes on with the gain that it had. One large
-    step would answer otherwise, and the estimate wander behind the gap as it never does else.
+    A gap of at most 0.15 s is crossed in steps of the `usual` length (n,), with the momentum on a straight line and the
+    mean force: the estimate is then where it would have been, and continues with the same gain. A single large step
+    would have another gain, and the estimate would wander after the gap as it never does otherwise.
 
-    `waits`: where a sample is not whole. Behind it a straight line stands for the force where the torque was missing,
-    or the pose of `coupled` joints.
+    `waits`: where a sample is incomplete. After it the force is interpolated by a straight line if the torque was
+    missing, or the pose of `coupled` joints.
     """
     started = False
     bridged = False

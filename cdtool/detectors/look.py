@@ -1,4 +1,4 @@
-"""How a detector looks in every figure: its colour, safe for the colour-blind, and its marker, for grey print."""
+"""How a detector looks in figures: a colour that is safe for colour-blind readers, and a marker for grey print."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ RED, GREEN, BLUE, VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
 ORANGE, SKY, BROWN = "#E69F00", "#56B4E9", "#8C613C"
 NAVY, OLIVE, GREY = "#332288", "#7A7A00", "#595959"
 
-# The markers that both the figures and the HTML page can draw, by matplotlib's names.
+# Markers that both the figures and the HTML page can draw, named as in matplotlib.
 MARKERS = ("o", "s", "D", "^", "v", "<", ">", "p", "P", "X")
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
@@ -20,7 +20,25 @@ _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 
 @dataclass(frozen=True)
 class Look:
-    """Colour (`#rrggbb`) and marker (one of `MARKERS`) of a detector; raises ConfigurationError for any other."""
+    """Colour and marker of a detector in figures.
+
+    Parameters
+    ----------
+    colour : str
+        As `#rrggbb`.
+    marker : str
+        One of `MARKERS`, named as in matplotlib.
+
+    Raises
+    ------
+    ConfigurationError
+        The colour is not written as `#rrggbb`, or the marker is not one of `MARKERS`.
+
+    Examples
+    --------
+    >>> Look("#332288", "o").colour
+    '#332288'
+    """
 
     colour: str
     marker: str

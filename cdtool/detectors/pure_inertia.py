@@ -16,10 +16,30 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class PureInertia:
-    """i = -a: the load's deceleration along positive travel (thesis 5.2.4), on the accelerometer's clock.
+    """i = -a: the deceleration of the load along positive travel.
 
-    Needs: acceleration. Unit: m/s2 (linear) or rad/s2 (rotary). Status: missing samples only. Fast for stiff impacts,
-    blind to soft ones: their deceleration drowns in the structure's vibration. A constant bias goes into the signature.
+    Notes
+    -----
+    Thesis 5.2.4 (pure inertia), as logged, on the clock of the accelerometer.
+
+    * Needs: acceleration.
+    * Unit: m/s2 (linear axis) or rad/s2 (rotary axis), positive if the load decelerates in positive travel.
+    * Status: missing samples only.
+    * Fails: fast in stiff impacts, it does not detect soft ones: their deceleration is lost in the vibration of the
+      structure. A constant bias becomes part of the signature.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> acceleration = Series(time, np.where(time < 1.0, 0.5, -1.5), "m/s2")
+    >>> signal = PureInertia().signal(Recording("run", "", ("axis",), {"acceleration": acceleration}), axis)
+    >>> signal.values[[0, 1000], 0].tolist(), signal.unit
+    ([-0.5, 1.5], 'm/s2')
     """
 
     name: ClassVar[str] = "pure_inertia"
@@ -31,11 +51,11 @@ class PureInertia:
     look: ClassVar[Look] = Look(GREEN, "^")
 
     def unit(self, machine: Machine) -> str:
-        """m/s2 or rad/s2."""
+        """Return "m/s2" or "rad/s2"."""
         return str(machine.load_units["acceleration"])
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Deceleration (n, J); raises RecordingError without an acceleration."""
+        """Return the deceleration (n, J); see `Detector.signal`."""
         require_channels(self, recording)
         acceleration = recording["acceleration"]
         status = np.where(np.isfinite(acceleration.values), Status.VALID, Status.GAP).astype(np.uint8)

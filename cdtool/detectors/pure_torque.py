@@ -16,10 +16,31 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class PureTorque:
-    """i = tau_m / r: the drive force on the load side (thesis 5.2.4), as logged, on the torque's own clock.
+    """i = tau_m / r: the drive force on the load side.
 
-    Needs: torque. Unit: N (linear) or N m (rotary). Status: missing samples only. It sees an impact when the controller
-    answers it: late for stiff impacts; friction, gravity and acceleration are all in it.
+    Notes
+    -----
+    Thesis 5.2.4 (pure torque), as logged, on the torque's own clock; r is the transmission ratio, load travel per motor
+    angle.
+
+    * Needs: torque.
+    * Unit: N (linear axis) or N m (rotary axis), positive in positive travel.
+    * Status: missing samples only.
+    * Fails: it detects an impact only when the controller responds to it, which is late for stiff impacts; friction,
+      gravity and acceleration are all part of the signal.
+
+    Examples
+    --------
+    A motor torque of 0.4 N m on a drive with 10 mm per radian is 40 N at the load.
+
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"transmission_ratio": 0.01}, "machine.toml"))
+    >>> logged = Recording("run", "", ("axis",), {"torque": Series([0.0, 0.001], [0.4, 0.4], "N m")})
+    >>> signal = PureTorque().signal(axis.referred_to_load(logged), axis)
+    >>> signal.values[:, 0].tolist(), signal.unit
+    ([40.0, 40.0], 'N')
     """
 
     name: ClassVar[str] = "pure_torque"
@@ -31,11 +52,11 @@ class PureTorque:
     look: ClassVar[Look] = Look(BLUE, "s")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return str(machine.force_unit)
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Drive force (n, J); raises RecordingError without a torque."""
+        """Return the drive force (n, J); see `Detector.signal`."""
         require_channels(self, recording)
         torque = recording["torque"]
         status = np.where(np.isfinite(torque.values), Status.VALID, Status.GAP).astype(np.uint8)

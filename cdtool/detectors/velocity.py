@@ -1,4 +1,4 @@
-"""Velocity observer: a disturbance observer on the joints' speeds."""
+"""Velocity observer: a disturbance observer on the joint speeds."""
 
 from __future__ import annotations
 
@@ -24,14 +24,48 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class Velocity:
-    """Residual res = (s I + K M^-1)^-1 K M^-1 tau_c (thesis 2.11-2.15; 2.12 gives d(xhat)/dt, not xhat).
+    """Residual res = (s I + K M^-1)^-1 K M^-1 tau_c of the joint speeds.
 
-    d(vhat)/dt = M^-1 (tau - C v - g - friction - res), res = K (vhat - v). K = `bandwidth` times the diagonal of M at
-    the home pose: there, and where M does not change, it is as fast as a momentum observer of that bandwidth. Sampled
-    with M frozen over each step: res = A res + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T). Needs: torque,
-    speed (and position, where joints are coupled). Unit N or N m, positive where the contact opposes positive travel.
-    Start-up: until the slowest mode of K M^-1 has had 3 time constants. Fails: its bandwidth changes with the pose, and
-    what one joint feels leaks into the others while the estimate settles.
+    Parameters
+    ----------
+    bandwidth : float or tuple of float
+        K divided by the diagonal of M at the home pose [rad/s], one number or one per joint. In that pose, and where M
+        does not change, the observer is as fast as a momentum observer of this bandwidth.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    Thesis 2.11 to 2.15; 2.12 is the rate of the estimated speed, not the speed (docs/errata.md), and friction is added:
+
+        d(vhat)/dt = M^-1 (tau - C v - g - friction - res),   res = K (vhat - v),   vhat(0) = v(0)
+
+    Sampled with M frozen over each step: res_k = A res_{k-1} + (I - A) (mean force balance - M dv / T), A = exp(-K M^-1
+    T).
+
+    * Needs: torque, speed; position if joints are coupled.
+    * Unit: N or N m, positive if the contact opposes positive travel.
+    * Start-up: until 3 time constants of the slowest mode of K M^-1 have passed.
+    * Fails: its bandwidth changes with the pose, and a contact of one joint appears in the others while the estimate
+      settles.
+
+    Examples
+    --------
+    On one axis it is the momentum observer.
+
+    >>> import numpy as np
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> time = np.arange(2001) * 1e-3
+    >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
+    >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed})
+    >>> Velocity(bandwidth=10.0).signal(run, axis).values[[999, 1100, 2000], 0].round(1).tolist()
+    [0.0, 19.0, 30.0]
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "K over the diagonal of M at the home pose")
@@ -48,11 +82,11 @@ class Velocity:
         require_positive(self, "bandwidth")
 
     def unit(self, machine: Machine) -> str:
-        """N or N m."""
+        """Return "N" or "N m"."""
         return machine.force_unit
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Residual (n, J) on the speed's clock; raises RecordingError where a channel is absent."""
+        """Return the residual (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         if not machine.coupled:

@@ -1,4 +1,4 @@
-"""The velocity observer's recursion for coupled joints: the modes of every step at once, then a compiled loop."""
+"""The velocity observer's recursion for coupled joints: the modes of all steps together, then a compiled loop."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cdtool.recording import BoolArray, FloatArray
 _BOOLS = "Array(b1, 1, 'C', readonly=True)"
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 _MATRICES = "Array(float64, 3, 'C', readonly=True)"
-# Steps whose modes are sought at once: as many matrices stay in the processor's cache.
+# Number of steps whose modes are computed together: their matrices fit into the processor's cache.
 _BLOCK = 1024
-# Rows of the work space: residual, impulse, what the residual tends to, the same by modes.
+# Rows of the work space: residual, impulse, target of the residual, the same by modes.
 _VALUE, _IMPULSE, _TARGET, _MODE, _WORK = range(5)
 
 
@@ -33,9 +33,9 @@ def observe_velocity(
 
     res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
 
-    K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2).
-    A missing motion makes the step longer; `missing` (any input) marks a sample as missing. After three time constants
-    of the slowest mode and 0.15 s without a sample it restarts.
+    K^(-1/2) M K^(-1/2) is symmetric: its eigenvectors V and eigenvalues 1/w give A = K^(1/2) V exp(-w T) V' K^(-1/2). A
+    missing motion makes the step longer; `missing` (any input) marks a sample as missing. It restarts after three time
+    constants of the slowest mode, and 0.15 s, without a sample.
     """
     residual, status = np.empty(balance.shape), np.empty(balance.shape, dtype=np.uint8)
     root = np.sqrt(gains)
@@ -68,7 +68,7 @@ def _observe(
     residual: FloatArray,
     status: StatusArray,
 ) -> None:
-    """As `observe_velocity`; `periods` 1/w (n, J) and `vectors` V (n, J, J) of the step that ends at each sample."""
+    """Run the recursion of `observe_velocity`; `periods` 1/w (n, J) and `vectors` V (n, J, J) of each sample's step."""
     joints = len(root)
     started = False
     elapsed = 0.0
@@ -88,7 +88,7 @@ def _observe(
         if started:
             slowest = periods[k, joints - 1]
             if k > last + 1:
-                # The balance over a gap rests on held values: a straight line stands for it.
+                # Over a gap the balance is based on held values: it is interpolated by a straight line.
                 for j in range(joints):
                     work[_IMPULSE, j] = 0.5 * (balance[k, j] + balance[last, j]) * elapsed
             if elapsed > max(3.0 * slowest, BRIDGED):

@@ -15,8 +15,20 @@ _AS_PLURAL = {"is": "are", "has": "have"}
 
 
 def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return names with texts in order of occurrence; texts that differ only in numbers are merged, with a count.
+    """Merge texts that differ only in numbers, with a count.
 
+    Parameters
+    ----------
+    items : sequence of (str, str)
+        Names with texts.
+
+    Returns
+    -------
+    list of (str, str)
+        In order of occurrence; four or more similar texts become one.
+
+    Examples
+    --------
     >>> grouped([("a", "3 gaps"), ("b", "1 gap"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
     [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]
     """
@@ -35,11 +47,27 @@ def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _words(text: str) -> str:
-    """The words of a text without its numbers, the length of its lists, and singular or plural."""
+    """Return the words of a text without its numbers, the length of its lists, and singular or plural."""
     bare = _LISTED.sub(r"\1", _NUMBERS.sub("#", text))
     return " ".join(_AS_PLURAL.get(word, word.rstrip("s")) for word in bare.split(" "))
 
 
 def alike(items: Sequence[Skipped]) -> list[Skipped]:
-    """Reasons, those that are alike once."""
+    """Merge reasons that differ only in numbers.
+
+    Parameters
+    ----------
+    items : sequence of Skipped
+        Recordings with reasons.
+
+    Returns
+    -------
+    list of Skipped
+        As `grouped` merges them.
+
+    Examples
+    --------
+    >>> [str(item.reason) for item in alike([Skipped(name, f"{n} gaps") for n, name in enumerate("abcd", 1)])]
+    ['1 gaps; 3 more like it (b, c, d)']
+    """
     return [Skipped(name, reason) for name, reason in grouped([(item.recording, item.reason) for item in items])]

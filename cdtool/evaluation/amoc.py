@@ -21,9 +21,9 @@ Per = Literal["hour", "operation"]
 
 @dataclass(frozen=True)
 class AmocPoint:
-    """One safety factor: `rate` of false alarms, `median` latency [ms], infinite where it is not reached.
+    """One safety factor: `rate` of false alarms, `median` latency [ms], infinite if it is not reached.
 
-    The median counts missed contacts as later than all others; NaN where no contact could be assessed.
+    The median counts missed contacts as later than all others; NaN if no contact could be assessed.
     """
 
     safety_factor: float
@@ -38,8 +38,8 @@ class AmocPoint:
 class AmocCurve:
     """One detector in one group: points by ascending safety factor, `in_use` the number of the one that is set.
 
-    The hold-out's `operations` and `hours` are what the rates are of. `at_most`: the rate that is not exceeded where
-    there was no false alarm (one-sided, 95 %).
+    The rates refer to the hold-out's `operations` and `hours`. `at_most`: the rate that is not exceeded if there was no
+    false alarm (one-sided, 95 %).
     """
 
     detector: str
@@ -59,9 +59,22 @@ class AmocCurve:
 
 
 def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
-    """The curves of `results.sweep` in its order; detectors that watched the hold-out nowhere have none.
+    """Return the curves of latency against false alarms of a benchmark.
 
-    Rates are per hour, or per operation where that is the unit of the false-alarm budget.
+    Parameters
+    ----------
+    results : Results
+        The results; their `sweep` has the points.
+
+    Returns
+    -------
+    tuple of AmocCurve
+        In the order of the benchmark file. Rates are per hour, or per operation if that is the unit of the false-alarm
+        budget. A detector that was nowhere assessable in the hold-out has no curve.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
     """
     rows: dict[tuple[str, str], list[SweepResult]] = {}
     for row in results.sweep:
@@ -72,7 +85,7 @@ def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
 
 
 def rate_unit(results: Results) -> Per:
-    """What false alarms are counted by: the unit of the budget, else hours."""
+    """Return the unit of false-alarm rates: that of the budget, else hours."""
     budget = results.provenance.get("false_alarm_budget")
     try:
         return Budget.parse(str(budget)).per if budget else "hour"

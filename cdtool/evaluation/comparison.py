@@ -21,7 +21,22 @@ Key = tuple[str, int]
 
 
 def check_significance(level: float) -> None:
-    """Raise UsageError where a significance level is not between 1e-9 and 0.5."""
+    """Check a significance level.
+
+    Parameters
+    ----------
+    level : float
+        The level.
+
+    Raises
+    ------
+    UsageError
+        It is not between 1e-9 and 0.5.
+
+    Examples
+    --------
+    >>> check_significance(0.05)
+    """
     if not _LEAST_LEVEL <= level < 0.5:
         hint = "give a share of at least 0.000000001 and below 0.5, such as 0.05"
         raise UsageError(f"significance level is {level:g}", hint)
@@ -31,8 +46,8 @@ def check_significance(level: float) -> None:
 class Comparison:
     """Two detectors on the contacts of one group that both could assess.
 
-    `latency` [ms] is first less second over the contacts that both detected; `only_first_missed` and
-    `only_second_missed` count the others. The p are corrected (Holm) over all pairs of the group, latency and misses
+    `latency` [ms] is first minus second over the contacts that both detected; `only_first_missed` and
+    `only_second_missed` count the others. All p are corrected (Holm) over all pairs of the group, latency and misses
     together.
     """
 
@@ -62,7 +77,7 @@ class Comparison:
 
 
 def compare_detectors(results: Results) -> list[Comparison]:
-    """Every pair of detectors in every group of impacts, in the order of the benchmark file."""
+    """Return every pair of detectors in every group of impacts, in the order of the benchmark file."""
     clusters = campaigns(results)
     rows: dict[tuple[str, str], dict[Key, ContactResult]] = {}
     for contact in results.scored_contacts:
@@ -81,13 +96,13 @@ def compare_detectors(results: Results) -> list[Comparison]:
 def pairs_of(
     first: Mapping[Key, ContactResult], second: Mapping[Key, ContactResult]
 ) -> list[tuple[ContactResult, ContactResult]]:
-    """The contacts that both could assess."""
+    """Return the contacts that both could assess."""
     both = [(first[key], second[key]) for key in first if key in second]
     return [pair for pair in both if all(item.outcome != "not_assessable" for item in pair)]
 
 
 def latency_difference(pairs: Sequence[tuple[ContactResult, ContactResult]], clusters: Mapping[str, str]) -> Difference:
-    """Latency [ms] of the first less that of the second, over the contacts that both detected."""
+    """Return the latency [ms] of the first minus that of the second, over the contacts that both detected."""
     differences, labels = [], []
     for first, second in pairs:
         if first.latency_ms is not None and second.latency_ms is not None:
@@ -97,7 +112,7 @@ def latency_difference(pairs: Sequence[tuple[ContactResult, ContactResult]], clu
 
 
 def only_one_missed(pairs: Sequence[tuple[ContactResult, ContactResult]]) -> tuple[int, int]:
-    """How many contacts only the first missed, and how many only the second."""
+    """Return how many contacts only the first missed, and how many only the second."""
     missed = [(first.outcome == "missed", second.outcome == "missed") for first, second in pairs]
     return missed.count((True, False)), missed.count((False, True))
 

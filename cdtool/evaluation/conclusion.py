@@ -44,8 +44,20 @@ class ForceCheck:
 def force_checks(results: Results) -> list[ForceCheck]:
     """Return what decides about every force profile that is set: test points, then the contacts that belong to none.
 
-    A contact without any load-cell force to compare is not assessable; so is a profile of a group without contacts that
-    were scored.
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    list of ForceCheck
+        A contact without any load-cell force to compare is not assessable; so is a profile of a group without scored
+        contacts.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
     """
     found = []
     for group, profile in _profiles(results).items():
@@ -82,7 +94,22 @@ def missed_unasked(results: Results, summaries: Sequence[Summary]) -> list[Summa
 
 
 def nothing_assessed(summaries: Sequence[Summary]) -> list[Summary]:
-    """Return the summaries of detectors that could assess nothing at all in their group."""
+    """Return the summaries of detectors that could assess nothing at all in their group.
+
+    Parameters
+    ----------
+    summaries : sequence of Summary
+        The summaries of a benchmark.
+
+    Returns
+    -------
+    list of Summary
+        Those without an assessable contact or operation.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the summaries.
+    """
     return [
         item
         for item in summaries
@@ -91,7 +118,24 @@ def nothing_assessed(summaries: Sequence[Summary]) -> list[Summary]:
 
 
 def force_missed(results: Results, summaries: Sequence[Summary]) -> list[Summary]:
-    """Return the summaries whose missed contacts are violations, since their group has a force profile."""
+    """Return the summaries whose missed contacts are violations, because their group has a force profile.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+    summaries : sequence of Summary
+        Their summaries.
+
+    Returns
+    -------
+    list of Summary
+        Those with missed contacts and a force profile, without a limit on missed contacts.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns results and summaries.
+    """
     profiles = _profiles(results)
     return [item for item in missed_unasked(results, summaries) if item.group in profiles]
 

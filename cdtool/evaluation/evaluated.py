@@ -22,11 +22,28 @@ class Evaluated:
 
 
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
-    """Derive the statistics; `limits` are checked and become rows of the results, else those in them stay.
+    """Derive all statistics, comparisons and the conclusion from results.
 
-    The conclusion is derived from all of them.
+    Parameters
+    ----------
+    results : Results
+        The rows of a benchmark.
+    limits : sequence of LimitRule
+        Limits to check; the outcomes become rows of the results. Without them, those in the results stay.
 
-    Raises ConfigurationError if a limit names a metric that these results do not have.
+    Returns
+    -------
+    Evaluated
+        The results with limits and conclusion, the summaries and the comparisons of detectors.
+
+    Raises
+    ------
+    ConfigurationError
+        A limit names a metric that these results do not have.
+
+    Examples
+    --------
+    `cdtool.benchmark` and `cdtool.score` return evaluated results.
     """
     summaries = tuple(summarise(results))
     if limits:

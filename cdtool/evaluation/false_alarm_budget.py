@@ -1,4 +1,4 @@
-"""A stated number of false alarms, and the safety factor that keeps to it on impact-free operations."""
+"""A stated number of false alarms, and the safety factor that meets it on impact-free operations."""
 
 from __future__ import annotations
 
@@ -23,14 +23,21 @@ _STEPS = 32
 
 @dataclass(frozen=True)
 class Budget:
-    """At most `rate` false alarms per operation or per hour."""
+    """At most `rate` false alarms per operation or per hour.
+
+    Examples
+    --------
+    >>> budget = Budget.parse("1/1000op")
+    >>> budget.rate, budget.per, budget.needed
+    (0.001, 'operation', 1000.0)
+    """
 
     rate: float
     per: Literal["operation", "hour"]
 
     @classmethod
     def parse(cls, text: str) -> Budget:
-        """From 1/1000op, 0.002/op, 1/8h or 0.1/h; raises UsageError."""
+        """Return the budget written as 1/1000op, 0.002/op, 1/8h or 0.1/h; raises UsageError."""
         found = _FORM.fullmatch(text)
         try:
             count, exposure = float(found[1]), float(found[2] or 1.0)  # type: ignore[index]
@@ -47,7 +54,7 @@ class Budget:
 
     @property
     def needed(self) -> float:
-        """The least exposure on which it can be set: one false alarm must be allowed in it."""
+        """The smallest exposure on which it can be set: one false alarm must be allowed in it."""
         return 1.0 / self.rate
 
     def check(self, exposure: float, detector: str) -> None:
@@ -73,10 +80,36 @@ class Calibrated:
 def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], activation: Activation) -> Calibrated:
     """Return the smallest safety factor that is expected to meet the budget, from impact-free operations.
 
+    Parameters
+    ----------
+    budget : Budget
+        False alarms per operation or hour.
+    detector : str
+        Name of the detector, for messages.
+    detections : sequence of Detection
+        Impact-free operations; each one's threshold must not have been learned from it. An operation that was nowhere
+        assessable does not count.
+    activation : Activation
+        What raises an alarm.
+
+    Returns
+    -------
+    Calibrated
+        The factor, and the number of alarms with it on these operations.
+
+    Raises
+    ------
+    UsageError
+        The exposure is smaller than `budget.needed`, with what is missing.
+
+    Notes
+    -----
     Just above the c-th largest of n operations' critical factors the probability of an alarm is c / (n + 1) on average,
     so c - 1 alarms are allowed in them, c = floor(budget (n + 1)); by hours likewise, one fewer than the budget allows.
-    Each detection's threshold must not have been learned from its operation. An operation that was nowhere assessable
-    does not count. Raises UsageError, with what is missing, if the exposure is smaller than `budget.needed`.
+
+    Examples
+    --------
+    `cdtool.learn_signature` sets a factor with `false_alarm_budget`.
     """
     judged = [item for item in detections if item.assessed_seconds > 0.0]
     hours = sum(item.assessed_seconds for item in judged) / 3600.0
@@ -92,14 +125,14 @@ def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], a
 
 
 def _by_operation(detections: Sequence[Detection], activation: Activation, allowed: int) -> tuple[float, int]:
-    """The factor at which at most `allowed` operations alarm: the next one just does not."""
+    """Return the factor at which at most `allowed` operations alarm: the next one just does not."""
     critical = np.sort([critical_factor(item, activation) for item in detections])[::-1]
     factor = _just_above(float(critical[min(allowed, len(critical) - 1)]))
     return factor, int(np.count_nonzero(critical > factor))
 
 
 def _by_count(detections: Sequence[Detection], activation: Activation, allowed: int) -> tuple[float, int]:
-    """The smallest factor of a fine grid from which on all alarms together are no more than allowed."""
+    """Return the smallest factor of a fine grid from which all alarms together are no more than allowed."""
     critical = [critical_factor(item, activation) for item in detections]
     top = _just_above(max(critical))
     factors = top * 2.0 ** (-np.arange(6 * _STEPS) / _STEPS)

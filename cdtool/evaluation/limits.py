@@ -1,6 +1,6 @@
-"""[limits]: what a figure may be at most or at least, so that a pipeline can act on it.
+"""[limits]: the smallest or largest allowed value of a metric, so that a pipeline can act on it.
 
-Conventions: a key is detector.group.metric, or detector.figure for every group; `*` stands for all. A limit is met,
+Conventions: a key is detector.group.metric, or detector.metric for every group; `*` stands for all. A limit is met,
 violated, or not assessable, which does not count as met: nothing passes because nothing was measured.
 """
 
@@ -20,7 +20,7 @@ ALL = "*"
 
 @dataclass(frozen=True)
 class LimitRule:
-    """`figure` of a detector in a group has to lie within `least` and `largest`; `*`: of every one."""
+    """The metric `figure` of a detector in a group must lie within `least` and `largest`; `*`: of all of them."""
 
     key: str
     detector: str
@@ -31,7 +31,33 @@ class LimitRule:
 
 
 def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequence[str]) -> tuple[LimitRule, ...]:
-    """The rules of [limits]; `detectors` are full and short names. Raises ConfigurationError naming the key."""
+    """Read the rules of [limits].
+
+    Parameters
+    ----------
+    table : Table
+        The table [limits] of a benchmark file.
+    detectors : sequence of (str, str)
+        Full and short names of the detectors.
+    groups : sequence of str
+        Names of the groups.
+
+    Returns
+    -------
+    tuple of LimitRule
+        The rules in the order of the file.
+
+    Raises
+    ------
+    ConfigurationError
+        A key or a value is wrong; the message names the key.
+
+    Examples
+    --------
+    >>> table = Table({"*.stiff.p95_ms": {"max": 50}}, "benchmark.toml", "limits.")
+    >>> [(rule.detector, rule.group, rule.largest) for rule in read_limits(table, [("momentum", "gm")], ["stiff"])]
+    [('*', 'stiff', 50.0)]
+    """
     full = {name: name for name, _ in detectors} | {short: name for name, short in detectors} | {ALL: ALL}
     rules = []
     for key in table.values:
@@ -76,7 +102,22 @@ def check_limits(
 
 
 def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:
-    """Those that are violated or could not be assessed."""
+    """Return the limits that are violated or not assessable.
+
+    Parameters
+    ----------
+    limits : sequence of LimitResult
+        Checked limits.
+
+    Returns
+    -------
+    list of LimitResult
+        All but those that are met.
+
+    Examples
+    --------
+    `cdtool.benchmark` checks the limits of its file.
+    """
     return [item for item in limits if item.outcome != "met"]
 
 
@@ -115,7 +156,7 @@ def _text(value: float) -> str:
 
 
 def _split(table: Table, key: str) -> tuple[str, str, str]:
-    """Detector, group and figure; a group's name may hold dots itself."""
+    """Return detector, group and metric; the name of a group may contain dots."""
     parts = key.split(".")
     if len(parts) == 2:
         return parts[0], ALL, parts[1]

@@ -34,7 +34,7 @@ Key = tuple[str, str, str]
 class RecordingOutcome:
     """One recording and one detector: contacts, false alarms, and its part in violated limits in words.
 
-    `judged` is False where the detector gave nothing for it: its contacts have no row, or it did not run in the group.
+    `judged` is False if the detector returned nothing for it: its contacts have no row, or it did not run in the group.
     """
 
     recording: str
@@ -47,13 +47,28 @@ class RecordingOutcome:
 
     @property
     def blind(self) -> bool:
-        """Whether the detector could say nothing about it."""
+        """Whether the detector could not assess it."""
         unseen = bool(self.contacts) and all(item.outcome == "not_assessable" for item in self.contacts)
         return not self.judged or (unseen and not self.false_alarms)
 
 
 def recording_outcomes(results: Results) -> list[RecordingOutcome]:
-    """Every recording that was scored with every detector, in the order of the benchmark file."""
+    """Return the outcome of every scored recording with every detector.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    list of RecordingOutcome
+        In the order of the benchmark file.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
+    """
     contacts: dict[Key, list[ContactResult]] = {}
     for contact in results.contacts:
         contacts.setdefault((contact.group, contact.detector, contact.recording), []).append(contact)
@@ -83,13 +98,13 @@ def recording_outcomes(results: Results) -> list[RecordingOutcome]:
 
 
 def _log_of(operation: str, logs: Mapping[str, None]) -> str:
-    """The log of an operation, which is named log#n where the log was cut."""
+    """Return the log of an operation, which is named log#n if the log was cut."""
     log, _, number = operation.rpartition("#")
     return log if operation not in logs and number.isdecimal() and log in logs else operation
 
 
 def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:
-    """The limits that a single recording can have violated, by group and detector."""
+    """Return the limits that a single recording can have violated, by group and detector."""
     found: dict[tuple[str, str], list[LimitResult]] = {}
     for limit in limits:
         above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
@@ -115,7 +130,7 @@ def _part_in(
 
 
 def _beyond(limit: LimitResult, item: ContactResult, force_failed: bool) -> str:
-    """How a contact goes beyond what a limit allows; empty where it does not."""
+    """Return how a contact exceeds what a limit allows; empty if it does not."""
     figure = limit.figure
     if item.outcome == "missed" and figure in MISSES | QUANTILES | {"detected"}:
         return "is missed"
@@ -133,7 +148,7 @@ def _beyond(limit: LimitResult, item: ContactResult, force_failed: bool) -> str:
 
 
 def _measured(figure: str, item: ContactResult) -> tuple[float | None, str, str]:
-    """What of a contact a figure is made from, in words and with its unit."""
+    """Return the value of a contact on which a metric is based, in words and with its unit."""
     if figure in MEANS | QUANTILES:
         return item.latency_ms, "is detected after", "ms"
     if figure in FORCES_AT_ALARM:

@@ -42,12 +42,52 @@ WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
 
 
 def to_json(results: Results) -> str:
-    """Strict JSON: null where there is no figure; characters that a terminal would obey are escaped."""
+    """Return results as strict JSON.
+
+    Parameters
+    ----------
+    results : Results
+        The results.
+
+    Returns
+    -------
+    str
+        The text of results.json: null without a value; characters that control a terminal are escaped.
+
+    Examples
+    --------
+    >>> empty = Results(provenance={}, detectors=(), groups=(), contacts=(), false_alarms=(), exposure=())
+    >>> json.loads(to_json(empty))["schema_version"] == SCHEMA_VERSION
+    True
+    """
     return strict_json(asdict(results)) + "\n"
 
 
 def read_results(path: Path) -> Results:
-    """Read results.json; raises RecordingError for any other file or another version."""
+    """Read a results.json.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Results
+        The results, checked field by field.
+
+    Raises
+    ------
+    RecordingError
+        The file is not a results file, is damaged, or is of an unknown version.
+
+    Examples
+    --------
+    >>> empty = Results(provenance={}, detectors=(), groups=(), contacts=(), false_alarms=(), exposure=())
+    >>> _ = Path("results.json").write_text(to_json(empty), encoding="utf-8")
+    >>> read_results(Path("results.json")) == empty
+    True
+    """
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = parse_json(content)
@@ -74,7 +114,7 @@ def read_results(path: Path) -> Results:
 
 
 def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of schema_version 2 as those of version 3: other words for verdicts, no conclusion yet."""
+    """Return values of schema_version 2 as those of version 3: other words for verdicts, no conclusion yet."""
 
     def renamed(rows: Any, name: str) -> Any:
         if not isinstance(rows, list):
@@ -94,7 +134,7 @@ def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def build(kind: type[Row], values: Any, where: str) -> Row:
-    """A dataclass from JSON values, checked field by field; raises ValueError that names the field."""
+    """Return a dataclass from JSON values, checked field by field; raises ValueError that names the field."""
     if not isinstance(values, dict):
         raise ValueError(f"{where} is no object")
     known = _field_types(kind)  # type: ignore[arg-type]
@@ -160,7 +200,7 @@ def _required(kind: Any) -> tuple[str, ...]:
 
 
 def _other_kind(path: Path, content: bytes) -> RecordingError | None:
-    """The error for a file that is known to be of another kind; a results file may begin as any JSON does."""
+    """Return the error for a file that is known to be of another kind; a results file may begin as any JSON does."""
     kind = kind_of(content)
     if not kind or kind in ("a results file", "JSON"):
         return None
@@ -172,7 +212,7 @@ def _no_results(path: Path, why: str) -> RecordingError:
 
 
 def results_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of results.json."""
+    """Return the JSON Schema (draft 2020-12) of results.json."""
     parts: dict[str, Any] = {}
     whole = _object(Results, parts)
     whole["properties"]["schema_version"] |= {"const": SCHEMA_VERSION}

@@ -153,7 +153,7 @@ COUNTED_ALWAYS = frozenset(
 
 
 def summarise(results: Results) -> list[Summary]:
-    """One Summary for each detector and group, in the order of the benchmark file; hold-out last."""
+    """Return one Summary for each detector and group, in the order of the benchmark file; hold-out last."""
     contacts: dict[tuple[str, str], list[ContactResult]] = {}
     for contact in results.contacts:
         contacts.setdefault((contact.detector, contact.group), []).append(contact)
@@ -178,7 +178,22 @@ def summarise(results: Results) -> list[Summary]:
 
 
 def later_ms(item: ContactResult) -> float:
-    """By how much the latency of a contact may be longer, since load-cell samples are missing where it began [ms]."""
+    """Return how much longer the latency of a contact may be, because load-cell samples are missing where it began.
+
+    Parameters
+    ----------
+    item : ContactResult
+        The row of the contact.
+
+    Returns
+    -------
+    float
+        The time [ms]; 0 if no sample is missing.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the rows.
+    """
     if item.onset_hole_ms is None:
         return 0.0
     before = 1e3 * (item.onset_uncertainty_s or 0.0)
@@ -188,7 +203,7 @@ def later_ms(item: ContactResult) -> float:
 
 
 def at_worst(results: Results) -> Results:
-    """The results with the longest latencies and the largest forces that missing load-cell samples leave possible."""
+    """Return the results with the longest latencies and the largest forces that missing load-cell samples allow."""
     return replace(results, contacts=tuple(_at_worst(item) for item in results.contacts))
 
 
@@ -205,12 +220,44 @@ def _at_worst(item: ContactResult) -> ContactResult:
 
 
 def campaigns(results: Results) -> dict[str, str]:
-    """What each recording is resampled with: its campaign where one is named, else itself."""
+    """Return with what each recording is resampled.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    dict of str to str
+        For each recording its campaign if it has one, else the recording itself.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
+    """
     return {item.recording: item.campaign or item.recording for item in results.recordings}
 
 
 def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
-    """Latency [ms] of every assessable contact, and whether it is censored (the contact was missed)."""
+    """Return the latency of every assessable contact, and whether it is censored.
+
+    Parameters
+    ----------
+    contacts : sequence of ContactResult
+        The rows of the contacts.
+
+    Returns
+    -------
+    latency : ndarray of float, shape (n,)
+        Latency [ms]; of a missed contact the time for which it was monitored.
+    censored : ndarray of bool, shape (n,)
+        True if the contact was missed.
+
+    Examples
+    --------
+    `latency_quantile` takes both.
+    """
     seen = [item for item in contacts if item.outcome in ("detected", "missed")]
     values = [item.latency_ms if item.latency_ms is not None else item.watched_ms or 0.0 for item in seen]
     return np.array(values, dtype=np.float64), np.array([item.outcome == "missed" for item in seen], dtype=bool)

@@ -16,8 +16,8 @@ from cdtool.recording import FloatArray
 class SurvivalCurve:
     """One detector in one group: `curve` over the time since the onset [ms], up to `end` [ms].
 
-    `end` is the latest detection or the longest time watched. `missed` (k,): the times [ms] up to which the missed
-    contacts were watched, in ascending order.
+    `end` is the latest detection or the longest time monitored. `missed` (k,): the times [ms] for which the missed
+    contacts were monitored, in ascending order.
     """
 
     detector: str
@@ -31,9 +31,22 @@ class SurvivalCurve:
 
 
 def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:
-    """A curve for each detector and group with contacts, in the order of the benchmark file.
+    """Return a survival curve for each detector and group with contacts.
 
-    Where no contact could be assessed it is the first time alone, its band from 0 to 1, and `end` is 0.
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    tuple of SurvivalCurve
+        In the order of the benchmark file. If no contact could be assessed the curve is only the time 0, with a band
+        from 0 to 1, and `end` is 0.
+
+    Examples
+    --------
+    `survival` computes a curve; `cdtool.benchmark` returns the results.
     """
     rows: dict[tuple[str, str], list[ContactResult]] = {}
     for contact in results.scored_contacts:

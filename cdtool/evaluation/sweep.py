@@ -25,7 +25,7 @@ MULTIPLES: FloatArray = 2.0 ** (np.arange(-16, 17) / 8.0)
 class Swept:
     """For each of f safety factors: alarms that belong to no contact (f,), and latencies (f, contacts) [s].
 
-    A latency is NaN where the contact gave no alarm, or was in progress when the recording began.
+    A latency is NaN if the contact raised no alarm, or was in progress when the recording began.
     """
 
     false_alarms: npt.NDArray[np.int64]
@@ -35,7 +35,30 @@ class Swept:
 def sweep(
     detection: Detection, contacts: Sequence[Contact], activation: Activation, window: float, factors: FloatArray
 ) -> Swept:
-    """Alarms and latencies of a detection with its limits at each of `factors`; the rules are those of `match`."""
+    """Return alarms and latencies of a detection for several safety factors.
+
+    Parameters
+    ----------
+    detection : Detection
+        An operation with its statistic and threshold.
+    contacts : sequence of Contact
+        The contacts of the operation.
+    activation : Activation
+        What raises an alarm.
+    window : float
+        How long after its onset a contact may be detected [s].
+    factors : ndarray of float, shape (f,)
+        Safety factors.
+
+    Returns
+    -------
+    Swept
+        False alarms (f,) and latencies (f, contacts) [s], by the rules of `match`.
+
+    Examples
+    --------
+    `cdtool.benchmark` stores the result in `results.sweep`.
+    """
     statistic, met_at = detection.statistic, detection.exceedance()
     spans = windows(contacts, window)
     order = np.argsort([contact.start for contact in contacts], kind="stable")
@@ -65,9 +88,9 @@ def sweep(
 
 
 def critical_factor(detection: Detection, activation: Activation) -> float:
-    """The largest safety factor below which an operation alarms: the highest debounced exceedance of any joint.
+    """Return the largest safety factor below which an operation alarms: the highest debounced exceedance of any joint.
 
-    -inf where no run of judged samples is as long as the debounce.
+    -inf if there are never as many consecutive assessable samples as the debounce needs.
     """
     statistic, met_at = detection.statistic, detection.exceedance()
     needed = activation.needed(statistic.time)

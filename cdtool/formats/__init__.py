@@ -6,7 +6,7 @@ also have
 * `topics`: True where it holds messages of topics, which [channels.mcap] maps;
 * `pieces`: the columns of a file that need not fit into memory (`pieces.py`), `exact_pieces`: the same with the times
   that cdtool convert wrote, `mapped`: those of a map (`pieces.mapped_log`);
-* `element_names` (`cdtool/ingest/element_names.py`);
+* `element_names`: how the messages of a topic name the elements of their arrays, as a JointState names its joints;
 * `sniffs_any_text`: True where almost any text passes for a file of it.
 
 What a column means (channel, unit, scale) is the same for all of them: see `cdtool/ingest/channel_assembly.py`. Writers

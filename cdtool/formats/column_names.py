@@ -47,16 +47,8 @@ def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[st
 
     Ground truth may be absent: the load cell is fitted for impact tests only.
     """
-    asked: list[tuple[str, str | int]] = []
-    if wanted.time.column is not None:
-        asked.append(("time", wanted.time.column))
-    asked += [
-        (source.channel, column)
-        for source in wanted.sources
-        for column in source.columns
-        if not (source.channel in GROUND_TRUTH and is_absent(column, names))
-    ]
-    keys = {find_key(path, channel, column, names) for channel, column in asked}
+    resolved, _ = _resolved(path, wanted, names)
+    keys = {resolved.time.key, *(key for item in resolved.sources for key in item.keys)} - {""}
     return [name for name in names if name in keys]
 
 
@@ -111,25 +103,33 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     RecordingError where a column is missing, or is there several times.
     """
     names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
+    own = channels.time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
+    plain = replace(channels, time=TimeSource()) if own else channels
+    resolved, absent = _resolved(source.path, plain, names)
+    resolved = replace(resolved, time=channels.time) if own else resolved
+    what = "topic" if channels.topics else "column"
+    notes = [
+        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
+    ]
+    return replace(source, findings=(*source.findings, *notes)), resolved
+
+
+def _resolved(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
+    """Return the map with the names that its columns have here, and the ground truth that is left out of it."""
     absent = [
         item
         for item in channels.sources
         if item.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _asked(item, channels))
     ]
     time = channels.time
-    own = time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
-    if time.column is not None and not own:
-        time = replace(time, key=find_key(source.path, "time", time.column, names))
+    if time.column is not None:
+        time = replace(time, key=find_key(path, "time", time.column, names))
     sources = tuple(
-        replace(item, keys=tuple(find_key(source.path, item.channel, key, names) for key in _asked(item, channels)))
+        replace(item, keys=tuple(find_key(path, item.channel, column, names) for column in _asked(item, channels)))
         for item in channels.sources
         if item not in absent
     )
-    what = "topic" if channels.topics else "column"
-    notes = [
-        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
-    ]
-    return replace(source, findings=(*source.findings, *notes)), replace(channels, time=time, sources=sources)
+    return replace(channels, time=time, sources=sources), absent
 
 
 def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from io import FileIO
 from itertools import chain
 from pathlib import Path
@@ -14,7 +17,8 @@ from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Parts, Written, stored
-from cdtool.formats.held_signals import held_signals
+
+_ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
@@ -106,3 +110,37 @@ def _dataset(folder: Any, column: Column, rows: int) -> Any:
 def _link(name: str) -> str:
     """A name without the slash that would make a group of it."""
     return name.replace("/", ".")
+
+
+@contextmanager
+def held_signals() -> Iterator[Callable[[], None]]:
+    """Hold SIGINT, SIGTERM and SIGHUP until the end, or until the function that this yields is called.
+
+    Where a library calls back into Python, nothing must be raised.
+    What they then do, and raise, is what they would have done. Outside the main thread, which alone gets signals,
+    nothing is held.
+    """
+    came: list[int] = []
+    before: dict[int, Any] = {}
+
+    def deliver() -> None:
+        while came:
+            number = came.pop(0)
+            handler = before[number]
+            if callable(handler):
+                handler(number, None)
+            elif handler == signal.SIG_DFL:
+                signal.signal(number, signal.SIG_DFL)
+                signal.raise_signal(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield deliver
+        return
+    for number in _ENDING:
+        before[number] = signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield deliver
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+        deliver()

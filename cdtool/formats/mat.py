@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats import mat_hdf5
 from cdtool.formats.column_names import wanted_keys
+from cdtool.formats.container_checks import check_chunks, check_size, library, one_line_errors
 from cdtool.formats.mat_check import MAGIC, check_whole
 from cdtool.formats.source import Source
 from cdtool.recording import Finding
 
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+_V73 = b"MATLAB 7."
+_HDF5, _USER_BLOCK = b"\x89HDF\r\n\x1a\n", 512
+_COMPLEX = ("real", "imag")
+_MOST_DIMENSIONS = 32
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,7 @@ class Mat:
     def sniff(self, path: Path) -> bool:
         """True if the file starts as MATLAB writes it (versions 5 to 7.3)."""
         with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC or mat_hdf5.is_v73(path)
+            return file.read(len(MAGIC)) == MAGIC or _is_v73(path)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all; raises RecordingError."""
@@ -77,8 +85,8 @@ def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, s
     """The numeric variables with their shapes, and the others with their kind."""
     from scipy.io import whosmat
 
-    if mat_hdf5.is_v73(path):
-        return mat_hdf5.contents(path)
+    if _is_v73(path):
+        return _contents_of_v73(path)
     check_whole(path)
     shapes: dict[str, tuple[int, int]] = {}
     others: list[tuple[str, str]] = []
@@ -98,8 +106,8 @@ def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, s
 def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    if mat_hdf5.is_v73(path):
-        return mat_hdf5.load(path, variables)
+    if _is_v73(path):
+        return _load_v73(path, variables)
     try:
         # Only variables of numbers are named: no struct, object or function is ever built.
         values: dict[str, Any] = loadmat(str(path), appendmat=False, variable_names=list(variables))
@@ -117,3 +125,99 @@ def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
 def _unreadable(path: Path, fault: Exception) -> RecordingError:
     reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
     return RecordingError(f"{path}: damaged or not a MATLAB file: {reason}", "save it again with -v7")
+
+
+def _is_v73(path: Path) -> bool:
+    """True if the file starts as MATLAB writes version 7.3: its own header, HDF5 behind it."""
+    with path.open("rb") as file:
+        head = file.read(_USER_BLOCK + len(_HDF5))
+    return head.startswith(_V73) and head.endswith(_HDF5)
+
+
+def _contents_of_v73(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, str]]]:
+    """Return the numeric variables with their shapes as MATLAB has them, and the others with their kind.
+
+    A dataset's dimensions are MATLAB's in reverse, its attribute MATLAB_class is the variable's class; structs and
+    sparse matrices are groups, complex numbers compounds:
+    https://www.mathworks.com/help/matlab/import_export/mat-file-versions.html
+    """
+    shapes: dict[str, tuple[int, int]] = {}
+    others: list[tuple[str, str]] = []
+    with _opened(path) as (h5py, file):
+        for name in file:
+            if name.startswith("#"):  # what cells and objects refer to
+                continue
+            if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+                others.append((name, "link"))
+                continue
+            item = file[name]
+            kind = _kind(item) if isinstance(item, h5py.Dataset) else _group_kind(item)
+            if kind:
+                others.append((name, kind))
+            else:
+                shapes[name] = _shape(item)
+    return shapes, others
+
+
+def _load_v73(path: Path, variables: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """Return the values of these variables as MATLAB has them; raises RecordingError for damage or a bomb."""
+    with _opened(path) as (_, file):
+        found = {name: file[name] for name in variables}
+        check_size(path, sum(dataset.size * (1 + _is_complex(dataset)) for dataset in found.values()))
+        for name, dataset in found.items():
+            check_chunks(path, name, dataset)
+        return {name: _values(dataset) for name, dataset in found.items()}
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    try:
+        h5py = library("h5py", "hdf5", path)
+    except RecordingError as fault:
+        raise RecordingError(
+            f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
+            f"{fault.hint}; or save it with: save(name, ..., '-v7')",
+        ) from fault
+    with one_line_errors(path, "a MATLAB 7.3 file"), h5py.File(path, "r") as file:
+        yield h5py, file
+
+
+def _kind(dataset: Any) -> str:
+    """What a dataset is if it is no vector, matrix or single number; else nothing."""
+    told = _class(dataset)
+    if dataset.is_virtual or dataset.external:
+        return "array kept in other files"
+    if told in ("char", "cell", "struct", "function_handle") or "MATLAB_object_decode" in dataset.attrs:
+        return told.replace("_handle", "")
+    if "MATLAB_empty" in dataset.attrs and 0 < dataset.size <= _MOST_DIMENSIONS:  # its values are its dimensions
+        return f"{' x '.join(map(str, dataset[()].ravel().tolist()))} array"
+    if dataset.dtype.kind not in "biuf" and not _is_complex(dataset):
+        return told or "text or a compound"
+    odd = dataset.ndim > 2 or 0 in dataset.shape
+    return f"{' x '.join(map(str, dataset.shape[::-1]))} array" if odd else ""
+
+
+def _group_kind(group: Any) -> str:
+    return "sparse" if "MATLAB_sparse" in group.attrs else _class(group) or "struct"
+
+
+def _class(item: Any) -> str:
+    told = item.attrs.get("MATLAB_class", b"")
+    return told.decode("utf-8", "replace") if isinstance(told, bytes) else str(told)
+
+
+def _is_complex(dataset: Any) -> bool:
+    return bool(dataset.dtype.names == _COMPLEX)
+
+
+def _shape(dataset: Any) -> tuple[int, int]:
+    """MATLAB's rows and columns; what other tools wrote with one dimension is a column."""
+    rows, *columns = (*dataset.shape[::-1], 1, 1)[: max(2, dataset.ndim)]
+    return int(rows), math.prod(columns)
+
+
+def _values(dataset: Any) -> npt.NDArray[Any]:
+    values = dataset[()]
+    if _is_complex(dataset):
+        values = values["real"] + 1j * values["imag"]
+    return np.asarray(values).T.reshape(_shape(dataset))

@@ -22,7 +22,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
 from cdtool.formats.groups import Group, Parts, Written, need_clocks, stored
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.recording import Finding, FloatArray
@@ -35,7 +35,7 @@ _ORIGIN = re.compile(r"^cdtool\.origin_s: (\S+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Mdf:
+class Mdf(InPieces):
     """MDF files: a column is a channel, with its group's number before it where several groups have one of that name.
 
     Each group's master channel is the clock of its channels. Attachments are not opened.
@@ -48,14 +48,6 @@ class Mdf:
         """True if the file starts as MDF does."""
         with path.open("rb") as file:
             return file.read(8) in _MAGICS
-
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
-
-    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         asammdf = library("asammdf", "mdf", path)

@@ -13,11 +13,10 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
-from cdtool.formats.arrow_check import check_batches
 from cdtool.formats.column_names import OWN_CLOCK, asked_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.parquet_check import check_pages
-from cdtool.formats.pieces import VALUES_A_PIECE, Pieces, joined
+from cdtool.formats.parquet_check import check_batches, check_pages
+from cdtool.formats.pieces import VALUES_A_PIECE, InPieces, Pieces
 from cdtool.formats.source import Source
 from cdtool.recording import Finding, FloatArray
 
@@ -29,7 +28,7 @@ _FEWEST_ROWS = 2**12
 
 
 @dataclass(frozen=True)
-class Parquet:
+class Parquet(InPieces):
     """Tables of Arrow's kind, `.parquet` and `.feather`: a missing value (null) is NaN, a time stamp seconds."""
 
     name: ClassVar[str] = "parquet"
@@ -40,14 +39,6 @@ class Parquet:
         with path.open("rb") as file:
             head = file.read(len(_ARROW))
         return head == _ARROW or head.startswith(_PARQUET)
-
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
-
-    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet", path)

@@ -5,6 +5,7 @@ A format that can hand its columns over so has a method `pieces`; the columns of
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -42,6 +43,22 @@ def mapped_log(found: Format, path: Path, wanted: ChannelMap) -> MappedLog | Non
     """The columns that `wanted` names of a file that need not fit into memory; None where the format has none such."""
     opened: Callable[[Path, ChannelMap], MappedLog] | None = getattr(found, "mapped", None)
     return None if opened is None else opened(path, wanted)
+
+
+class InPieces(ABC):
+    """A format that reads a file piece by piece: all of it at once is the join of these pieces."""
+
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
+        """Return the columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        return joined(self._read(path, wanted, None), sort=False)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
+        """Yield all numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        return self._read(path, None, keys)
+
+    @abstractmethod
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
+        """Yield the columns of a map, or those of `some`, or all."""
 
 
 class Run:

@@ -17,8 +17,9 @@ from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source
 from cdtool.messages.batch import Batch
-from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
+from cdtool.messages.stream import Stream
+from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
@@ -75,32 +76,6 @@ class Rosbag:
         return _Bag(path)
 
 
-@dataclass(frozen=True)
-class _Schema:
-    """A message definition of the bag."""
-
-    name: str
-    encoding: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class _Channel:
-    """A connection of the bag."""
-
-    id: int
-    topic: str
-    message_encoding: str
-
-
-@dataclass(frozen=True)
-class _Stream:
-    """A connection with its message definition."""
-
-    channel: _Channel
-    schema: _Schema
-
-
 @dataclass
 class _Bag:
     """A bag that is run through once; then `topics` (type, messages) and the `origin` [ns] hold."""
@@ -121,47 +96,26 @@ class _Bag:
         """Every numeric field; at their end the columns, without rows, and what is odd."""
         topics: dict[str, TopicSurvey] = {}
         for stream, batch in self._batches(lambda _: True):
-            name = stream.channel.topic
+            name = stream.topic
             yield from topics.setdefault(name, TopicSurvey(name)).pieces(stream, batch, self.origin)
-        columns, findings = {}, self._losses()
-        for item in (item for topic in topics.values() for item in topic.found()):
-            if isinstance(item, Finding):
-                findings.append(item)
-            else:
-                columns[item.name] = item
+        columns: dict[str, Column] = {}
+        findings = self._losses()
+        for topic in topics.values():
+            of_topic, found = topic.found()
+            columns |= of_topic
+            findings += found
         return columns, findings
 
     def wanted(self, wanted: ChannelMap) -> tuple[dict[str, Column], list[Finding]]:
-        """The fields of a map."""
-        fields: dict[str, list[str]] = {}
-        for source in wanted.sources:
-            if source.field not in fields.setdefault(source.topic, []):
-                fields[source.topic].append(source.field)
-        topics = {}
-        for name, texts in fields.items():
-            where = f"{self.path}: {name}"
-            parsed = [parse_field(text, where) for text in texts]
-            topics[name] = Gathering(where, name, parsed, wanted.time.clock, wanted.joint_names)
-        for stream, batch in self._batches(fields.__contains__):
-            topics[stream.channel.topic].add(stream, batch)
+        """Return the fields of a map."""
+        topics = wanted_topics(self.path, wanted, Gathering)
+        for stream, batch in self._batches(topics.__contains__):
+            topics[stream.topic].add(stream, batch)
         held = with_topics(self.path, wanted, [name for name, (_, count) in self.topics.items() if count])
-        topics = {name: topics[name] for name in dict.fromkeys(source.topic for source in held.sources)}
-        columns, findings = {}, self._losses()
-        for name, topic in topics.items():
-            if not topic.decoders.decoded:
-                text = f"{self.path}: no message of {name} can be decoded: {topic.decoders.reason}"
-                raise RecordingError(text, "record it with its message definition")
-            findings += topic.decoders.failure(name)
-        if wanted.time.clock != "log":
-            self.origin = min(topic.first_stamp or 0 for topic in topics.values())
-        for name, topic in topics.items():
-            for i in range(len(fields[name])):
-                column, found = topic.column(i, self.origin)
-                columns[column.name] = column
-                findings += found
-        return columns, findings
+        columns, findings, self.origin = wanted_columns(self.path, held, topics, self.origin)
+        return columns, self._losses() + findings
 
-    def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[_Stream, Batch]]:
+    def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[Stream, Batch]]:
         """The messages of the topics that are asked for, batch by batch."""
         from rosbags.highlevel import AnyReader
 
@@ -225,7 +179,7 @@ def _typestore() -> Any:
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-def _stream(connection: Any) -> _Stream:
+def _stream(connection: Any) -> Stream:
     """A connection and how its messages are decoded."""
     definition = connection.msgdef
     ros1 = not hasattr(connection.ext, "serialization_format")
@@ -234,8 +188,7 @@ def _stream(connection: Any) -> _Stream:
     if not text:
         text, _ = _typestore().generate_msgdef(connection.msgtype, ros_version=1 if ros1 else 2)
     encoding = "ros1" if ros1 else connection.ext.serialization_format
-    channel = _Channel(connection.id % 2**16, connection.topic, encoding)
-    return _Stream(channel, _Schema(connection.msgtype, kind, text.encode()))
+    return Stream(connection.id % 2**16, connection.topic, encoding, (kind, connection.msgtype, text.encode()))
 
 
 def _batch(rows: list[tuple[int, bytes]]) -> Batch:

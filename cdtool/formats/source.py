@@ -17,7 +17,7 @@ class Source:
     """A file's columns. `origin` [s] has been taken off every `Column.time`, or off the stamps of a table.
 
     `names` are all columns of the file in its order, read or not; `first_row` is the file's line of the first sample
-    (0: not known).
+    (0: not known); `dialect` is how a table of text is written, as `[csv]` of a machine file.
     """
 
     path: Path
@@ -28,6 +28,7 @@ class Source:
     details: Mapping[str, str] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     first_row: int = 0
+    dialect: str = ""
 
 
 class Format(Protocol):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -20,8 +22,7 @@ from cdtool.formats.column_names import OWN_CLOCK, asked_keys
 from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
 from cdtool.formats.groups import Group, Part, Parts, Written, stored
-from cdtool.formats.library_lines import collected_lines
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
@@ -35,7 +36,7 @@ _CLOCK_NAMES = ("time", "t", "timestamp")
 
 
 @dataclass(frozen=True)
-class Tdms:
+class Tdms(InPieces):
     """TDMS files: a column is a channel, with its group before it where several groups have one of that name.
 
     A waveform's clock (`wf_increment`), or a channel `time` of its group with a unit of time, is a channel's clock.
@@ -48,14 +49,6 @@ class Tdms:
         """True if the file starts as TDMS does."""
         with path.open("rb") as file:
             return file.read(len(_MAGIC)) == _MAGIC
-
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
-
-    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)
@@ -250,3 +243,31 @@ def _filled(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
         nptdms.ChannelObject(group.name, column.name, item, {"unit_string": column.unit} if column.unit else {})
         for column, item in zip(columns, values, strict=True)
     ]
+
+
+class _Lines(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.lines.append(" ".join(record.getMessage().split())[:200])
+
+
+@contextmanager
+def collected_lines(library: str) -> Iterator[list[str]]:
+    """The warnings that a library's loggers give within; none of them is printed, by its own handlers or others'.
+
+    The loggers are those of the modules that are imported. Files that are read at the same time share their lines.
+    """
+    known = [name for name in logging.Logger.manager.loggerDict if name == library or name.startswith(f"{library}.")]
+    loggers = [logging.getLogger(name) for name in known]
+    before = [(logger.handlers, logger.propagate) for logger in loggers]
+    collector = _Lines()
+    for logger in loggers:
+        logger.handlers, logger.propagate = [collector], False
+    try:
+        yield collector.lines
+    finally:
+        for logger, (handlers, propagate) in zip(loggers, before, strict=True):
+            logger.handlers, logger.propagate = handlers, propagate

@@ -1,1 +1,1 @@
-"""What happens in an impact: contact laws, restitution, transmissions, and which sensor sees it first."""
+"""Impacts: contact laws, restitution, transmissions, and which sensor responds first."""

@@ -20,7 +20,7 @@ class Bodies:
 
     Without `mass_2` body 2 is an obstacle at rest. `push` [N] is a constant force on body 1 towards body 2: a drive, or
     the weight of a ball that falls. `friction` [N s/m] acts on body 1, against its own speed.
-    Raises UsageError where body 1 does not come nearer, and for constants without meaning.
+    Raises UsageError if body 1 does not approach, and for constants outside their range.
     """
 
     mass_1: float
@@ -53,7 +53,7 @@ class Bodies:
         return effective_mass(self.mass_1, self.mass_2)
 
     def flight(self, speed_1: float, speed_2: float) -> tuple[float, float] | None:
-        """Time [s] till bodies that part at these speeds touch again, and the speed of body 1 [m/s] then; None: never.
+        """Return when bodies that part at these speeds touch again [s], and the speed of body 1 then [m/s], or None.
 
         Closed form of M_1 dV_1/dt = push - friction V_1, V_2 constant.
         """
@@ -70,7 +70,7 @@ class Bodies:
 
         from scipy.optimize import brentq
 
-        # The bodies are farthest apart where their speeds are equal; from there on they come nearer.
+        # The bodies are farthest apart where their speeds are equal; after that they approach.
         farthest = settling * math.log((final - speed_1) / (final - speed_2))
         late = 2.0 * farthest
         while nearer(late) <= 0.0:

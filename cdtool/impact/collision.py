@@ -25,7 +25,7 @@ _DEPTH, _SPEED_1, _SPEED_2, _IMPULSE, _WORK, _FRICTION = range(6)
 _RELATIVE, _ABSOLUTE = 1e-10, 1e-13
 # Samples of compression and of restitution; the moment between both is a sample.
 _SAMPLES = 501
-# Penetrations [m] among which the scale of a contact is sought: from far below an atom to a kilometre.
+# The range in which the scale of a contact is sought [m]: from far below an atom to a kilometre.
 _DEPTHS: FloatArray = np.geomspace(1e-13, 1e3, 1601)
 _PATIENCE = 100.0
 _BISECTIONS = 50
@@ -35,7 +35,7 @@ _AT_REST = 1e-9
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A part of a contact with one law: its solution, its end, and which event ended it (None: the time was up)."""
+    """A part of a contact with one law: its solution, its end, and which event ended it (None: the time limit)."""
 
     law: ContactLaw
     solution: Callable[[Any], FloatArray]
@@ -50,13 +50,13 @@ class _Stretch:
 
 
 def collide(law: ContactLaw, bodies: Bodies, contacts: int = 1, longest: float | None = None) -> Collision:
-    """Simulate the impact of two bodies with a contact law: at most so many contacts, each at most `longest` [s].
+    """Simulate the impact of two bodies with a contact law: at most `contacts` contacts, each at most `longest` [s].
 
     Integrated by Dormand and Prince's method of order 8 with a relative tolerance of 1e-10. Later contacts come only
     where a push brings the bodies together again; the surface has then come back, but for a permanent indentation. A
     contact that passes a least penetration without a separation lasts: less and less energy is in it, and the series
     stops. `longest` is a hundred times the duration without damping, unless it is given.
-    Raises UsageError for a law without force, for numbers without meaning, and where the damping is so large that the
+    Raises UsageError for a law without force, for numbers outside their range, and if the damping is so large that the
     motion lasts thousands of times as long as its quickest part.
     """
     if contacts < 1:
@@ -81,7 +81,7 @@ def collide(law: ContactLaw, bodies: Bodies, contacts: int = 1, longest: float |
 
 
 def _contact(law: ContactLaw, bodies: Bodies, time: float, longest: float | None) -> list[_Stretch]:
-    """Compression, and restitution if compression ends: two stretches, as some laws change between them."""
+    """Return compression, and restitution if compression ends: two phases, because some laws change between them."""
     depth, scale = _scales(law, bodies)
     patience = _PATIENCE * scale if longest is None else longest
     mass, speed = bodies.effective_mass, bodies.approach_speed
@@ -113,7 +113,7 @@ def _stretch(
     falling: Callable[[float, FloatArray], float],
     rising: Callable[[float, FloatArray], float] | None = None,
 ) -> _Stretch:
-    """The motion until `falling` passes 0 downward (event 0), `rising` upward (event 1), or the span is over."""
+    """Return the motion until `falling` passes 0 downward (event 0), `rising` upward (event 1), or the span ends."""
     from scipy.integrate import solve_ivp
 
     mass, heavy = bodies.effective_mass, bodies.mass_1
@@ -151,7 +151,7 @@ def _surface(law: ContactLaw) -> float:
 
 
 def _scales(law: ContactLaw, bodies: Bodies) -> tuple[float, float]:
-    """Penetration [m] and duration [s] of the contact without damping, roughly: what step sizes are held against."""
+    """Return penetration [m] and duration [s] of the contact without damping, roughly: the scale of the step sizes."""
     depths = _surface(law) + _DEPTHS
     force = np.asarray(law.force(depths, np.zeros_like(depths)), dtype=np.float64)
     work = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(depths))))
@@ -164,7 +164,7 @@ def _scales(law: ContactLaw, bodies: Bodies) -> tuple[float, float]:
 
 
 def _impact(stretches: list[_Stretch], bodies: Bodies) -> Impact:
-    """The course of a contact, from its stretches; a force that ends before the surface has come back ends it."""
+    """Return a contact as a function of time, from its phases; it ends when the force ends."""
     first, last = stretches[0], stretches[-1]
     end = _force_ends(last)
     times = np.linspace(first.start, first.end, _SAMPLES)
@@ -207,7 +207,7 @@ def _stored(law: ContactLaw, depth: FloatArray) -> FloatArray:
 
 
 def _force_ends(stretch: _Stretch) -> float:
-    """The last moment [s] with a force: where a damper holds the surface back, that is before it has come back."""
+    """Return the last time with a force [s]: if a damper holds the surface back, before it has recovered."""
     if stretch.event != 0 or stretch.end == stretch.start:
         return stretch.end
     times = np.linspace(stretch.start, stretch.end, _SAMPLES)
@@ -225,7 +225,7 @@ def _force_ends(stretch: _Stretch) -> float:
 
 
 def _peak(stretch: _Stretch) -> float:
-    """Largest force [N] of a stretch: the largest sample, and a search beside it."""
+    """Return the largest force [N] of a phase: the largest sample, refined by a search around it."""
     if stretch.end == stretch.start:
         return 0.0
     from scipy.optimize import minimize_scalar

@@ -1,4 +1,4 @@
-"""How the speed controller feels a contact force: from F_c to motor torque and to control action (thesis 4.37 to 4.39).
+"""The speed controller's response to a contact force: from F_c to motor torque and control action (thesis 4.37-4.39).
 
 With a rigid transmission (4.8 as a speed: G = 1/(J_t s + d_t)), R = K_P + K_I/s + K_D s/(T_f s + 1) and
 A = mu_a/(tau_a s + 1) the open loop is L = G R A, and
@@ -23,7 +23,7 @@ from cdtool.impact.transmission import Transmission
 def torque_by_force(transmission: Transmission, controller: SpeedController) -> Transfer:
     """tau_m/F_c [N m/N]; tends to r for a steady force where the controller integrates (4.39 corrected).
 
-    F_c is taken as given: what the torque does to the force is in the simulation, not in here.
+    F_c is an input: the effect of the torque on the force is in the simulation, not here.
     """
     load, both = load_by_torque(transmission), _closed(transmission, controller, NO_CONTACT)
     steer = np.polymul(controller.regulator.numerator, controller.actuator.numerator)
@@ -42,7 +42,7 @@ def speed_by_reference(
 ) -> Transfer:
     """Motor speed by its reference, before the contact or about a state of it (figure 4.8 closed); unit 1.
 
-    In contact its gain is 0: a machine that is held stands, and the controller integrates.
+    In contact its gain is 0: a machine that is held does not move, and the controller integrates.
     """
     motor, both = motor_by_torque(transmission, contact), _closed(transmission, controller, contact)
     steer = np.polymul(controller.regulator.numerator, controller.actuator.numerator)

@@ -1,4 +1,4 @@
-"""A bound on the effort of an integration: constants that are far apart end in an error, not in endless work."""
+"""A bound on the effort of an integration: constants of very different size end in an error, not in endless work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of one impact: its course, its impulse and where its energy went."""
+"""One impact: motion and force over time, impulse, and the balance of its energy."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Impact:
 
     `time` s (0 = first touch of the first contact), `penetration` m, `rate` m/s, `force` N, `impulse` N s since the
     contact began, `speeds` (n, 2) m/s of both bodies. Energies in J, of the relative motion (m v^2/2 with 3.7), which
-    is all that an impact can change: `kinetic`; `stored`, elastic, NaN where the law does not define it;
+    is all that an impact can change: `kinetic`; `stored`, elastic, NaN if the law does not define it;
     `contact_work`, done on the contact; `friction_loss` and `push_work`, of the outer forces. `turn` is the sample at
-    t_c, where compression ends. `separated` is False where the bodies stay together: then the course ends when they
-    are least pressed, or at the limit of time.
+    t_c, where compression ends. `separated` is False if the bodies stay together: the arrays then end when they
+    are least pressed, or at the time limit.
     """
 
     time: FloatArray
@@ -54,7 +54,7 @@ class Impact:
 
     @property
     def dissipated(self) -> FloatArray:
-        """Energy (n,) [J] that the contact will not give back; NaN where the law stores none that it can name."""
+        """Energy that the contact does not return (n,) [J]; NaN if the law defines no stored energy."""
         return self.contact_work - self.stored
 
     @property
@@ -71,8 +71,8 @@ class Impact:
     def restitution(self) -> Restitution:
         """Newton's, Poisson's and Stronge's coefficient (thesis 3.2, 3.4, 3.8); equal where no outer force acts.
 
-        An outer force during the contact is in Newton's, which looks at the speeds alone; Stronge's is of the contact.
-        Means nothing where `separated` is False.
+        An outer force during the contact affects Newton's, which uses only the speeds; Stronge's is of the contact.
+        Meaningless if `separated` is False.
         """
         work = -self.contact_work
         return Restitution(
@@ -84,7 +84,7 @@ class Impact:
 
 @dataclass(frozen=True)
 class Collision:
-    """Impacts in their order; where the bodies come to rest, the last one does not separate."""
+    """Impacts in their order; if the bodies come to rest, the last one does not separate."""
 
     impacts: tuple[Impact, ...]
 
@@ -100,6 +100,6 @@ class Collision:
 
     @property
     def last_separation(self) -> float:
-        """Time [s] of the last separation; NaN where there is none."""
+        """Time of the last separation [s]; NaN without one."""
         ends = [float(impact.time[-1]) for impact in self.impacts if impact.separated]
         return ends[-1] if ends else float(np.nan)

@@ -1,11 +1,11 @@
 """The discrete approach (thesis 3.2.1): two rigid bodies in a plane, hit in no time, with Coulomb friction.
 
 Conventions: the normal points from body 1 to body 2, the tangent is the normal turned by -90 degrees. The relative
-velocity u = (u_t, u_n) is that of body 2 at the contact less that of body 1 (3.3): u_n < 0 while they approach. The
+velocity u = (u_t, u_n) is that of body 2 at the contact minus that of body 1 (3.3): u_n < 0 while they approach. The
 impulse p = (p_t, p_n) acts on body 2, its opposite on body 1 (3.1, 3.11), and u changes by W p. For central bodies
 1/W_nn is the effective mass of 3.7.
 
-Impulses grow with the normal one from 0 on. While the bodies slide, dp_t = -mu sign(u_t) dp_n. When sliding stops they
+Impulses grow with the normal one from 0. While the bodies slide, dp_t = -mu sign(u_t) dp_n. When sliding stops they
 stick, if mu is at least |W_tn|/W_tt, or slide back. So u_n is a broken line over p_n, and the works are its areas.
 """
 
@@ -74,10 +74,10 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class ImpulseResult:
-    """Both bodies after the impact, the impulse on body 2 [N s] and where the energy went [J].
+    """Both bodies after the impact, the impulse on body 2 [N s] and the energy lost [J].
 
-    `energy_loss` is never negative. `hypothesis` is the one that was used: "stronge" where the one that was asked for
-    would have made energy.
+    `energy_loss` is never negative. `hypothesis` is the one used: "stronge" if the one requested
+    would have created energy.
     """
 
     body_1: RigidBody
@@ -101,13 +101,13 @@ def strike(
 ) -> ImpulseResult:
     """Both bodies after an impact at a point (2,) m: `restitution` e, Coulomb's `friction` mu, `normal` from 1 to 2.
 
-    When the restitution ends, says the hypothesis: Newton (3.2), u_n has become -e times what it was; Poisson (3.4),
+    The hypothesis defines when restitution ends: Newton (3.2), u_n is -e times its initial value; Poisson (3.4),
     the normal impulse is 1 + e times that of compression; Stronge (3.8), the normal work of restitution is e^2 times
     that of compression. They agree unless friction acts on an eccentric impact whose sliding stops or turns. There
-    Newton's may say that energy is made. Where the one that was asked for does, Stronge's is used, which never can: it
-    gives back e^2 <= 1 of the normal work, and friction only takes. A body on a pivot (infinite mass, finite inertia)
-    that sticks is locked: nothing comes back. Raises UsageError where the bodies do not approach. Fails where the
-    contact lasts so long that the bodies move on in it: take `cdtool.impact.collision` then.
+    Newton's may create energy. If the one requested does, Stronge's is used, which never does: it
+    returns e^2 <= 1 of the normal work, and friction only dissipates. A body on a pivot (infinite mass, finite inertia)
+    that sticks is locked: there is no rebound. Raises UsageError if the bodies do not approach. Fails if the
+    contact lasts so long that the bodies move during it: use `cdtool.impact.collision` then.
     """
     require_restitution(restitution)
     require_not_negative("the friction", friction)
@@ -148,7 +148,7 @@ def _axes(normal: tuple[float, float]) -> FloatArray:
 
 
 class _Course:
-    """The impulse as it grows: up to where sliding stops, and from there on."""
+    """The growing impulse: until sliding stops, and after that."""
 
     def __init__(self, velocity: FloatArray, mobility: FloatArray, friction: float) -> None:
         self.velocity, self.mobility = velocity, mobility
@@ -159,7 +159,7 @@ class _Course:
         self.sticks = abs(needed) <= friction
         self.after = -needed if self.sticks else -math.copysign(friction, coupling)
         slowing = coupling + float(mobility[0, 0]) * self.before
-        # Signs, not a product: that of a slide of next to nothing would be 0.
+        # Signs, not a product: the product of very small velocities would be 0.
         slows = slide < 0.0 < slowing or slowing < 0.0 < slide
         self.stop = 0.0 if slide == 0.0 else -slide / slowing if slows else math.inf
 
@@ -223,7 +223,7 @@ class _Course:
         return compression + (math.sqrt(2.0 * work / after) if after else 0.0)
 
     def slip(self, normal: float) -> Slip:
-        """What the contact points did along the tangent."""
+        """Return how the contact points moved along the tangent."""
         if self.stop >= normal:
             return "slides"
         if self.stop == 0.0:

@@ -30,8 +30,8 @@ NO_CONTACT = ContactStiffness(0.0, 0.0)
 def linearised_contact(law: ContactLaw, penetration: float, rate: float) -> ContactStiffness:
     """K_c and D_c of a law about a penetration [m] and its rate [m/s]; r^2 times them is 4.17.
 
-    Central differences, good to about 1e-8 of the value, so any law will do. Raises UsageError outside the contact.
-    Both change with the state: see `docs/transmission.md` for how far one may go from it.
+    Central differences, accurate to about 1e-8 of the value, for any law. Raises UsageError outside the contact.
+    Both change with the state: `docs/transmission.md` states how far from it they are valid.
     """
     require_positive("penetration", penetration, "m")
     depth, change = 1e-4 * penetration, 1e-4 * max(abs(rate), 1e-3)
@@ -48,7 +48,7 @@ def motor_by_torque(transmission: Transmission, contact: ContactStiffness = NO_C
 
     Rigid: 1 / (J_t s^2 + (d_t + r^2 D_c) s + r^2 K_c); before the contact poles 0 and -d_t/J_t, gain 1/d_t; in it
     `transfer.second_order` gives wn, xi and 1/K. Elastic: Q/(P Q - E^2/r^2) with P = J_m s^2 + d_t s + k_el,
-    E = d_el s + k_el, d_t = d_m + d_el and Q = M_l s^2 + (d_l + D_c) s + K_c + E/r^2. It is the answer to a small
+    E = d_el s + k_el, d_t = d_m + d_el and Q = M_l s^2 + (d_l + D_c) s + K_c + E/r^2. It is the response to a small
     change of the torque while the contact stays about its state; an impact of a stiff contact leaves it within 1 ms.
     """
     motor, _, both = _driven(transmission, contact)
@@ -58,7 +58,7 @@ def motor_by_torque(transmission: Transmission, contact: ContactStiffness = NO_C
 def load_by_torque(transmission: Transmission, contact: ContactStiffness = NO_CONTACT) -> Transfer:
     """X_l/tau_m [m/(N m)] = [rad/N]: rigid r Theta/tau_m (4.7), elastic (E/r)/(P Q - E^2/r^2), see `motor_by_torque`.
 
-    By reciprocity it is also -Theta/F_c, the motor's answer to a force on the load.
+    By reciprocity it is also -Theta/F_c, the motor's response to a force on the load.
     """
     _, load, both = _driven(transmission, contact)
     return Transfer(load, both, "m/(N m)").reduced
@@ -67,7 +67,7 @@ def load_by_torque(transmission: Transmission, contact: ContactStiffness = NO_CO
 def penetration_by_momentum(
     transmission: ElasticTransmission, contact_stiffness: float, contact_damping: float = 0.0
 ) -> Transfer:
-    """G_cd: penetration a unit of the load's initial momentum [m/(N s)] (4.27, 4.29 and 4.30 corrected, d_l added).
+    """G_cd: penetration per unit of the load's initial momentum [m/(N s)] (4.27, 4.29 and 4.30 corrected, d_l added).
 
         (J_m s^2 + d_t s + k_el) / (a4 s^4 + a3 s^3 + a2 s^2 + a1 s + a0),  d_t = d_m + d_el
 
@@ -90,7 +90,7 @@ def motor_by_penetration(transmission: ElasticTransmission) -> Transfer:
 
 
 def undamped(transmission: ElasticTransmission) -> ElasticTransmission:
-    """The same without friction and damping, as 4.31 to 4.35 take it."""
+    """Return the transmission without friction and damping, as 4.31 to 4.35 assume."""
     t = transmission
     return ElasticTransmission(t.motor_inertia, t.load_mass, t.ratio, t.stiffness)
 

@@ -89,7 +89,7 @@ def coefficients(time: FloatArray, rate: FloatArray, force: FloatArray) -> Resti
 def rate_from_force(time: FloatArray, force: FloatArray, mass: float, approach_speed: float) -> FloatArray:
     """Penetration rate (n,) [m/s] from a measured force (n,) [N]: v - p/m (thesis 3.6), trapezoids.
 
-    `mass` is the effective mass of 3.7 [kg]; the mass must be free: a drive that pushes on is not in it.
+    `mass` is the effective mass of 3.7 [kg]; the mass must be free: a pushing drive is not included.
     """
     require_positive("the mass", mass, "kg")
     impulses = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))))
@@ -148,7 +148,7 @@ def hunt_crossley_damping_number(restitution: npt.ArrayLike) -> FloatArray:
 def damping_for_restitution(restitution: float, approach_speed: float, stiffness: float) -> float:
     """mu [N s/m^(n+1)] with which Hunt-Crossley's law rebounds with e at a speed [m/s]: exact, for every n and mass.
 
-    Raises UsageError for e = 0, which no damping gives, and for constants that are not positive.
+    Raises UsageError for e = 0, which no damping achieves, and for constants that are not positive.
     """
     require_restitution(restitution)
     require_positive("the restitution", restitution)

@@ -1,4 +1,4 @@
-"""When may a transmission be taken as rigid? The condition 4.36 with the margin that it needs."""
+"""When does a transmission count as rigid? Condition 4.36 with the margin that it needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RIGID_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Rigidity:
-    """K_c against the limit of 4.36 [N/m], the resonances in contact and that of the transmission [rad/s].
+    """K_c and the limit of 4.36 [N/m], the resonances in contact and that of the transmission [rad/s].
 
     `motion_ratio` is theta r / delta at the lower resonance: 1 where motor and load move as one.
     """
@@ -47,7 +47,7 @@ class Rigidity:
 
 
 def rigidity(transmission: ElasticTransmission, contact_stiffness: float) -> Rigidity:
-    """K_c against k_el J_t / (J_m r^2) (4.36), with the true error of the motion at the lower resonance.
+    """Compare K_c with k_el J_t / (J_m r^2) (4.36), with the true error of the motion at the lower resonance.
 
     The limit equates the contact's resonance of the rigid machine, sqrt(K_c r^2/J_t), with sqrt(k_el/J_m). There the
     motor already moves 2.5 times as far as the load (with J_t = 2.35 J_m), so a margin is needed: a tenth of the limit

@@ -1,8 +1,8 @@
-"""Which sensor sees an impact first, and at which force: figure 4.10 of the thesis, computed for one machine.
+"""Which sensor responds first to an impact, and at which force: figure 4.10 of the thesis, computed for one machine.
 
-Conventions: the machine moves at steady speed under speed control and touches the obstacle at time 0. What a sensor
-sees is its deviation from the steady motion; it has seen the impact when that exceeds k sigma of its noise and its
-resolution. The machine's own scatter (friction along the path, ripple) counts only where it is put into the noise.
+Conventions: the machine moves at steady speed under speed control and touches the obstacle at time 0. A sensor
+measures the deviation from the steady motion; it has responded when that exceeds k sigma of its noise and its
+resolution. The machine's own scatter (friction along the path, ripple) counts only if it is included in the noise.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from cdtool.impact.transmission_simulation import Motion, simulate_impact
 from cdtool.recording import FloatArray
 
 _SAMPLES = 10_000
-# A change that saves less than this share of the time is no remedy.
+# A change that saves less than this share of the time is not a remedy.
 _WORTH = 0.02
 ITSELF = "the impact itself"
 
 
 @dataclass(frozen=True)
 class ImpactCase:
-    """A machine that meets an obstacle at steady `speed` [m/s]; watched for `window` [s] from the touch on.
+    """A machine that hits an obstacle at steady `speed` [m/s]; observed for `window` [s] from the touch.
 
-    The controller's reference is speed/r, whatever its own says. Raises UsageError for values without meaning.
+    The controller's reference is speed/r, in place of its own. Raises UsageError for values outside their range.
     """
 
     transmission: ElasticTransmission
@@ -65,12 +65,12 @@ class ImpactCase:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """When a sensor has seen the impact [s], the contact force at that moment [N], and what would help most.
+class SensorResponse:
+    """When a sensor responds to the impact [s], the contact force at that time [N], and what would help most.
 
-    `peak_so_far` is the largest force up to that moment [N]: a load that has bounced off may have no force on it then.
-    `time`, `force` and `peak_so_far` are None where it sees nothing within the window. `limited_by` is the one of its
-    causes whose improvement by a factor of two saves the most, `saving` [s]; `remedy` says the improvement. Where none
+    `peak_so_far` is the largest force up to that time [N]: on a load that has bounced off there may be no force then.
+    `time`, `force` and `peak_so_far` are None if it does not respond within the window. `limited_by` is the one of its
+    causes whose improvement by a factor of two saves the most, `saving` [s]; `remedy` names the improvement. If none
     of them saves 2 %, it is the impact itself.
     """
 
@@ -86,15 +86,15 @@ class Sight:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The sensors from the first to the last that sees the impact; those that see nothing come last.
+    """The sensors in the order in which they respond; those that do not respond come last.
 
-    `time` (n,) and `contact_force` (n,) are the impact's course [s, N]; `factor` is the k of k sigma;
+    `time` (n,) and `contact_force` (n,) are those of the impact [s, N]; `factor` is the k of k sigma;
     `swing_duration` is how long the force's first swing lasts [s]: see `_swing_duration`.
     """
 
     case: ImpactCase
     factor: float
-    sights: tuple[Sight, ...]
+    responses: tuple[SensorResponse, ...]
     time: FloatArray
     contact_force: FloatArray
     swing_duration: float
@@ -112,9 +112,9 @@ class Ranking:
 
 
 def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.0) -> Ranking:
-    """Simulate the impact and say when each sensor exceeds `factor` sigma of its noise and its resolution.
+    """Simulate the impact and return when each sensor exceeds `factor` sigma of its noise and its resolution.
 
-    Times hold for the unluckiest sampling instants. Raises UsageError for an unknown quantity and k <= 0.
+    Times are for the least favourable sampling instants. Raises UsageError for an unknown quantity and k <= 0.
     """
     require_positive("k", factor)
     for sensor in sensors:
@@ -123,8 +123,8 @@ def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.
     motion = case.simulate()
     shown = deviations(case, motion)
     stronger = {cause: deviations(other, other.simulate()) for cause, other in _stronger_machines(case).items()}
-    sights = [_sight(sensor, factor, motion, shown, stronger) for sensor in sensors]
-    order = sorted(sights, key=lambda item: np.inf if item.time is None else item.time)
+    responses = [_response(sensor, factor, motion, shown, stronger) for sensor in sensors]
+    order = sorted(responses, key=lambda item: np.inf if item.time is None else item.time)
     rigid = rigidity(case.transmission, case.obstacle.stiffness)
     return Ranking(case, factor, tuple(order), motion.time, motion.force, _swing_duration(motion), rigid)
 
@@ -169,13 +169,13 @@ def _stronger_machines(case: ImpactCase) -> dict[tuple[str, str], ImpactCase]:
     return found
 
 
-def _sight(
+def _response(
     sensor: Sensor,
     factor: float,
     motion: Motion,
     shown: Mapping[str, tuple[FloatArray, FloatArray]],
     stronger: Mapping[tuple[str, str], Mapping[str, tuple[FloatArray, FloatArray]]],
-) -> Sight:
+) -> SensorResponse:
     time = sensor.time_to_see(*shown[sensor.quantity], factor)
     better = {
         ("noise", "half the noise"): sensor.half_the_noise(),
@@ -195,6 +195,6 @@ def _sight(
         peak = max(force, float(np.max(motion.force[motion.time <= time])))
     threshold = sensor.threshold(factor)
     if saving <= _WORTH * (window if time is None else time):
-        return Sight(sensor, threshold, time, force, peak, ITSELF, "", None)
-    # Where nothing was seen, how much sooner the remedy makes it is not known.
-    return Sight(sensor, threshold, time, force, peak, *cause, None if time is None else saving)
+        return SensorResponse(sensor, threshold, time, force, peak, ITSELF, "", None)
+    # Without a response the time saved by a remedy is unknown.
+    return SensorResponse(sensor, threshold, time, force, peak, *cause, None if time is None else saving)

@@ -1,4 +1,4 @@
-"""What a sensor makes of the deviation that an impact causes: low-pass, sampling, noise and resolution."""
+"""The response of a sensor to the deviation that an impact causes: low-pass, sampling, noise and resolution."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Sensor:
     def step(self) -> float:
         """The largest error of the logged signal by the resolution [unit].
 
-        A step of the quantity; differentiated, a count that comes one sample early: (1 - a) q/T with
+        A step of the quantity; differentiated, a count one sample early: (1 - a) q/T with
         a = exp(-2 pi f T). It is bounded, so no multiple of it is taken.
         """
         if not self.differentiated:
@@ -58,27 +58,27 @@ class Sensor:
         return (1.0 - keep) * self.resolution * self.sample_rate
 
     def threshold(self, factor: float) -> float:
-        """k sigma + step: a deviation that cannot be noise or a count [unit]."""
+        """Return k sigma + step: a larger deviation cannot be noise or a count [unit]."""
         return factor * self.noise + self.step
 
     def half_the_noise(self) -> Sensor:
-        """The same with half the noise."""
+        """Return the sensor with half the noise."""
         return replace(self, noise=0.5 * self.noise)
 
     def half_the_step(self) -> Sensor:
-        """The same with twice as many counts."""
+        """Return the sensor with twice as many counts."""
         return replace(self, resolution=0.5 * self.resolution)
 
     def twice_the_bandwidth(self) -> Sensor:
-        """The same with a low-pass twice as fast, which lets more noise through."""
+        """Return the sensor with a low-pass twice as fast, which passes more noise."""
         return replace(self, bandwidth=2.0 * self.bandwidth, noise=math.sqrt(2.0) * self.noise)
 
     def twice_the_rate(self) -> Sensor:
-        """The same, sampled twice as often."""
+        """Return the sensor sampled twice as often."""
         return replace(self, sample_rate=2.0 * self.sample_rate)
 
     def time_to_see(self, time: FloatArray, deviation: FloatArray, factor: float) -> float | None:
-        """When the logged deviation is first beyond the threshold, for the unluckiest sampling instants [s].
+        """Return when the logged deviation first exceeds the threshold, for the least favourable sampling instants [s].
 
         `deviation` (n,) of the quantity over `time` (n,) from the touch at 0. None: not within `time`, at least for
         some sampling instants.

@@ -1,4 +1,4 @@
-"""A transfer function: its poles, gain, frequency response, and its answers to an impulse, a step and a ramp."""
+"""A transfer function: its poles, gain, frequency response, and its responses to an impulse, a step and a ramp."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Transfer:
 
     @property
     def reduced(self) -> Transfer:
-        """The same without leading zeros, and without the poles and zeros at the origin that cancel."""
+        """Return the function without leading zeros, and without the poles and zeros at the origin that cancel."""
         numerator, denominator = self.numerator, self.denominator
         while numerator[-1] == denominator[-1] == 0.0:
             numerator, denominator = numerator[:-1], denominator[:-1]
@@ -64,19 +64,19 @@ class Transfer:
         return np.array(self.numerator, dtype=np.float64), np.array(self.denominator, dtype=np.float64)
 
     def impulse(self, time: FloatArray) -> FloatArray:
-        """Answer (n,) to a unit impulse at 0; `time` (n,) evenly spaced from 0 [s]."""
+        """Return the response (n,) to a unit impulse at 0; `time` (n,) evenly spaced from 0 [s]."""
         from scipy.signal import impulse
 
         return np.asarray(impulse(self._coefficients, T=np.ravel(time))[1], dtype=np.float64)
 
     def step(self, time: FloatArray) -> FloatArray:
-        """Answer (n,) to a unit step at 0; `time` (n,) evenly spaced from 0 [s]."""
+        """Return the response (n,) to a unit step at 0; `time` (n,) evenly spaced from 0 [s]."""
         from scipy.signal import step
 
         return np.asarray(step(self._coefficients, T=np.ravel(time))[1], dtype=np.float64)
 
     def ramp(self, time: FloatArray) -> FloatArray:
-        """Answer (n,) to a ramp of slope 1/s from 0; `time` (n,) evenly spaced from 0 [s]."""
+        """Return the response (n,) to a ramp of slope 1/s from 0; `time` (n,) evenly spaced from 0 [s]."""
         return Transfer(self.numerator, (*self.denominator, 0.0), self.unit).step(time)
 
 

@@ -22,7 +22,7 @@ class RigidTransmission:
     """tau_m - r F_c = J_t thdd + d_t thd (thesis 4.6 and 4.10): motor and load move as one.
 
     `inertia` J_t = J_m + M_l r^2 [kg m2] and `friction` d_t = d_m + d_l r^2 [N m s/rad] at the motor, `ratio` r
-    [m/rad]. Raises UsageError for values without meaning. Fails where the contact is stiff against the drive (see
+    [m/rad]. Raises UsageError for values outside their range. Fails if the contact is stiff relative to the drive (see
     `rigidity`).
     """
 
@@ -42,7 +42,7 @@ class RigidTransmission:
 
     @property
     def moving_mass(self) -> float:
-        """The mass that meets the obstacle: all of it [kg]."""
+        """The mass that hits the obstacle: all of it [kg]."""
         return self.mass
 
     @property
@@ -51,7 +51,7 @@ class RigidTransmission:
         return math.inf
 
     def start(self, penetration: float, load_speed: float, motor_speed: float | None) -> list[float]:
-        """(penetration [m], its rate [m/s]); raises UsageError where the motor is to move on its own."""
+        """(penetration [m], its rate [m/s]); raises UsageError if the motor is to move separately."""
         if motor_speed is not None and abs(motor_speed * self.ratio - load_speed) > 1e-12:
             raise UsageError(
                 f"motor speed is {motor_speed:g} rad/s", "behind a rigid transmission the load's speed decides it"
@@ -64,7 +64,7 @@ class RigidTransmission:
         return [speed, ((torque - self.friction * speed / self.ratio) / self.ratio - force) / self.mass]
 
     def drive_force(self, state: Any) -> Any:
-        """NaN: where motor and load are one, no force between them is defined."""
+        """NaN: between rigidly coupled motor and load no force is defined."""
         return np.full_like(state[0], np.nan)
 
     def motor(self, state: Any) -> tuple[Any, Any]:
@@ -86,7 +86,7 @@ class ElasticTransmission:
 
     `motor_inertia` J_m [kg m2], `load_mass` M_l [kg], `ratio` r [m/rad], `stiffness` k_el [N m/rad] and `damping` d_el
     [N m s/rad] at the motor, `motor_friction` d_m [N m s/rad], `load_friction` d_l [N s/m]. Raises UsageError for
-    values without meaning. Backlash is not in it.
+    values outside their range. Backlash is not included.
     """
 
     motor_inertia: float
@@ -108,7 +108,7 @@ class ElasticTransmission:
 
     @property
     def rigid(self) -> RigidTransmission:
-        """The same drive without elasticity: J_t = J_m + M_l r^2, d_t = d_m + d_l r^2."""
+        """Return the drive without elasticity: J_t = J_m + M_l r^2, d_t = d_m + d_l r^2."""
         square = self.ratio**2
         return RigidTransmission(
             self.motor_inertia + self.load_mass * square, self.motor_friction + self.load_friction * square, self.ratio
@@ -116,17 +116,17 @@ class ElasticTransmission:
 
     @property
     def moving_mass(self) -> float:
-        """The mass that meets the obstacle: the load's [kg]."""
+        """The mass that hits the obstacle: the load's [kg]."""
         return self.load_mass
 
     @property
     def transmission_frequency(self) -> float:
-        """w_a = sqrt(k_el/J_m): the motor swings on the transmission while the load stands [rad/s] (4.35 corrected)."""
+        """w_a = sqrt(k_el/J_m): the motor oscillates while the load is at rest [rad/s] (4.35 corrected)."""
         return math.sqrt(self.stiffness / self.motor_inertia)
 
     @property
     def swing_period(self) -> float:
-        """Of motor against load, the quickest swing without contact [s]."""
+        """The period of motor relative to load, the fastest oscillation without contact [s]."""
         load = self.load_mass * self.ratio**2
         return 2.0 * math.pi / math.sqrt(self.stiffness * (1.0 / self.motor_inertia + 1.0 / load))
 

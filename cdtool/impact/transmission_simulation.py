@@ -16,16 +16,16 @@ from cdtool.impact.transmission import Transmission
 from cdtool.recording import FloatArray
 
 _MOST_CONTACTS = 200
-_SAMPLES_A_CONTACT = 1000
+_SAMPLES_PER_CONTACT = 1000
 _SETTINGS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-13, "dense_output": True}
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One contact: when it begins and how long it lasts [s], speeds [m/s], peaks [N, m], and what became of the energy.
+    """One contact: when it begins and how long it lasts [s], speeds [m/s], peaks [N, m], and the energy lost.
 
     `energy_loss` = 1 - (v_f/v_i)^2 of the load's speed; `contact_loss` is the work on the obstacle over the energy at
-    the touch: the rest went into friction, motor and transmission. A contact that does not end within the simulation
+    the touch: the rest is lost in friction, motor and transmission. A contact that does not end within the simulation
     is `lasting`: its duration reaches to the end of it, and its losses are those up to there.
     """
 
@@ -40,13 +40,13 @@ class Contact:
 
     @property
     def energy_loss(self) -> float:
-        """Share of the load's kinetic energy at the touch that it no longer has at the end of the contact."""
+        """The share of the load's kinetic energy at the touch that is lost at the end of the contact."""
         return 1.0 - (self.final_speed / self.approach_speed) ** 2
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Courses (n,) over strictly increasing `time` [s], and the contacts.
+    """Motion and force (n,) over strictly increasing `time` [s], and the contacts.
 
     `penetration` x_l - x_o [m] (negative before the touch), `load_speed` [m/s], `load_acceleration` [m/s2], `force` F_c
     [N], `motor_position` relative to the obstacle [rad], `motor_speed` [rad/s], `motor_torque` [N m], and
@@ -79,7 +79,7 @@ def simulate_impact(  # noqa: PLR0913  every part of the simulated impact
     """Solve 4.20, or 4.21 and 4.23 (corrected), from a `gap` [m] before the obstacle at `load_speed` [m/s].
 
     A negative gap starts pressed in. `motor_speed` [rad/s]: only behind an elastic transmission; None: as the load.
-    `samples` are at least that many over `duration` [s]; each contact has its own thousand besides. Events find touch
+    There are at least `samples` samples over `duration` [s], and a thousand more per contact. Events find touch
     and separation, relative tolerance 1e-9. Raises UsageError for values without meaning, for a law with a memory,
     where the contacts never end (a law that loses nothing against a steady push), and where the motion is far quicker
     than the duration.
@@ -96,7 +96,7 @@ def simulate_impact(  # noqa: PLR0913  every part of the simulated impact
     while time < duration:
         part = solver.until_crossing(time, state, -1.0 if touching else +1.0)
         end, state = float(part.t[-1]), [float(value) for value in part.y[:, -1]]
-        count = max(2, int(np.ceil(samples * (end - time) / duration)), _SAMPLES_A_CONTACT if touching else 2)
+        count = max(2, int(np.ceil(samples * (end - time) / duration)), _SAMPLES_PER_CONTACT if touching else 2)
         times = np.linspace(time, end, count)
         states = part.sol(times)
         if touching:
@@ -131,7 +131,7 @@ class _Solver:
         return [*moving, *drive.rates(state[:-1], speed), force * state[1]]
 
     def until_crossing(self, start: float, state: list[float], direction: float) -> Any:
-        """Until the penetration crosses zero, upward (+1) or downward (-1), or the end."""
+        """Integrate until the penetration crosses zero, upward (+1) or downward (-1), or the end."""
         from scipy.integrate import solve_ivp
 
         def crosses(_: float, now: FloatArray) -> float:

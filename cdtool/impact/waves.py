@@ -1,7 +1,7 @@
 """Elastic waves: is an impact long enough for the bodies to count as rigid? (thesis 3.1.4)
 
 The thesis names the parameter, duration of the contact over period of the first natural mode, and says that waves take
-less energy the larger it is. It gives no number. The one here comes from a mode that is hit by half a sine of force.
+less energy the larger it is. It has no number. The one here is that of a mode excited by half a sine of force.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cdtool.errors import UsageError
 from cdtool.impact.checks import require_positive
 from cdtool.recording import FloatArray
 
-# From here on a mode keeps at most 4.1 % of the energy that it holds at the force's peak.
+# With this ratio and above, a mode keeps at most 4.1 % of its energy at the force's peak.
 QUASI_STATIC_FROM = 5.0
 # Natural periods of a rod in travel times of a wave along it, by how its ends are held.
 _TRAVELS = {"free": 2.0, "one fixed": 4.0}
@@ -31,7 +31,7 @@ class WaveCheck:
 
     @property
     def quasi_static(self) -> bool:
-        """Whether the bodies count as rigid but for the contact."""
+        """Whether the bodies count as rigid except for the contact."""
         return not self.warning
 
     @property
@@ -41,7 +41,7 @@ class WaveCheck:
 
 
 def check_waves(contact_duration: float, first_frequency: float) -> WaveCheck:
-    """Hold a contact's duration [s] against the first natural frequency [Hz] of a body (thesis 3.1.4).
+    """Compare a contact's duration [s] with the first natural frequency [Hz] of a body (thesis 3.1.4).
 
     Of two bodies the one with the lower frequency decides. Raises UsageError for numbers that are not positive.
     """
@@ -52,10 +52,10 @@ def check_waves(contact_duration: float, first_frequency: float) -> WaveCheck:
         return WaveCheck(ratio, "")
     lasts = f"the contact lasts {ratio:.2g} periods of the body's first natural mode"
     if ratio < 1.0:
-        rest = "it is over before the body has answered as a whole, so the contact law alone cannot tell the rebound"
+        rest = "it is over before the body has responded as a whole, so the contact law does not determine the rebound"
     else:
         share = 100.0 * float(vibration_share(ratio))
-        rest = f"up to {share:.0f} % of what this mode holds under the peak force stays behind as vibration"
+        rest = f"up to {share:.0f} % of the energy of this mode under the peak force remains as vibration"
     return WaveCheck(ratio, f"waves matter: {lasts}; {rest}")
 
 
@@ -74,7 +74,7 @@ def rod_first_frequency(length: float, young: float, density: float, ends: str =
     """First longitudinal natural frequency [Hz] of a rod: c/(2 L) with free ends, c/(4 L) with one fixed.
 
     c = sqrt(E/rho): Young's modulus in Pa, density in kg/m3; length in m. Raises UsageError for other ends ("free",
-    "one fixed"). A beam that is hit across swings far slower: give `check_waves` its own frequency.
+    "one fixed"). A beam hit across its axis oscillates far slower: give `check_waves` its own frequency.
     """
     require_positive("the length", length, "m")
     require_positive("Young's modulus", young, "Pa")

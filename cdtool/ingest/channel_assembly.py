@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -26,6 +26,12 @@ from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
 
 Counts = npt.NDArray[np.int64]
+# Why values are masked.
+_MASKED: tuple[tuple[str, Literal["warning", "loss"]], ...] = (
+    ("infinite", "loss"),
+    ("at the sensor's limit", "warning"),
+    ("outside the possible range", "loss"),
+)
 
 
 def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
@@ -105,9 +111,9 @@ class _Assembly:
         if not len(clock.time):
             raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
         scaled, masked = in_si(item, self._kept(item, values, clock.keep))
-        self.findings += masked.findings(item, self.channels.joints)
+        self.findings += masked_findings(masked, item, self.channels.joints)
         series = Series(clock.time, scaled, item.unit)
-        odd = gap_findings(series, item.channel, masked.total)
+        odd = gap_findings(series, item.channel, int(masked.sum()))
         self.findings += [found for found in odd if found.message not in self.gaps]
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
@@ -167,37 +173,14 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
         )
 
 
-@dataclass(frozen=True)
-class Masked:
-    """How many values of each joint are masked: infinite, at the sensor's limit, and none that a sensor gives."""
-
-    infinite: Counts
-    saturated: Counts
-    impossible: Counts
-
-    def __add__(self, other: Masked) -> Masked:
-        return Masked(
-            self.infinite + other.infinite, self.saturated + other.saturated, self.impossible + other.impossible
-        )
-
-    def findings(self, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-        """The findings about them, by joint."""
-        kinds: tuple[tuple[Counts, str, Literal["warning", "loss"]], ...] = (
-            (self.infinite, "infinite", "loss"),
-            (self.saturated, "at the sensor's limit", "warning"),
-            (self.impossible, "outside the possible range", "loss"),
-        )
-        return [
-            Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)
-            for counts, what, severity in kinds
-            for j, count in enumerate(counts.tolist())
-            if count
-        ]
-
-    @property
-    def total(self) -> int:
-        """How many values are masked in all."""
-        return int(sum(counts.sum() for counts in (self.infinite, self.saturated, self.impossible)))
+def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+    """Return the findings about masked values (as in_si counts them), by joint."""
+    return [
+        Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)
+        for (what, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+        for j, count in enumerate(counts)
+        if count
+    ]
 
 
 def _counted(count: int, of: str) -> str:
@@ -211,8 +194,11 @@ def of_joint(joints: Sequence[str], joint: int, count: int) -> str:
     return f" of joint {joints[joint]}" if count > 1 else ""
 
 
-def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Masked]:
-    """(n, J) values of a channel in its SI unit, NaN where they are masked, and how many these are."""
+def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
+    """Return (n, J) values of a channel in its SI unit, NaN where they are masked, and how many these are.
+
+    They are (3, J): infinite, at the sensor's limit, and none that a sensor gives.
+    """
     infinite = np.isinf(values)
     saturated = np.zeros_like(infinite)
     if item.valid_range is not None:
@@ -225,8 +211,7 @@ def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Masked]:
         beyond |= np.abs(scaled) >= IMPOSSIBLE
     beyond &= ~(infinite | saturated)
     scaled[infinite | saturated | beyond] = np.nan
-    infinite, saturated, beyond = (np.count_nonzero(item, axis=0) for item in (infinite, saturated, beyond))
-    return scaled, Masked(infinite, saturated, beyond)
+    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, beyond)])
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:

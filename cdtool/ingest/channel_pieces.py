@@ -2,21 +2,215 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from cdtool.channels import ChannelSource
+from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
 from cdtool.columns import Column, Piece
+from cdtool.errors import RecordingError
+from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.pieces import MappedLog
-from cdtool.formats.time_order import by_time
-from cdtool.ingest.logged_file import LoggedChannel, LoggedFile
-from cdtool.ingest.part_gaps import gaps_between
-from cdtool.ingest.part_pieces import FoundParts
-from cdtool.ingest.parts import not_alike, of_part, overlapping
+from cdtool.formats.pieces import MappedLog, Run
+from cdtool.formats.source import Source
+from cdtool.formats.time_order import Lateness, by_time
+from cdtool.ingest.channel_assembly import (
+    apart_findings,
+    check_width,
+    in_si,
+    masked_findings,
+    stuck_findings,
+)
+from cdtool.ingest.log_figures import ClockFigures
+from cdtool.ingest.parts import ChannelSpan, PartSpan, check_parts, gaps_between, of_part
+from cdtool.ingest.reading import FoundParts
 from cdtool.machine_file import MachineFile
-from cdtool.recording import GROUND_TRUTH, Finding
+from cdtool.recording import MEASURED, Finding, FloatArray
+
+
+class LoggedChannel:
+    """A channel's samples so far: cleaned and in SI, with their findings.
+
+    `period` [s] is the median step, where it is known: then gaps are looked for, too.
+    """
+
+    def __init__(self, path: Path, item: ChannelSource, names: Sequence[str], period: float | None = None) -> None:
+        self._path, self.item, self.joints, self._names = path, item, len(item.factor), names
+        self.clean, self.clock = CleanPieces(), ClockFigures()
+        self._gaps = None if period is None else Gaps(period, item.channel)
+        self._masked, self._known = np.zeros((3, self.joints), np.int64), np.zeros(self.joints, np.int64)
+        self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
+
+    def add(self, stamps: FloatArray, values: FloatArray | None, final: bool = False) -> tuple[FloatArray, FloatArray]:
+        """The next samples in the order of their stamps [s]: their times, `time_offset` included, and (n, J) values.
+
+        The last ones wait for those that follow, or for `final`.
+        """
+        table = np.full((len(stamps), self.joints), np.nan) if values is None else _table(values)
+        check_width(self._path, self.item, table.shape[1])
+        time, table = self.clean.rows(stamps, stamps, table, final)
+        rows, masked = in_si(self.item, table)
+        self._masked += masked
+        self._known += np.count_nonzero(np.isfinite(rows), axis=0)
+        self._least = np.fmin(self._least, np.fmin.reduce(rows, axis=0, initial=np.inf))
+        self._most = np.fmax(self._most, np.fmax.reduce(rows, axis=0, initial=-np.inf))
+        self.clock.add(time, len(time))
+        if self._gaps is not None:
+            self._gaps.add(time)
+        return (time + self.item.time_offset if self.item.time_offset else time), rows
+
+    @property
+    def is_coarse(self) -> bool:
+        """Its clock is to be made a straight line of, for which clean_time needs it as a whole."""
+        return self.item.channel != "event" and self.clean.is_coarse
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time [s], `time_offset` included."""
+        return self.clock.first + self.item.time_offset, self.clock.last + self.item.time_offset
+
+    @property
+    def constant(self) -> list[bool]:
+        """Joint by joint: does the value never change?"""
+        return list(map(bool, (self._known > 1) & (self._least == self._most)))
+
+    def findings(self) -> list[Finding]:
+        """The findings, worded as in channel_assembly."""
+        found = [replace(item, channel=f"{self.item.channel} time") for item in self.clean.findings(0)]
+        found += masked_findings(self._masked, self.item, self._names)
+        found += self._gaps.findings() if self._gaps is not None else []
+        values = self.clock.rows * self.joints
+        absent = values - int(self._known.sum())
+        return found + missing_findings(absent, values, self.item.channel, int(self._masked.sum()))
+
+
+class LoggedFile:
+    """A file of messages that is read once for its figures, twice where they are not in the order of time.
+
+    `channels` hold the figures, `late` [s] how late any sample is at most (Lateness). Gaps are known once
+    `pieces` has been run through. `log` gives the mapped fields of the file at `path`. Raises RecordingError.
+    """
+
+    def __init__(self, path: Path, machine_file: MachineFile, log: MappedLog) -> None:
+        self.path, self._items, self._joints = path, machine_file.topics.sources, machine_file.topics.joints
+        self._log = log
+        self._is_sorted = True
+        self.channels = self._new()
+        source, lateness = self._survey()
+        self.late = lateness.late
+        self._columns: Mapping[str, list[Column]] = {name: [column] for name, column in source.columns.items()}
+        if not (self._is_sorted and self._log.settled):
+            self._survey_in_order()
+        source, held = resolve_columns(source, machine_file.topics)
+        self.channels = {item.channel: self.channels[item.channel] for item in held.sources}
+        self.origin, self._told = source.origin, source.findings
+        for channel in self.channels.values():
+            check_width(path, channel.item, math.prod(source.columns[channel.item.described].values.shape[1:]))
+            if not channel.clock.rows:
+                raise RecordingError(f"{path}: channel '{channel.item.channel}' has no sample with a time")
+        offsets = [item.time_offset for item in held.sources]
+        self.late += max(offsets, default=0.0) - min(offsets, default=0.0)
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample of any channel [s]."""
+        return min((channel.span[0] for channel in self.channels.values()), default=np.inf)
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample of any channel [s]."""
+        return max((channel.span[1] for channel in self.channels.values()), default=-np.inf)
+
+    @property
+    def spanned(self) -> PartSpan:
+        """What its channels span."""
+        spans = {
+            name: ChannelSpan(*each.span, each.clock.steps.median if each.clock.steps.count else np.inf, each.item.unit)
+            for name, each in self.channels.items()
+        }
+        return PartSpan(str(self.path), self.origin, spans)
+
+    @property
+    def is_coarse(self) -> bool:
+        """A channel's clock cannot be cleaned piece by piece."""
+        return any(channel.is_coarse for channel in self.channels.values())
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of the file and its channels."""
+        found = [*self._told, *(item for channel in self.channels.values() for item in channel.findings())]
+        constant = {name: self.channels[name].constant for name in MEASURED if name in self.channels}
+        found += stuck_findings(constant, self._joints)
+        found += apart_findings({name: channel.span for name, channel in self.channels.items()})
+        return tuple(found)
+
+    def pieces(self, names: Collection[str], shift: float) -> Iterator[Piece]:
+        """The channels of those names, each a clock of its own; `shift` [s] is added to their times."""
+        again = {
+            name: LoggedChannel(self.path, channel.item, self._joints, channel.clock.steps.median)
+            for name, channel in self.channels.items()
+            if name in names
+        }
+        for channel, time, rows in _added(again, self._in_order()):
+            if len(time):
+                name, values = channel.item.channel, rows if channel.joints > 1 else rows[:, 0]
+                yield Piece(name, time + shift, {name: values}, len(time))
+        self.channels |= again
+
+    def _survey(self) -> tuple[Source, Lateness]:
+        """The figures, as if all were in order."""
+        lateness, orders = Lateness(), dict[str, Lateness]()
+        run = Run(self._log.pieces())
+
+        def looked_at() -> Iterator[Piece]:
+            for piece in run:
+                if piece.time is not None:
+                    lateness.add(piece.time)
+                    orders.setdefault(piece.clock, Lateness()).add(piece.time)
+                yield piece
+
+        for _ in _added(self.channels, looked_at()):
+            pass
+        self._is_sorted = all(order.late == 0.0 for order in orders.values())
+        return run.source, lateness
+
+    def _survey_in_order(self) -> None:
+        self.channels = self._new()
+        for _ in _added(self.channels, self._in_order()):
+            pass
+
+    def _new(self) -> dict[str, LoggedChannel]:
+        return {item.channel: LoggedChannel(self.path, item, self._joints) for item in self._items}
+
+    def _in_order(self) -> Iterator[Piece]:
+        """The fields' pieces, those of each field in the order of their times."""
+        run = Run(self._log.pieces())
+        if self._is_sorted:
+            yield from run
+        else:
+            for ready in by_time(run, self._columns, self.late, sort=True):
+                yield from ready.values()
+
+
+def _added(
+    channels: Mapping[str, LoggedChannel], pieces: Iterable[Piece]
+) -> Iterator[tuple[LoggedChannel, FloatArray, FloatArray]]:
+    """The channels that each field's pieces are one of, with their times and values; at the end what still waits."""
+    for piece in pieces:
+        for channel in channels.values():
+            if channel.item.described == piece.clock and piece.time is not None:
+                yield channel, *channel.add(piece.time, piece.values.get(piece.clock))
+    for channel in channels.values():
+        yield channel, *channel.add(np.empty(0), np.empty((0, channel.joints)), final=True)
+
+
+def _table(values: FloatArray) -> FloatArray:
+    """(n, J) of values (n,) or (n, J), of no rows, too."""
+    return values[:, np.newaxis] if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 class ChannelPieces:
@@ -34,17 +228,23 @@ class ChannelPieces:
         self._folder, self._joints = folder, machine_file.topics.joints
         self.origin = self._files[0].origin
         self.is_coarse = any(file.is_coarse for file in self._files)
+        check_parts([file.spanned for file in self._files])
         self._late = max(file.late for file in self._files)
+        latest = -np.inf  # a part that begins before others end is late, too
+        for file in self._files:
+            shift = file.origin - self.origin
+            self._late = max(self._late, latest - (file.start + shift))
+            latest = max(latest, file.end + shift)
         clocks: dict[tuple[bytes, ...], list[str]] = {}
         for name in dict.fromkeys(name for file in self._files for name in file.channels):
-            self._check(name)
-            digests = (file.channels[name].digest.digest() if name in file.channels else b"" for file in self._files)
+            held = (file.channels.get(name) for file in self._files)
+            digests = (b"" if channel is None else channel.clock.digest.digest() for channel in held)
             clocks.setdefault(tuple(digests), []).append(name)
         self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is odd; gaps are among it once the rows have been run through."""
+        """All findings; gaps are among them once the rows have been run through."""
         if self._folder is None:
             return self._files[0].findings
         of_parts = (item for file in self._files for item in of_part(file.path, file.findings))
@@ -61,28 +261,10 @@ class ChannelPieces:
         for file in self._files:
             yield from file.pieces(names, file.origin - self.origin)
 
-    def _check(self, name: str) -> None:
-        """Raise RecordingError where a part lacks the channel, or begins before the one before it ends.
-
-        How far it stands behind other channels of parts before it, is kept.
-        """
-        end, latest = -np.inf, -np.inf
-        for file in self._files:
-            shift = file.origin - self.origin
-            if name in file.channels:
-                first, last = file.channels[name].span
-                if first + shift <= end:
-                    raise overlapping(str(file.path), name, first + shift, end)
-                self._late = max(self._late, latest - (first + shift))
-                end = last + shift
-            elif name not in GROUND_TRUTH:
-                raise not_alike(str(file.path), name, str(self._files[0].path))
-            latest = max(latest, file.end + shift)
-
     def _group(self, name: str, channels: Sequence[str]) -> Group:
         holding = [file for file in self._files if channels[0] in file.channels]
         start = holding[0].channels[channels[0]].span[0] + (holding[0].origin - self.origin)
-        rows = sum(file.channels[channels[0]].rows for file in holding)
+        rows = sum(file.channels[channels[0]].clock.rows for file in holding)
         columns = tuple(_header(holding[0].channels[channel]) for channel in channels)
         return Group(name, columns, rows, True, start, self._joints)
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from cdtool.bounded_loading import read_bytes
+from cdtool.clock import GAP_PERIODS
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.formats.source import Source
-from cdtool.ingest.part_gaps import PartSpan, gaps_between
 from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
+
+# First and last time [s].
+Span = tuple[float, float]
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
@@ -56,117 +61,141 @@ def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
 
 
 def joined_sources(
-    folder: Path, parts: Sequence[Source], unread: Mapping[Path, RecordingError] | None = None
+    folder: Path, parts: Sequence[tuple[Source, Mapping[str, Span]]], unread: Mapping[Path, RecordingError]
 ) -> Source:
-    """The columns of all parts, each in the order of its times, with what is odd about every part.
+    """Return the columns of all parts without rows, with the findings of every part, in the order of their times.
 
-    A column may be absent in some of them; one whose arrays differ in length is left out, and that is said, as are
-    parts that could not be read (`unread`).
+    Each part comes with what its columns span [s], on one clock. A column may be absent in some of them; one whose
+    arrays differ in length is left out, and that is said, as are parts that could not be read (`unread`).
     """
-    unread = unread or {}
-    lost = lost_findings(folder, [*(part.path for part in parts), *unread], unread)
+    sources = [source for source, _ in parts]
+    lost = lost_findings(folder, [*(source.path for source in sources), *unread], unread)
     if len(parts) == 1:
-        return replace(parts[0], path=folder, findings=(*lost, *parts[0].findings))
-    parts = sorted(parts, key=_start)
-    findings = [*lost, *(found for part in parts for found in of_part(part.path, part.findings))]
+        return replace(sources[0], path=folder, findings=(*lost, *sources[0].findings))
+    findings = [*lost, *(found for source in sources for found in of_part(source.path, source.findings))]
     columns: dict[str, Column] = {}
-    late: dict[Path, list[str]] = {}
-    for name in dict.fromkeys(name for part in parts for name in part.columns):
-        holding = [part for part in parts if name in part.columns]
-        widths = sorted({part.columns[name].values.shape[1:] for part in holding})
+    late: dict[Path, str] = {}
+    for name in dict.fromkeys(name for source in sources for name in source.columns):
+        holding = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
+        widths = sorted({source.columns[name].values.shape[1:] for source, _ in holding})
         if len(widths) > 1:
             text = f"arrays of {' and '.join(str(width[0] if width else 1) for width in widths)} elements: left out"
             findings.append(Finding(text, name, "note"))
             continue
-        columns[name], overlapping = _joined_column(name, holding, parts[0].origin)
-        for path in overlapping:
-            late.setdefault(path, []).append(name)
-    for path, names in late.items():
-        text = f"{path.name} begins before the part before it ends ({names[0]}): put in the order of the times"
+        columns[name] = holding[0][0].columns[name]
+        for (_, before), (source, span) in pairwise(holding):
+            if before and span and span[0] < before[1]:
+                late.setdefault(source.path, name)
+    for path, name in late.items():
+        text = f"{path.name} begins before the part before it ends ({name}): put in the order of the times"
         findings.append(Finding(text))
-    details = joined_details(parts)
-    return Source(folder, parts[0].format, columns, parts[0].origin, tuple(findings), details, tuple(columns))
+    details, first = joined_details([(source.path, source.details) for source in sources]), sources[0]
+    return Source(folder, first.format, columns, first.origin, tuple(findings), details, tuple(columns))
 
 
-def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
-    """Parts of one log, as logged, as one recording; raises RecordingError where they overlap or are not alike.
+class ChannelSpan(NamedTuple):
+    """A channel's first and last time in a part, and its median step [s]; the unit of its values."""
+
+    first: float
+    last: float
+    step: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class PartSpan:
+    """What the channels of a part span, in times counted from `origin` [s]."""
+
+    path: str
+    origin: float
+    channels: Mapping[str, ChannelSpan]
+
+    @classmethod
+    def of(cls, part: Recording) -> PartSpan:
+        """Return that of a part which is in memory."""
+        spans = {}
+        for name, series in part.channels.items():
+            time = series.time
+            step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+            spans[name] = ChannelSpan(float(time[0]), float(time[-1]), step, series.unit)
+        return cls(part.source, part.origin, spans)
+
+
+def check_parts(parts: Sequence[PartSpan]) -> None:
+    """Raise RecordingError where a part has no such channel, or begins before the one before it ends.
 
     Ground truth may be in some of them only, such as the events of a stroke.
     """
+    first = parts[0]
+    for name in dict.fromkeys(name for part in parts for name in part.channels):
+        end, unit = -np.inf, None
+        for part in parts:
+            if name not in part.channels and name in GROUND_TRUTH:
+                continue
+            span = part.channels.get(name)
+            if span is None or unit not in (None, span.unit):
+                raise RecordingError(
+                    f"{part.path}: channel '{name}' is not logged as in {first.path}", "parts of one log are alike"
+                )
+            start = span.first + (part.origin - first.origin)
+            if start <= end:
+                raise RecordingError(
+                    f"{part.path}: overlaps the part before it ({name}: starts at {start:g} s, before {end:g} s)",
+                    "parts of one log share one clock and follow one another",
+                )
+            end, unit = span.last + (part.origin - first.origin), span.unit
+
+
+def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
+    """Yield one finding for each part that begins later than its channels' steps explain; `parts` follow one another.
+
+    Between them nothing was logged: a recorder that was stopped, or a part that nobody names. Ground truth may be in
+    some parts only. Where not all channels pause, the finding names those that do.
+    """
+    for before, after in pairwise(parts):
+        channels = [name for name in before.channels if name in after.channels and name not in GROUND_TRUTH]
+        gaps = {}
+        for name in channels:
+            gap = after.channels[name].first + (after.origin - before.origin) - before.channels[name].last
+            if gap > GAP_PERIODS * before.channels[name].step:
+                gaps[name] = gap
+        if gaps:
+            whose = "" if len(gaps) == len(channels) else f" ({', '.join(gaps)})"
+            text = f"begins {min(gaps.values()):.3g} s after the part before it ends{whose}: nothing is logged between"
+            yield Finding(f"{Path(after.path).name}: {text}")
+
+
+def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
+    """Return parts of one log, as logged, as one recording; raises RecordingError as check_parts does."""
     parts = sorted(parts, key=lambda part: part.origin + part.start)
+    spans = [PartSpan.of(part) for part in parts]
+    check_parts(spans)
     first = parts[0]
     joined: dict[str, Series] = {}
     for channel in dict.fromkeys(name for part in parts for name in part.channels):
-        pieces: list[Series] = []
-        for part in parts:
-            if channel in GROUND_TRUTH and channel not in part:
-                continue
-            if channel not in part or (pieces and part[channel].unit != pieces[0].unit):
-                raise not_alike(part.source, channel, first.source)
-            shift = part.origin - first.origin
-            series = part[channel]
-            if pieces and series.time[0] + shift <= pieces[-1].time[-1]:
-                raise overlapping(part.source, channel, series.time[0] + shift, pieces[-1].time[-1])
-            pieces.append(Series(series.time + shift, series.values, series.unit))
-        time = np.concatenate([piece.time for piece in pieces])
-        joined[channel] = Series(time, np.concatenate([piece.values for piece in pieces]), pieces[0].unit)
+        holding = [part for part in parts if channel in part]
+        time = np.concatenate([part[channel].time + (part.origin - first.origin) for part in holding])
+        values = np.concatenate([part[channel].values for part in holding])
+        joined[channel] = Series(time, values, holding[0][channel].unit)
     findings = tuple(found for part in parts for found in of_part(Path(part.source), part.findings))
-    findings += tuple(gaps_between([PartSpan.of(part) for part in parts]))
+    findings += tuple(gaps_between(spans))
     source = ", ".join(part.source for part in parts)
     digest = joined_digest([part.digest for part in parts])
     return Recording(name, source, first.joints, joined, first.origin, findings, digest)
 
 
-def not_alike(part: str, channel: str, first: str) -> RecordingError:
-    """A part lacks a channel that the first one has."""
-    return RecordingError(f"{part}: channel '{channel}' is not logged as in {first}", "parts of one log are alike")
-
-
-def overlapping(part: str, channel: str, start: float, before: float) -> RecordingError:
-    """A channel starts [s] in a part before it ends [s] in the one before."""
-    return RecordingError(
-        f"{part}: overlaps the part before it ({channel}: starts at {start:g} s, before {before:g} s)",
-        "parts of one log share one clock and follow one another",
-    )
-
-
 def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
-    """What is odd about a part, with its name."""
+    """The findings of a part, with its name."""
     return (replace(found, message=f"{path.name}: {found.message}") for found in findings)
 
 
-def _start(part: Source) -> tuple[float, str]:
-    """The time of a part's first sample on the clock of its log; parts without any come last."""
-    starts = [float(c.time[0]) for c in part.columns.values() if c.time is not None and len(c.time)]
-    return part.origin + min(starts) if starts else np.inf, part.path.name
-
-
-def _joined_column(name: str, parts: Sequence[Source], origin: float) -> tuple[Column, list[Path]]:
-    """One column of the parts that hold it, and those of them that begin before the one before them ends."""
-    times, values, late = [], [], []
-    for part in parts:
-        column = part.columns[name]
-        time = column.time if column.time is not None else np.empty(0)
-        times.append(time + (part.origin - origin))
-        values.append(column.values)
-        if len(times) > 1 and len(times[-2]) and len(time) and times[-1][0] < times[-2][-1]:
-            late.append(part.path)
-    time, joined = np.concatenate(times), np.concatenate(values)
-    if late:
-        order = np.argsort(time, kind="stable")
-        time, joined = time[order], joined[order]
-    return Column(name, joined, time, parts[0].columns[name].unit), late
-
-
-def joined_details(parts: Sequence[Source]) -> dict[str, str]:
-    """What the parts of a log say of themselves, and of each topic once: the messages of all are added up."""
-    if len(parts) == 1:
-        return dict(parts[0].details)
+def joined_details(parts: Sequence[tuple[Path, Mapping[str, str]]]) -> dict[str, str]:
+    """Return what the parts of a log state, each topic once: the messages of all are added up."""
     said: dict[str, list[str]] = {}
-    for part in parts:
-        for key, text in part.details.items():
+    for _, details in parts:
+        for key, text in details.items():
             said.setdefault(key, []).append(text)
-    joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
+    joined = {"parts": f"{len(parts)}, {parts[0][0].name} to {parts[-1][0].name}"}
     for key, texts in said.items():
         counted = [match for text in texts if (match := _MESSAGES.fullmatch(text))]
         kinds = list(dict.fromkeys(match["what"] for match in counted))
@@ -201,7 +230,7 @@ def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
 
 
 def _block_list(below: Sequence[str]) -> Iterator[str]:
-    """Lines `- bag_0.mcap`, until one that is no item."""
+    """Lines `- bag_0.mcap`, until one that is not an item."""
     for line in below:
         text = line.strip()
         if not text or text.startswith("#"):

@@ -1,4 +1,4 @@
-"""What is known of a machine: inertia, friction, transmission. One file a type, named as in machine.toml."""
+"""The model of a machine: inertia, friction, transmission. One file per type, named as in machine.toml."""
 
 from __future__ import annotations
 

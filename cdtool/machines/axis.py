@@ -1,4 +1,4 @@
-"""One degree of freedom a joint, without coupling: what a linear and a rotary axis share.
+"""One degree of freedom per joint, without coupling: what a linear and a rotary axis share.
 
 Conventions: everything is referred to the load side (see joint_machine). The force balance is (thesis 5.1, 5.2 on the
 load side, friction and a constant force added)
@@ -24,7 +24,7 @@ from cdtool.tables import Table
 
 @dataclass(frozen=True)
 class Axis(JointMachine):
-    """Joints that move independently of one another; parameters as in machine.toml, one value a joint."""
+    """Joints that move independently of one another; parameters as in machine.toml, one value per joint."""
 
     load_inertia: tuple[float, ...]
 
@@ -44,7 +44,7 @@ class Axis(JointMachine):
         return inertia
 
     def require_inertia(self, who: str) -> None:
-        """Raise ConfigurationError, naming the key, where a joint's inertia is not given and `who` needs it."""
+        """Raise ConfigurationError, naming the key, if the inertia of a joint is not given and `who` needs it."""
         for joint, inertia in zip(self.joints, self.nominal_inertia, strict=True):
             if inertia <= 0.0:
                 raise ConfigurationError(
@@ -55,35 +55,35 @@ class Axis(JointMachine):
     def momentum_balance(
         self, torque: FloatArray, position: FloatArray, speed: FloatArray, velocity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """(F - friction, p = m w), both (n, J); viscous friction acts on the velocity w, like the momentum."""
+        """Return (F - friction, p = m w), both (n, J); viscous friction acts on the velocity w, like the momentum."""
         return self.minus_friction(torque.copy(), speed, velocity), self.nominal_inertia * velocity
 
     def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """F - friction (n, J): what is left to accelerate or to collide."""
+        """Return F - friction (n, J): what is left to accelerate or to collide."""
         return self.minus_friction(torque.copy(), speed, speed)
 
     def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """m a + friction (n, J): what the drive must give for this motion without contact."""
+        """Return m a + friction (n, J): the drive force of this motion without contact."""
         return self.inertia_times(position, acceleration) + self.friction(speed)
 
     def energy(self, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """Kinetic energy of each joint (n, J) [J]; a constant force counts as friction, not as a potential."""
+        """Return the kinetic energy of each joint (n, J) [J]; a constant force counts as friction."""
         energy: FloatArray = 0.5 * self.nominal_inertia * speed**2
         return energy
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
-        """M x (n, J)."""
+        """Return M x (n, J)."""
         product: FloatArray = self.nominal_inertia * vector
         return product
 
     def inertia_matrix(self, position: FloatArray) -> FloatArray:
-        """(n, J, J): diagonal and the same at every sample."""
+        """Return M (n, J, J): diagonal and equal at every sample."""
         return np.broadcast_to(np.diag(self.nominal_inertia), (len(position), *(2 * (len(self.joints),))))
 
     def joint_equations(
         self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray
     ) -> list[JointEquation]:
-        """One equation a joint: the virtual friction stands for all viscous friction, the rest is taken off."""
+        """Return one equation per joint: the virtual friction replaces all viscous friction, the rest is subtracted."""
         force = self.minus_friction(torque.copy(), speed, np.zeros_like(speed))
         inertia = self.nominal_inertia
         return [

@@ -1,4 +1,4 @@
-"""Machines whose joints move one another: what a planar arm and a robot from a URDF share.
+"""Machines with coupled joints: what a planar arm and a robot from a URDF share.
 
 M(q) a + C(q, v) v + g(q) + friction = tau - tau_c (thesis 2.4, friction added), tau_c = J_c' F_c (2.5): what the
 machine exerts on the obstacle. C is the matrix of Christoffel symbols, so that dM/dt = C + C'.
@@ -16,16 +16,16 @@ from cdtool.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
 from cdtool.recording import FloatArray
 
-# A singular value of the Jacobian below this share of the largest: what it would tell of a force is noise.
+# A singular value of the Jacobian below this share of the largest only contributes noise to a force.
 _HARDLY = 0.05
 
 
 @dataclass(frozen=True)
 class CoupledMachine(JointMachine, ABC):
-    """Everything over whole recordings at once: position, speed, acceleration and torque are (n, J), load side."""
+    """A machine of coupled joints; methods use whole recordings: position, speed and torque (n, J), load side."""
 
     coupled: ClassVar[bool] = True
-    default_sides: ClassVar[str] = "two"  # which side of a link a contact is on is not known
+    default_sides: ClassVar[str] = "two"  # the side of a link on which a contact is unknown
     derives_position: ClassVar[bool] = False
 
     @property
@@ -35,86 +35,86 @@ class CoupledMachine(JointMachine, ABC):
 
     @abstractmethod
     def momentum_terms(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """p = M v, C'v and g, each (n, J): momentum [N m s, N s] and torques [N m, N]."""
+        """Return p = M v, C'v and g, each (n, J): momentum [N m s, N s] and torques [N m, N]."""
 
     @abstractmethod
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """M a + C v + g (n, J) [N m, N]."""
+        """Return M a + C v + g (n, J) [N m, N]."""
 
     @abstractmethod
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
-        """M x (n, J)."""
+        """Return M x (n, J)."""
 
     @abstractmethod
     def inertia_matrix(self, position: FloatArray) -> FloatArray:
-        """M (n, J, J), drives included."""
+        """Return M (n, J, J), drives included."""
 
     @abstractmethod
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Kinetic and potential energy, each (n,) [J]."""
+        """Return kinetic and potential energy, each (n,) [J]."""
 
     @abstractmethod
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
-        """J_c (n, 6, J) of a point of a link, in its frame [m]: linear, then angular velocity, base axes (2.2)."""
+        """Return J_c (n, 6, J) of a point in a link's frame [m]: linear, then angular velocity, base axes (2.2)."""
 
     def momentum(self, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """p = M v (n, J), thesis 2.16."""
+        """Return p = M v (n, J), thesis 2.16."""
         return self.inertia_times(position, speed)
 
     def velocity_force(self, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """C'v (n, J) = the derivative of the kinetic energy by q."""
+        """Return C'v (n, J), the derivative of the kinetic energy by q."""
         return self.momentum_terms(position, speed)[1]
 
     def gravity(self, position: FloatArray) -> FloatArray:
-        """g (n, J): what the drives must give to hold the machine."""
+        """Return g (n, J): the drive torques that hold the machine."""
         return self.momentum_terms(position, np.zeros_like(position))[2]
 
     def contact_torque(
         self, position: FloatArray, force: FloatArray, link: str, point: tuple[float, float, float]
     ) -> FloatArray:
-        """tau_c = J_c' F_c (n, J), thesis 2.5; `force` (n, 6): force and moment that the machine exerts, base axes."""
+        """Return tau_c = J_c' F_c (n, J), thesis 2.5; `force` (n, 6): exerted force and moment, base axes."""
         jacobian = self.contact_jacobian(position, link, point)
         return np.asarray(np.einsum("nij,ni->nj", jacobian, force))
 
     def contact_force(
         self, position: FloatArray, residual: FloatArray, link: str, point: tuple[float, float, float]
     ) -> FloatArray:
-        """The force (n, 3) [N] at a known point that explains a joint residual best: least squares of J_c' F = res.
+        """Return the force (n, 3) [N] at a known point that explains a joint residual best.
 
-        Of the force only what moves the joints can be seen: in a direction in which the point cannot move, or hardly
-        (5 % of its best direction, near a singular pose), it is 0.
+        Only the part of the force that moves the joints is visible: in a direction in which the point cannot move, or
+        hardly (5 % of its best direction, near a singular pose), it is 0.
         """
         jacobian = self.contact_jacobian(position, link, point)[:, :3]
         return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1), rcond=_HARDLY), residual))
 
     def require_inertia(self, who: str) -> None:
-        """A coupled machine always has its inertia."""
+        """Do nothing: a coupled machine always has its inertia."""
 
     def momentum_balance(
         self, torque: FloatArray, position: FloatArray, speed: FloatArray, velocity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """(tau - g + C'w - friction, p = M w), both (n, J): thesis 2.17 with beta = g - C'w + friction."""
+        """Return (tau - g + C'w - friction, p = M w), both (n, J): thesis 2.17 with beta = g - C'w + friction."""
         momentum, velocity_force, gravity = self.momentum_terms(position, velocity)
         velocity_force -= gravity
         velocity_force += torque
         return self.minus_friction(velocity_force, speed, velocity), momentum
 
     def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """tau - C v - g - friction (n, J)."""
+        """Return tau - C v - g - friction (n, J)."""
         rest = torque - self.inverse_dynamics(position, speed, np.zeros_like(speed))
         return self.minus_friction(rest, speed, speed)
 
     def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """M a + C v + g + friction (n, J)."""
+        """Return M a + C v + g + friction (n, J)."""
         return self.inverse_dynamics(position, speed, acceleration) + self.friction(speed)
 
     def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:
-        """v'(tau - friction) of all joints together (n, 1) [W]."""
+        """Return v'(tau - friction) of all joints together (n, 1) [W]."""
         power: FloatArray = np.sum(super().drive_power(torque, speed), axis=1, keepdims=True)
         return power
 
     def energy(self, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """Kinetic and potential energy (n, 1) [J]."""
+        """Return kinetic plus potential energy (n, 1) [J]."""
         kinetic, potential = self.energies(position, speed)
         return (kinetic + potential)[:, np.newaxis]
 

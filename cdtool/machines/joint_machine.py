@@ -1,7 +1,7 @@
-"""What every machine with joints shares: names, drives, friction, and how a log is referred to the load side.
+"""What all machines with joints share: names, drives, friction, and how a log is referred to the load side.
 
 With the transmission ratio r = dx/dtheta (load travel per motor angle) a motor torque tau drives the load with tau / r,
-and the motor's inertia J_m weighs J_m / r^2 there; position = r theta + offset.
+and the motor's inertia J_m is J_m / r^2 there; position = r theta + offset.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _COORDINATES = ("motor", "load")
 
 @dataclass(frozen=True)
 class JointMachine:
-    """Parameters as in machine.toml, one a joint; friction at the motor with coordinates "motor", else at the load.
+    """Parameters as in machine.toml, one per joint; friction at the motor with coordinates "motor", else at the load.
 
-    `coordinates`: "motor" where logs hold motor torque, angle and speed, "load" where they hold the load's.
+    `coordinates`: "motor" if logs contain motor torque, angle and speed, "load" if they contain those of the load.
     """
 
     name: str
@@ -48,7 +48,7 @@ class JointMachine:
 
     @classmethod
     def drive_keys(cls, table: Table, default_joints: tuple[str, ...] = ()) -> dict[str, Any]:
-        """The keys of [machine] that every machine has; raises ConfigurationError naming the key."""
+        """Return the keys of [machine] that every machine has; raises ConfigurationError naming the key."""
         joints = table.texts("joints", default_joints or (table.text("name", "axis"),))
         if len(set(joints)) != len(joints):
             raise table.fault("joints", "names a joint twice", "joint names must differ")
@@ -100,7 +100,7 @@ class JointMachine:
         return inertia
 
     def accepted_units(self, channel: str) -> tuple[str, ...]:
-        """SI units in which a log may hold a channel; the first is what a scaled raw value becomes."""
+        """Return the SI units in which a log may contain a channel; the first is that of a scaled raw value."""
         quantity = channel.removeprefix("reference_")
         if channel == "force":
             return ("N",)
@@ -113,10 +113,10 @@ class JointMachine:
         return (motor,) if motor == load else (motor, load)
 
     def referred_to_load(self, recording: Recording, speed_low_pass: float = 50.0) -> Recording:
-        """A recording as logged -> the same with every channel on the load side (apply it once).
+        """Return a recording as logged with every channel on the load side (apply it once).
 
-        A missing speed is derived causally from the position, and (but for robots, whose pose must be measured) a
-        missing position from the speed, a missing reference position from the reference speed. A finding says so.
+        A missing speed is derived causally from the position, and (except for robots, whose pose must be measured) a
+        missing position from the speed, a missing reference position from the reference speed. A finding reports it.
         """
         channels = {name: self._referred(name, series) for name, series in recording.channels.items()}
         findings = list(recording.findings)
@@ -142,16 +142,16 @@ class JointMachine:
         return Series(travel.time, travel.values + start, travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
-        """(n, J), `force` changed in place: what else acts on a joint, less its friction and constant force.
+        """Return `force` (n, J), changed in place, minus friction and constant force of each joint.
 
-        Viscous friction acts on `velocity`. Dry friction is Coulomb tanh(slope v) where a slope is given [s/m, s/rad];
-        else it is sign(v) Coulomb, and below the stick speed it balances the force as far as it reaches, so that a
+        Viscous friction acts on `velocity`. Dry friction is Coulomb tanh(slope v) if a slope is given [s/m, s/rad];
+        else it is sign(v) Coulomb, and below the stick speed it balances the force up to its magnitude, so that a
         resting machine under static torque leaves no residual.
         """
         for j in range(len(self.joints)):
             ratio = self.transmission_ratio[j]
             column = force[:, j]
-            # In place: on long logs the time goes into fresh memory, not into arithmetic.
+            # In place: on long logs allocating memory takes longer than the arithmetic.
             if self.viscous_friction[j]:
                 column -= velocity[:, j] * (self.viscous_friction[j] / ratio**2)
             if self.constant_force[j]:
@@ -166,11 +166,11 @@ class JointMachine:
         return force
 
     def friction(self, speed: FloatArray) -> FloatArray:
-        """(n, J): viscous, dry and constant friction while moving [N, N m]; at rest the constant force alone."""
+        """Return viscous, dry and constant friction in motion (n, J) [N, N m]; at rest only the constant force."""
         return -self.minus_friction(np.zeros_like(speed), speed, speed)
 
     def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:
-        """v (tau - friction) of each joint (n, J) [W]."""
+        """Return v (tau - friction) of each joint (n, J) [W]."""
         power = self.minus_friction(torque.copy(), speed, speed)
         power *= speed
         return power
@@ -182,7 +182,7 @@ class JointMachine:
             return series
         ratio, offset = np.array(self.transmission_ratio), np.array(self.position_offset)
         values = series.values
-        # In motor coordinates a log may still hold some channels on the load side already.
+        # In motor coordinates a log may still contain some channels on the load side.
         if self.coordinates == "motor" and series.unit == _MOTOR_UNITS[quantity]:
             values = values / ratio if quantity == "torque" else values * ratio
         if quantity == "position" and offset.any():

@@ -59,7 +59,7 @@ class TreeLink:
 class KinematicTree:
     """Joints with parents before children, links, `order` of the columns by name, gravity in the base's axes [m/s2].
 
-    Raises ConfigurationError where `order` does not name every joint once, or a child comes before its parent.
+    Raises ConfigurationError if `order` does not name every joint once, or a child comes before its parent.
     """
 
     joints: tuple[TreeJoint, ...]
@@ -78,10 +78,10 @@ class KinematicTree:
                 raise ConfigurationError(f"joint '{joint.name}' comes before its parent", "parents come first")
 
     def momentum_terms(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Momentum p = M qd, velocity force C^T qd = dT/dq and gravity torque g = dU/dq, (n, J) each.
+        """Return momentum p = M qd, velocity force C^T qd = dT/dq and gravity torque g = dU/dq, (n, J) each.
 
-        What a momentum observer needs: dp/dt = tau + C^T qd - g - tau_c (thesis 2.16, corrected). Neither M nor C is
-        formed: one sweep out, one back. Raises UsageError where shapes do not fit.
+        For a momentum observer: dp/dt = tau + C^T qd - g - tau_c (thesis 2.17, beta = g - C^T qd). Neither M nor C is
+        formed: one sweep out, one back. Raises UsageError if shapes do not fit.
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
         terms = np.empty_like(position), np.empty_like(position), np.empty_like(position)
@@ -89,9 +89,9 @@ class KinematicTree:
         return terms
 
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Kinetic energy T = qd^T M qd / 2, drives included, and potential energy U, (n,) each [J].
+        """Return kinetic energy T = qd^T M qd / 2, drives included, and potential energy U, (n,) each [J].
 
-        U = -sum m c.g_vec over all moving masses, 0 where they are in the base's origin. Raises UsageError where shapes
+        U = -sum m c.g_vec over all moving masses, 0 if they are at the base's origin. Raises UsageError if shapes
         do not fit.
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
@@ -100,13 +100,13 @@ class KinematicTree:
         return kinetic, potential
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
-        """M(q) x for one vector x a sample, (n, J); M is not formed. Raises UsageError where shapes do not fit."""
+        """Return M(q) x (n, J) for a vector x per sample, without M; raises UsageError if shapes do not fit."""
         return self.momentum_terms(position, vector)[0]
 
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """M qdd + C qd + g, (n, J): torques of the motion without friction and contact, drives included.
+        """Return M qdd + C qd + g, (n, J): torques of the motion without friction and contact, drives included.
 
-        Recursive Newton-Euler. Raises UsageError where shapes do not fit.
+        Recursive Newton-Euler. Raises UsageError if shapes do not fit.
         """
         position, speed = self._table("position", position), self._table("speed", speed, position)
         acceleration, torque = self._table("acceleration", acceleration, position), np.empty_like(position)
@@ -114,7 +114,7 @@ class KinematicTree:
         return torque
 
     def inertia_matrix(self, position: FloatArray) -> FloatArray:
-        """M(q), (n, J, J), drive inertias on its diagonal. Raises UsageError where shapes do not fit."""
+        """Return M(q), (n, J, J), drive inertias on its diagonal. Raises UsageError if shapes do not fit."""
         position = self._table("position", position)
         matrix = np.empty((*position.shape, len(self.joints)))
         for column in range(len(self.joints)):
@@ -124,10 +124,10 @@ class KinematicTree:
         return matrix
 
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
-        """J_c (n, 6, J): linear, then angular velocity of a point of a link for each joint's speed, base axes (2.2).
+        """Return J_c (n, 6, J): linear, then angular velocity of a point of a link per joint speed, base axes (2.2).
 
         `point` is fixed to the link and given in its frame [m]. A contact force and torque F_c load the joints with
-        tau_c = J_c^T F_c (2.5). Raises ConfigurationError for a link that is not there, UsageError where shapes do not
+        tau_c = J_c^T F_c (2.5). Raises ConfigurationError for an unknown link, UsageError if shapes do not
         fit.
         """
         position = self._table("position", position)
@@ -149,7 +149,7 @@ class KinematicTree:
 
     @cached_property
     def _bodies(self) -> FloatArray:
-        """The kernels' constants, one row a joint."""
+        """Return the kernels' constants, one row per joint."""
         moved = [joint.mass for joint in self.joints]
         for index in range(len(moved) - 1, -1, -1):
             if self.joints[index].parent >= 0:
@@ -168,7 +168,7 @@ class KinematicTree:
 
     @cached_property
     def _route(self) -> rows.IndexArray:
-        """The kernels' way through the tree: slot 0 is the base, a joint's own slot follows the one before it."""
+        """Return the kernels' path through the tree: slot 0 is the base, a joint's slot follows the one before it."""
         table = np.empty((len(self.joints), rows.STEPS), dtype=np.int64)
         own: list[int] = []
         last = 0
@@ -187,7 +187,7 @@ class KinematicTree:
         return np.array(self.gravity, dtype=np.float64)
 
     def _table(self, name: str, values: FloatArray, like: FloatArray | None = None) -> FloatArray:
-        """(n, J) as the kernels read it; they do not check bounds, so it is done here."""
+        """Return a table (n, J) as the kernels read it, after checking its shape: they do not check bounds."""
         table = np.ascontiguousarray(values, dtype=np.float64)
         samples = len(table) if like is None and table.ndim else len(like) if like is not None else 0
         if table.shape != (samples, len(self.joints)):

@@ -13,8 +13,8 @@ from cdtool.machines.joint_machine import LINEAR_UNITS
 class LinearAxis(Axis):
     """Axes that slide: gate, door, ball screw, gantry; several of them move independently.
 
-    Motor inertia [kg m2], load mass [kg], ratio [m/rad], friction at the motor [N m s/rad, N m]; load side N, m.
-    With coordinates = "load" friction is given at the load [N s/m, N].
+    Motor inertia [kg m2], load mass [kg], ratio [m/rad], friction at the motor [N m s/rad, N m]; load side N, m. With
+    coordinates = "load" friction is given at the load [N s/m, N].
     """
 
     inertia_key: ClassVar[str] = "load_mass"

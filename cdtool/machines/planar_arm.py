@@ -28,7 +28,7 @@ class PlanarArm(CoupledMachine):
 
     with M11 = J1 + m1 lG1^2 + m2 l1^2 + Ja1/n1^2, M22 = J2 + m2 lG2^2 + Ja2/n2^2, h = m2 l1 lG2, g1 = (m2 l1 + m1 lG1)
     g, g2 = m2 lG2 g and T_i = tau_mi / n_i. An inertial sensor on link i at `imu_position` measures the specific force
-    across the link: it becomes the link's angular acceleration, gravity and the elbow's acceleration taken off.
+    across the link: it becomes the link's angular acceleration after subtracting gravity and the elbow's acceleration.
     """
 
     link_mass: tuple[float, ...]
@@ -42,7 +42,7 @@ class PlanarArm(CoupledMachine):
 
     @classmethod
     def from_table(cls, table: Table) -> PlanarArm:
-        """Build from the [machine] table; raises ConfigurationError naming the key."""
+        """Return the machine of the [machine] table; raises ConfigurationError naming the key."""
         keys = cls.drive_keys(table, cls.link_names)
         if len(keys["joints"]) != _LINKS:
             raise table.fault("joints", f"names {len(keys['joints'])} joints", "a planar arm has 2: arm and forearm")
@@ -129,7 +129,7 @@ class PlanarArm(CoupledMachine):
     def joint_equations(
         self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray
     ) -> list[JointEquation]:
-        """One equation a link (thesis 6.33, 6.37): what hangs on its own angle stays for the filter."""
+        """Return one equation per link (thesis 6.33, 6.37); the terms of its own angle are left to the filter."""
         force = self.minus_friction(torque.copy(), speed, np.zeros_like(speed))
         equations = []
         for own, other in ((0, 1), (1, 0)):
@@ -141,14 +141,14 @@ class PlanarArm(CoupledMachine):
         return equations
 
     def accepted_units(self, channel: str) -> tuple[str, ...]:
-        """As for every machine; an acceleration may be the sensors' [m/s2] or the links' own [rad/s2]."""
+        """Return the units; an acceleration may be that of the sensors [m/s2] or of the links [rad/s2]."""
         units = super().accepted_units(channel)
         return ("m/s2", *units) if channel == "acceleration" else units
 
     def referred_to_load(self, recording: Recording, speed_low_pass: float = 50.0) -> Recording:
-        """Every channel on the load side; the sensors' specific forces become angular accelerations of the links.
+        """Return every channel on the load side; specific forces become angular accelerations of the links.
 
-        Raises RecordingError where that needs a position or speed that the log lacks.
+        Raises RecordingError if a position or speed needed for that is not in the log.
         """
         referred = super().referred_to_load(recording, speed_low_pass)
         if "acceleration" not in referred or referred["acceleration"].unit == "rad/s2":

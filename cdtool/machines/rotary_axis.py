@@ -1,4 +1,4 @@
-"""A rotary axis: hinged door, barrier, turntable, or the joints of a robot of which no coupled model is known."""
+"""A rotary axis: hinged door, barrier, turntable, or the joints of a robot without a known coupled model."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cdtool.machines.axis import Axis
 class RotaryAxis(Axis):
     """Axes that turn: hinged door, barrier, turntable; several of them move independently.
 
-    Motor and load inertia [kg m2], ratio [rad/rad], friction at the motor [N m s/rad, N m]; load side N m, rad.
-    Its joints are taken as uncoupled: on a robot only detectors without a model (pure_torque) are meaningful.
+    Motor and load inertia [kg m2], ratio [rad/rad], friction at the motor [N m s/rad, N m]; load side N m, rad. The
+    joints are treated as uncoupled: on a robot only detectors without a model (pure_torque) are meaningful.
     """
 
     inertia_key: ClassVar[str] = "load_inertia"

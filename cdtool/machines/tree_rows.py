@@ -1,13 +1,13 @@
-"""How the sweeps over a kinematic tree lay out their work: blocks of samples, the sample index innermost.
+"""How the sweeps over a kinematic tree arrange their data: blocks of samples, the sample index innermost.
 
 Conventions: every joint turns about, or slides along, the z axis of its own frame; parents come before children. Twist
 (w, v of the frame's origin), momentum (l linear, k angular about the origin), force and torque (f, n) and first moment
 s of the mass are in the joint's own frame. E turns a vector of the parent's frame into the joint's, R one of the
-joint's frame at position 0 into the parent's, t is the joint's place in its parent. A block is BLOCK samples; a row
-holds one component for all samples of the block, so that one instruction handles several samples. What stands in
-the rows beyond the end of a recording is computed with and never given out.
+joint's frame at position 0 into the parent's, t is the joint's position in its parent. A block is BLOCK samples; a row
+holds one component for all samples of the block, so that one instruction handles several samples. The content of the
+rows beyond the end of a recording is computed with, but never returned.
 
-Each joint has a slot of rows; the slot before it (the two make a pair) holds its parent's motion and gathers its
+Each joint has a slot of rows; the slot before it (the two make a pair) holds its parent's motion and accumulates its
 parent's load. Where the parent's own slot is not the one before, that slot is a copy. So all distances between rows are
 known at compile time, and the compiler sees that rows do not overlap: without that it does not vectorise.
 """
@@ -33,10 +33,10 @@ L, K, S = 17 * BLOCK, 20 * BLOCK, 23 * BLOCK
 TERMS = 26 * BLOCK
 SLOT = 29 * BLOCK
 
-# Columns of the constants (one row a joint): R and R' t of its placement, own and moved mass, s, upper triangle of I.
+# Columns of the constants (one row per joint): R and R' t of its placement, own and moved mass, s, upper triangle of I.
 ROTATION, TRANSLATION, MASS, MOMENT, INERTIA, DRIVE, SLIDES, MOVED_MASS, CONSTANTS = 0, 9, 12, 13, 16, 22, 23, 24, 25
 
-# Columns of the route (one row a joint): the recording's column, the slot before its own, whose copy it is (-1: none).
+# Columns of the route (one row per joint): the recording's column, the slot before its own, its original (-1: none).
 COLUMN, BEFORE, COPY_OF, STEPS = 0, 1, 2, 3
 
 ROW = "Array(float64, 1, 'C')"

@@ -1,7 +1,7 @@
 """URDF -> KinematicTree. pinocchio reads it (extra cdtool[urdf]): kinematics and inertias, never meshes.
 
 Conventions: each joint's frame is turned so that its axis is z; link frames keep the URDF's axes. Locked joints become
-fixed ones. What is wrong in a file is a ConfigurationError on one line that names file, joint or link.
+fixed ones. An error in a file is a ConfigurationError on one line that names file, joint or link.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from cdtool.recording import FloatArray
 _STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 _MOVING = ("revolute", "continuous", "prismatic")
 _MOST_TAGS, _MOST_ATTRIBUTES = 100_000, 200_000
-# A chain of links is walked by recursion in the library that reads it.
+# The library that reads a chain of links does so by recursion.
 _MOST_JOINTS = 1000
-# How many numbers an attribute has; of those that are not named here, one.
+# The number of values of an attribute; one if it is not named here.
 _COUNTS = {"xyz": 3, "rpy": 3, "rgba": 4, "size": 3, "scale": 3}
 
 
@@ -39,15 +39,15 @@ def read_urdf(
     drive_inertia: Sequence[float] = (),
     gravity: tuple[float, float, float] = _STANDARD_GRAVITY,
 ) -> KinematicTree:
-    """The tree of the moving joints of a URDF, columns in the order of `joints`.
+    """Return the tree of the moving joints of a URDF, columns in the order of `joints`.
 
     Every revolute, continuous or prismatic joint is either in `joints` or frozen at a value of `locked` [rad or m]; one
-    that mimics another counts as a joint of its own. `drive_inertia` [kg m2 or kg], on the load side, one a joint of
+    that mimics another counts as a joint of its own. `drive_inertia` [kg m2 or kg], on the load side, one for each of
     `joints`, () for none. `gravity` [m/s2] is in the axes of the root link. Raises ConfigurationError.
     """
     _check_urdf(path, joints, locked)
     if drive_inertia and len(drive_inertia) != len(joints):
-        raise ConfigurationError(f"{len(drive_inertia)} values of drive_inertia, {len(joints)} joints", "one a joint")
+        raise ConfigurationError(f"{len(drive_inertia)} values of drive_inertia, {len(joints)} joints", "one per joint")
     drives = dict(zip(joints, drive_inertia or (0.0,) * len(joints), strict=True))
     pinocchio = _pinocchio(path)
     model = _reduced(pinocchio, _build(pinocchio, path), locked)
@@ -83,7 +83,7 @@ def _build(pinocchio: Any, path: Path) -> Any:
 
 @contextmanager
 def _error_stream() -> Iterator[Callable[[], str]]:
-    """What C++ code writes to the error stream, kept from the terminal: the reason for a fault is there only."""
+    """Capture what C++ code writes to the error stream: the reason for an error is only there."""
     with tempfile.TemporaryFile() as kept:
         terminal = os.dup(2)
         os.dup2(kept.fileno(), 2)
@@ -100,7 +100,7 @@ def _error_stream() -> Iterator[Callable[[], str]]:
 
 
 def _reduced(pinocchio: Any, model: Any, locked: Mapping[str, float]) -> Any:
-    """The model with its locked joints fixed."""
+    """Return the model with its locked joints fixed."""
     configuration = pinocchio.neutral(model)
     for name, value in locked.items():
         index = model.getJointId(name)
@@ -112,7 +112,7 @@ def _reduced(pinocchio: Any, model: Any, locked: Mapping[str, float]) -> Any:
 
 
 def _axis(model: Any, index: int) -> tuple[bool, FloatArray]:
-    """Whether a joint slides, and its axis in its frame: the motion subspace is (linear, angular)."""
+    """Return whether a joint slides, and its axis in its frame: the motion subspace is (linear, angular)."""
     joint = model.joints[index]
     data = joint.createData()
     joint.calc(data, np.array([1.0, 0.0])[: joint.nq])
@@ -122,7 +122,7 @@ def _axis(model: Any, index: int) -> tuple[bool, FloatArray]:
 
 
 def _z_along(found: tuple[bool, FloatArray]) -> tuple[bool, FloatArray]:
-    """Whether it slides, and the rotation that takes z to the axis, exact for an axis of the frame."""
+    """Return whether it slides, and the rotation that turns z to the axis, exact for an axis of the frame."""
     slides, axis = found
     axis = axis / np.linalg.norm(axis)
     y = np.cross(axis, (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0))
@@ -159,7 +159,7 @@ def _links(pinocchio: Any, model: Any, frames: Sequence[tuple[bool, FloatArray]]
 
 
 def _check_inertia(path: Path, tree: KinematicTree) -> None:
-    """M at position 0 must be positive definite; single links may be unphysical, as identified ones often are."""
+    """Check that M at position 0 is positive definite; single links may be unphysical, as identified ones often are."""
     matrix = tree.inertia_matrix(np.zeros((1, len(tree.order))))[0]
     for name, inertia in zip(tree.order, np.diag(matrix), strict=True):
         if not inertia > 0.0:
@@ -181,13 +181,13 @@ def _floats(values: FloatArray) -> tuple[float, ...]:
 
 
 def _check_urdf(path: Path, joints: Sequence[str], locked: Mapping[str, float]) -> None:
-    """Raises ConfigurationError unless numbers and types hold and each moving joint is logged or locked, once."""
+    """Raise ConfigurationError unless numbers and types are valid and each moving joint is logged or locked, once."""
     _check_names(path, _movable(path, _parse(path)), joints, locked)
 
 
 def _parse(path: Path) -> ElementTree.Element:
     content = read_bytes(path, ConfigurationError, hint="a URDF file is needed", missing="check the path of the URDF")
-    # Of each element, attribute and level a parser makes far more than the few bytes that they take here.
+    # For each element, attribute and level a parser needs far more memory than the few bytes that they have here.
     if (
         content.count(b"<") > _MOST_TAGS
         or content.count(b"=") > _MOST_ATTRIBUTES
@@ -213,7 +213,7 @@ def _parse(path: Path) -> ElementTree.Element:
 
 
 def _movable(path: Path, root: ElementTree.Element) -> dict[str, str]:
-    """Types of the moving joints by name, after a check of every number and type that is used."""
+    """Return the types of the moving joints by name, after a check of every number and type that is used."""
     for link in root.findall("link"):
         who = f"{path}: link '{link.get('name')}'"
         for item in link.findall("inertial//*"):

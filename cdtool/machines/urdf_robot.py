@@ -23,7 +23,7 @@ _MIXED_UNITS = dict.fromkeys(ROTARY_UNITS, "SI")
 
 @dataclass(frozen=True)
 class UrdfRobot(CoupledMachine):
-    """Any serial robot by its URDF; drive inertias, ratios and friction of its joints from the machine file.
+    """Any serial robot, by its URDF; drive inertias, ratios and friction of its joints from the machine file.
 
     M, C and g from the URDF's links, and on the diagonal of M the drives: `drive_inertia` + motor_inertia / r^2. Logs
     hold the joints' own torque, angle and speed (coordinates = "load"), or the motors', referred by transmission_ratio;
@@ -38,8 +38,8 @@ class UrdfRobot(CoupledMachine):
 
     @classmethod
     def from_table(cls, table: Table) -> UrdfRobot:
-        """Build from the [machine] table and the URDF that it names; raises ConfigurationError naming key or joint."""
-        table.texts("joints")  # a robot's joints have to be named
+        """Return the machine of the [machine] table and its URDF; raises ConfigurationError naming key or joint."""
+        table.texts("joints")  # the joints of a robot must be named
         keys = cls.drive_keys(table)
         count = len(keys["joints"])
         drives = np.array(table.numbers("drive_inertia", count, 0.0, minimum=0.0))
@@ -88,7 +88,7 @@ class UrdfRobot(CoupledMachine):
 
 
 def _urdf_names(table: Table, joints: tuple[str, ...]) -> list[str]:
-    """The URDF's name of each joint of the log: by joint_map, else the same."""
+    """Return the URDF's name of each joint of the log: by joint_map, else the same."""
     part = table.table("joint_map")
     renamed: Mapping[str, Any] = part.values
     for name in renamed:
@@ -103,7 +103,7 @@ def _values(table: Table, key: str) -> dict[str, float]:
 
 
 def _gravity(table: Table) -> tuple[float, float, float]:
-    """Along -z of the base where a number is given; a vector where the base is mounted otherwise."""
+    """Return gravity along -z of the base for a number; a vector if the base is mounted in another way."""
     if isinstance(table.raw("gravity"), list):
         x, y, z = table.numbers("gravity", 3)
         return x, y, z

@@ -30,15 +30,12 @@ class Decoders:
 
     def of(self, stream: Stream, batch: Batch) -> Decoder | None:
         """The decoder of a channel; None, and its messages counted, where there is none."""
-        number = stream.channel.id
-        if number not in self._made:
-            schema = stream.schema
-            described = (schema.encoding, schema.name, schema.data) if schema is not None else ("", "", b"")
+        if stream.id not in self._made:
             try:
-                self._made[number] = decoder_for(stream.channel.message_encoding, *described)
+                self._made[stream.id] = decoder_for(stream.encoding, *stream.definition)
             except UndecodableError as fault:
-                self._made[number] = fault
-        made = self._made[number]
+                self._made[stream.id] = fault
+        made = self._made[stream.id]
         if isinstance(made, UndecodableError):
             self._fail(len(batch), str(made))
             return None
@@ -70,7 +67,7 @@ class Decoders:
 
     def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
         """What only the wanted places show: a channel's messages cannot be decoded; they are counted."""
-        self._made[stream.channel.id] = fault
+        self._made[stream.id] = fault
         self._fail(len(batch), str(fault))
 
     def keep(self, gathered: Gathered) -> npt.NDArray[np.bool_]:

@@ -43,7 +43,7 @@ class Field:
         """True for a whole array."""
         return any(index == ":" for _, index in self.steps)
 
-    def of(self, message: Any, joints: Sequence[str] = ()) -> Value:  # noqa: C901  one branch for each kind of index
+    def of(self, message: Any, joints: Sequence[str] = ()) -> Value:
         """Its value in one message; raises FieldMissingError."""
         value = message
         for name, index in self.steps:
@@ -54,30 +54,37 @@ class Field:
             if not _is_array(value):
                 raise FieldMissingError(f"'{name}' is not an array", [name])
             if index == ":":
-                numbers = [_number(item, self.text) for item in value]
-                order = order_of(len(numbers), _element_names(parent), joints)
-                return numbers if order is None else [numbers[place] for place in order]
-            if is_element_number(index):
-                if len(value) == 0:
-                    return math.nan
-                if int(index) >= len(value):
-                    raise FieldMissingError(
-                        f"'{name}' has {len(value)} elements", [f"{name}[0] to {name}[{len(value) - 1}]"]
-                    )
-                value = value[int(index)]
-                continue
-            if not _is_array(_member(parent, "name")):
-                raise FieldMissingError("'name' is not an array", ["name"])
-            names = _element_names(parent)
-            if index not in names:
+                return self._in_order(value, _element_names(parent), joints)
+            place = _place_of(index, name, value, parent)
+            if place is None:
                 return None
-            place = names.index(index)
             if place >= len(value):
                 return math.nan
             value = value[place]
         if _is_array(value):
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
         return _number(value, self.text)
+
+    def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> list[float]:
+        """Return a whole array's numbers, by their names in the order of the joints."""
+        numbers = [_number(item, self.text) for item in array]
+        order = order_of(len(numbers), names, joints)
+        return numbers if order is None else [numbers[place] for place in order]
+
+
+def _place_of(index: str, name: str, array: Any, parent: Any) -> int | None:
+    """Return which element of an array an index takes, by number or by name; None where no element has that name.
+
+    Elements beyond the end of an empty array, or of one with more names than numbers, are NaN.
+    """
+    if is_element_number(index):
+        if 0 < len(array) <= int(index):
+            raise FieldMissingError(f"'{name}' has {len(array)} elements", [f"{name}[0] to {name}[{len(array) - 1}]"])
+        return int(index)
+    if not _is_array(_member(parent, "name")):
+        raise FieldMissingError("'name' is not an array", ["name"])
+    names = _element_names(parent)
+    return names.index(index) if index in names else None
 
 
 def is_element_number(index: str) -> bool:

@@ -1,132 +1,157 @@
-"""The wanted fields of one topic, gathered batch by batch into columns."""
+"""The wanted fields of a topic, gathered batch by batch into columns.
+
+Arrays grow by batches, without a copy where their length was expected; others may write rows of their own into them.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.columns import Column
-from cdtool.errors import RecordingError
-from cdtool.large_integers import rounded_integers
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns import Picked
-from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS
-from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import Field, FieldMissingError, missing
-from cdtool.messages.rows import Rows
-from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.messages.stream import Stream
-from cdtool.messages.taken import Bound, Destination, Numbers, Part
-from cdtool.plain_text import counted
+from cdtool.messages.taken import Bound, Destination, Part
+from cdtool.messages.topic import Topic, Values, in_order
 from cdtool.recording import Finding, FloatArray
 
-
-class _Field:
-    """One field's values of all decoded messages; `elsewhere` marks those that name other joints only."""
-
-    def __init__(self, field: Field, expected: int) -> None:
-        self.field = field
-        self.rows = Rows(expected)
-        self.elsewhere: Rows | None = None
-        self.widths: Counter[int] = Counter()
-        self.names: list[str] = []
-        self.exact = False  # its numbers' type is one that float64 holds
-
-    def add(self, picked: Picked, whole: npt.NDArray[np.bool_], all_whole: bool) -> None:
-        if picked.alike and all_whole and self.elsewhere is None:
-            if picked.count is not None:
-                self._count(Counter({picked.values.shape[1]: len(picked.values)}))
-            self.rows.append(picked.values)
-            return
-        values, count, state = picked.values, picked.count, picked.state
-        if not all_whole:
-            values, count, state = values[whole], None if count is None else count[whole], state[whole]
-        other = state == OTHER_JOINTS
-        if self.elsewhere is None and other.any():
-            self.elsewhere = Rows(0, np.bool_)
-            self.elsewhere.append(np.zeros(self.rows.count, np.bool_))
-        if self.elsewhere is not None:
-            self.elsewhere.append(other)
-            count = None if count is None else count[~other]
-        if count is not None:
-            self._count(tally(count))
-        self.rows.append(values)
-
-    def share(self, numbers: Numbers) -> FloatArray | None:
-        """The column, for more messages that all have these numbers; None where others came before."""
-        table = self.rows.share(() if numbers.single else (len(numbers.at),))
-        self.exact = numbers.dtype not in ("i8", "u8")
-        return None if self.elsewhere is not None else table
-
-    def confirm(self, table: FloatArray, rows: slice) -> None:
-        """More messages, which stand in these rows of a column that was shared."""
-        count = rows.stop - rows.start
-        if self.elsewhere is not None:
-            self.elsewhere.append(np.zeros(count, np.bool_))
-        if table.ndim > 1:
-            self._count(Counter({table.shape[1]: count}))
-        self.rows.confirm(table, rows)
-
-    def _count(self, found: Counter[int]) -> None:
-        if not self.widths.keys() - {0} and (widths := found.keys() - {0}):
-            self.rows.widen(next(width for width in found if width in widths))
-        self.widths.update(found)
+# An expected length is no more than a hint: this much is reserved at most [bytes].
+_MOST_RESERVED = 1 << 28
+# How often an array that others write into is replaced: each time it is copied.
+_MOST_REPLACED = 16
 
 
-class Gathering:
-    """The fields that are wanted of a topic; `where` begins its errors, `joints` order whole arrays by their names.
+class Rows:
+    """(n,) or (n, k) values; what does not fit the first batch's k is NaN.
 
-    `expected` messages are foretold.
+    Others may write into rows behind the last one, each into rows of their own: `share` gives them the array,
+    `confirm` tells that some are there. As nobody knows who is still writing, what is appended otherwise goes into a
+    copy of it from then on.
     """
 
-    def __init__(
-        self, where: str, topic: str, fields: Sequence[Field], clock: str, joints: Sequence[str], expected: int = 0
-    ) -> None:
-        self.where, self.topic = where, topic
-        self.clock, self.joints = clock, joints
-        self.decoders = Decoders()
-        self._fields = [_Field(field, expected) for field in fields]
-        self._wanted = list(fields)
-        # A header's stamp may lie before 1970.
-        self._stamps = Rows(expected, np.int64 if clock == "header" else np.uint64)
-        self.orders = StampOrders(topic)
-        self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
+    def __init__(self, expected: int, dtype: npt.DTypeLike = np.float64) -> None:
+        self._expected = expected
+        self._table: npt.NDArray[Any] | None = None
+        self._dtype = dtype
+        self._shared = False
+        self._replaced = 0
+        self.count = 0
+
+    def append(self, values: npt.NDArray[Any]) -> None:
+        """Add a batch's rows."""
+        if self._table is None:
+            width = int(np.prod(values.shape[1:])) * values.itemsize  # bytes of a row
+            rows = min(self._expected, _MOST_RESERVED // max(1, width))
+            self._table = np.empty((rows, *values.shape[1:]), self._dtype)
+        end = self.count + len(values)
+        if end > len(self._table) or self._shared:
+            rows = max(end, 2 * len(self._table)) if end > len(self._table) else len(self._table)
+            grown = np.empty((rows, *self._table.shape[1:]), self._dtype)
+            grown[: self.count] = self._table[: self.count]
+            self._replaced += self._shared
+            self._table, self._shared = grown, False
+        fits = values.shape[1:] == self._table.shape[1:]
+        self._table[self.count : end] = values if fits else np.nan
+        self.count = end
+
+    def share(self, shape: tuple[int, ...]) -> npt.NDArray[Any] | None:
+        """The array, so that others write rows of this shape into it; None where it has none of them."""
+        if self._table is None or self._table.shape[1:] != shape or self._replaced > _MOST_REPLACED:
+            return None
+        self._shared = True
+        return self._table
+
+    def confirm(self, table: npt.NDArray[Any], rows: slice) -> None:
+        """Add these rows of an array that was shared, at some time."""
+        present = self._table
+        if present is None or rows.start != self.count or rows.stop > len(present):
+            self.append(table[rows])
+            return
+        if table is not present:  # of the present one nobody else has these rows
+            present[rows] = table[rows]
+        self.count = int(rows.stop)
+
+    def widen(self, width: int) -> None:
+        """Give rows that were all empty so far their width."""
+        if self._table is not None and self._table.shape[1:] != (width,):
+            self._table = np.full((len(self._table), width), np.nan)
 
     @property
-    def first_stamp(self) -> int | None:
-        """Time [ns] of the first message, by the chosen clock."""
-        return int(self._stamps.values[0]) if self._stamps.count else None
+    def values(self) -> npt.NDArray[Any]:
+        """All rows so far."""
+        return self._table[: self.count] if self._table is not None else np.empty(0, self._dtype)
+
+
+class _FieldRows:
+    """One field's values of all decoded messages; `elsewhere` marks those that name other joints only."""
+
+    def __init__(self, expected: int) -> None:
+        self.rows = Rows(expected)
+        self.elsewhere: Rows | None = None
+        self.exact = False  # its numbers' type is one that float64 holds
+
+    def append(self, count: int, values: Values, width: int | None) -> None:
+        """Add a batch's rows, whose arrays have this width; None: all so far are empty."""
+        rows, other = values
+        if width is not None:
+            self.rows.widen(width)
+        self.rows.append(np.full((count, 1), np.nan) if rows is None else rows)
+        if other is not None and self.elsewhere is None:
+            self.elsewhere = Rows(0, np.bool_)
+            self.elsewhere.append(np.zeros(self.rows.count - count, np.bool_))
+        self.mark(count, other)
+
+    def mark(self, count: int, other: npt.NDArray[np.bool_] | None = None) -> None:
+        """Add which of the next rows name other joints only; None: none of them does."""
+        if self.elsewhere is not None:
+            self.elsewhere.append(np.zeros(count, np.bool_) if other is None else other)
+
+
+class Gathering(Topic):
+    """A topic whose rows are kept in memory; `expected` is how many messages of a topic there will be, as a hint."""
+
+    def __init__(
+        self,
+        path: Path,
+        topic: str,
+        texts: Iterable[str],
+        clock: str,
+        joints: Sequence[str],
+        expected: Callable[[str], int] = lambda _: 0,
+    ) -> None:
+        super().__init__(path, topic, texts, clock, joints)
+        self._rows = {text: _FieldRows(expected(topic)) for text in self.fields}
+        # A header's stamp may lie before 1970.
+        self._stamps = Rows(expected(topic), np.int64 if self.clock == "header" else np.uint64)
+        self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     def add(self, stream: Stream, batch: Batch) -> None:
         """Take a batch; raises RecordingError where a field or the header's stamp is not there."""
-        found = self.decoders.gather(self.where, stream, batch, self._wanted, self.joints, self.clock)
-        if found is None:
-            return
-        decoder, gathered, stamps = found
-        whole = self.decoders.keep(gathered)
-        all_whole = bool(whole.all())
-        stamps = stamps if all_whole else stamps[whole]
-        self._stamps.append(stamps)
-        self.orders.add(stream.channel.id, stamps)
-        for field, picked in zip(self._fields, gathered.picked, strict=True):
-            if picked.fault is not None and bool(np.any(whole & (picked.state == ABSENT))):
-                raise missing(self.where, field.field.text, picked.fault)
-            field.add(picked, whole, all_whole)
-            if field.elsewhere is not None and not field.names:
-                field.names = decoder.names(batch, field.field)
+        taken = self.take(stream, batch)
+        if taken is not None:
+            stamps, values = taken
+            self._stamps.append(stamps)
+            for text, rows in self._rows.items():
+                rows.append(len(stamps), values[text], self.fields[text].width)
 
     def bound(self, channel: int) -> Bound:
-        """How more messages of the topic's channel (its id) become rows of these columns; None where they do not."""
-        recipe = self.decoders.recipe(channel, self._wanted, self.joints, self.clock == "header")
+        """Return how more messages of the topic's channel (its id) become rows here; None where they do not."""
+        recipe = self.decoders.recipe(channel, self.wanted, self.joints, self.clock == "header")
         if recipe is None:
             return None
-        stamps = self._stamps.share(())
-        tables = [field.share(numbers) for field, numbers in zip(self._fields, recipe.fields, strict=True)]
+        stamps, tables = self._stamps.share(()), []
+        for rows, numbers in zip(self._rows.values(), recipe.fields, strict=True):
+            tables.append(rows.rows.share(() if numbers.single else (len(numbers.at),)))
+            rows.exact = numbers.dtype not in ("i8", "u8")
         there = tuple(table for table in tables if table is not None)
-        if stamps is None or len(there) < len(tables):
+        if stamps is None or len(there) < len(tables) or any(each.elsewhere for each in self.fields.values()):
             return None
         return recipe, Destination(there, stamps, self._stamps.count)
 
@@ -135,49 +160,31 @@ class Gathering:
         for part in _joined(parts):
             self.decoders.decoded += part.count
             self._stamps.confirm(part.destination.stamps, part.rows)
-            self.orders.add(stream.channel.id, part.destination.stamps[part.rows], part.ascending)
-            for field, table in zip(self._fields, part.destination.tables, strict=True):
-                field.confirm(table, part.rows)
+            self.orders.add(stream.id, part.destination.stamps[part.rows], part.ascending)
+            for (text, rows), table in zip(self._rows.items(), part.destination.tables, strict=True):
+                self.fields[text].count(part.count, Counter(dict.fromkeys(table.shape[1:], part.count)))
+                rows.rows.confirm(table, part.rows)
+                rows.mark(part.count)
 
-    def column(self, index: int, origin: int) -> tuple[Column, list[Finding]]:
-        """The field of that number as a column, sorted by the chosen clock; raises RecordingError."""
-        field = self._fields[index]
-        text, values, time = field.field.text, field.rows.values, self._stamps.values
-        name = f"{self.topic} {text}"
-        findings = []
-        there = ~field.elsewhere.values if field.elsewhere is not None else None
-        if there is not None:
-            if not there.any():
-                raise missing(self.where, text, FieldMissingError("no message names this joint", field.names))
-            left_out = len(there) - int(np.count_nonzero(there))
-            findings.append(
-                Finding(f"{counted(left_out, 'message', 'name')} other joints only: left out", name, "note")
-            )
-        empty = field.widths.pop(0, 0)
-        if len(field.widths) > 1:
-            found = ", ".join(f"{width} in {count}" for width, count in field.widths.most_common())
-            raise RecordingError(
-                f"{self.where}: the length of field '{text}' varies: {found} messages",
-                "name one element, e.g. position[0]",
-            )
-        if empty:
-            findings.append(Finding(f"{counted(empty, 'message', 'hold')} an empty array: NaN", name))
-            if not field.widths:
-                values = np.full((len(values), 1), np.nan)
-        if there is not None:
-            return column_of(name, values[there], *in_order(time[there], origin)), findings
-        if self._clock is None:
-            self._clock = in_order(time, origin)
-        return column_of(name, values, *self._clock), findings
-
-    def rounded(self, index: int) -> int:
-        """How many values of the field of that number may be integers that float64 has rounded."""
-        field = self._fields[index]
-        return 0 if field.exact else rounded_integers(field.rows.values)
+    def column(self, text: str) -> tuple[Column, list[Finding]]:
+        """Return a field as a column in the order of its times, and its findings; raises RecordingError."""
+        column, findings = super().column(text)
+        rows = self._rows[text]
+        values = rows.rows.values
+        rounded = 0 if rows.exact else rounded_integers(values)
+        if rows.elsewhere is not None:
+            there = ~rows.elsewhere.values
+            values, (time, order) = values[there], in_order(self._stamps.values[there], self.origin)
+        else:
+            if self._clock is None:
+                self._clock = in_order(self._stamps.values, self.origin)
+            time, order = self._clock
+        column = replace(column, values=values if order is None else values[order], time=time)
+        return column, [*findings, *rounding_finding(column.name, rounded)]
 
 
 def _joined(parts: Sequence[Part]) -> list[Part]:
-    """The same, those one behind the other as one."""
+    """Return the same, those one behind the other as one."""
     joined: list[Part] = []
     for part in parts:
         together = joined[-1].before(part) if joined else None
@@ -186,28 +193,3 @@ def _joined(parts: Sequence[Part]) -> list[Part]:
         else:
             joined[-1] = together
     return joined
-
-
-def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:
-    """How often each count occurs, in the order of their first ones."""
-    if len(counts) and (counts == counts[0]).all():
-        return Counter({int(counts[0]): len(counts)})
-    return Counter(counts.tolist())
-
-
-def in_order(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
-    """Times [s] after `origin` [ns] in ascending order, and the order; None where they are in order as they stand."""
-    # The difference is taken between integers: an epoch in ns has more digits than a float64. It may need all 64 bits.
-    later: npt.NDArray[np.uint64] = stamps.view(np.uint64) - np.uint64(origin % 2**64)
-    time = later / 1e9
-    if len(stamps) and (before := stamps < origin).any():
-        time[before] = -((~later[before] + np.uint64(1)) / 1e9)
-    if np.all(time[1:] >= time[:-1]):
-        return time, None
-    order = np.argsort(time, kind="stable")
-    return time[order], order
-
-
-def column_of(name: str, values: FloatArray, time: FloatArray, order: npt.NDArray[np.intp] | None) -> Column:
-    """A column in the order of its times."""
-    return Column(name, values if order is None else values[order], time)

@@ -2,56 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
 
 
-class Schema(Protocol):
-    """How the messages of a channel are laid out: a name, and a definition in an encoding such as `ros2msg`."""
+@dataclass(frozen=True)
+class Stream:
+    """A channel by its number in its log; several may write to one topic.
 
-    @property
-    def name(self) -> str:
-        """The type of the messages, such as `sensor_msgs/msg/JointState`."""
-        ...
+    `encoding` is how its messages are written, such as `cdr`; `definition` is how they are laid out: a language such as
+    `ros2msg`, the type of the messages, such as `sensor_msgs/msg/JointState`, and the text; all empty: unknown.
+    """
 
-    @property
-    def encoding(self) -> str:
-        """The language of the definition."""
-        ...
-
-    @property
-    def data(self) -> bytes:
-        """The definition."""
-        ...
-
-
-class Channel(Protocol):
-    """A stream of messages on a topic; several channels may share one topic."""
-
-    @property
-    def id(self) -> int:
-        """The channel's number in its log."""
-        ...
-
-    @property
-    def topic(self) -> str:
-        """The topic's name."""
-        ...
-
-    @property
-    def message_encoding(self) -> str:
-        """How the messages are written, such as `cdr`."""
-        ...
-
-
-class Stream(Protocol):
-    """A channel with its schema; None: there is none."""
-
-    @property
-    def channel(self) -> Channel:
-        """The channel."""
-        ...
-
-    @property
-    def schema(self) -> Schema | None:
-        """Its schema."""
-        ...
+    id: int
+    topic: str
+    encoding: str
+    definition: tuple[str, str, bytes]

@@ -16,9 +16,9 @@ from cdtool.messages.batch import Batch
 from cdtool.messages.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
-from cdtool.messages.gathering import in_order, tally
 from cdtool.messages.stamp_order import StampOrders
 from cdtool.messages.stream import Stream
+from cdtool.messages.topic import in_order, tally
 from cdtool.recording import Finding, FloatArray
 
 _LONGEST_ARRAY = 16
@@ -69,7 +69,7 @@ class TopicSurvey:
         whole = self.decoders.keep(gathered)
         self._add_stamps(batch, gathered, whole)
         stamps = batch.log_time if whole.all() else batch.log_time[whole]
-        self._orders.add(stream.channel.id, stamps)
+        self._orders.add(stream.id, stamps)
         time, order = in_order(stamps, origin)
         values: dict[str, FloatArray] = {}
         for name, picked in zip(self._fields, gathered.picked, strict=True):
@@ -112,29 +112,28 @@ class TopicSurvey:
             values = np.where(there.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
         return values
 
-    def found(self) -> Iterator[Column | Finding]:
-        """Columns without rows, arrays whose length varies, messages that cannot be decoded."""
-        yield from self.decoders.failure(self.topic)
-        yield from self._orders.findings()
+    def found(self) -> tuple[dict[str, Column], list[Finding]]:
+        """Return the columns without rows, and the findings: arrays whose length varies, undecodable messages."""
+        columns: dict[str, Column] = {}
+        findings = self.decoders.failure(self.topic) + self._orders.findings()
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"
             if len(widths) > 1:
                 text = f"arrays of {' and '.join(map(str, sorted(widths)))} elements: left out"
-                yield Finding(text, full, "note")
+                findings.append(Finding(text, full, "note"))
             elif widths:
-                yield from rounding_finding(full, self._rounded[name], "note")
-                yield Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
-        yield from self._header()
+                findings += rounding_finding(full, self._rounded[name], "note")
+                columns[full] = Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
+        return columns, findings + self._header()
 
-    def _header(self) -> Iterator[Finding]:
+    def _header(self) -> list[Finding]:
         if not self._is_late:
-            return
+            return []
         if not self._stamped:
-            yield Finding("the header's stamps are never set: use the log clock", self.topic, "note")
-            return
+            return [Finding("the header's stamps are never set: use the log clock", self.topic, "note")]
         low, median, high = (self._late.percentile(percent) for percent in (5, 50, 95))
         text = f"logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
-        yield Finding(text, self.topic, "note")
+        return [Finding(text, self.topic, "note")]
 
 
 def _parsed(name: str) -> Field | None:

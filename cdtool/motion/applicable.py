@@ -1,7 +1,8 @@
-"""Which classes of motion judge a log, sample by sample, from its speed so far and nothing later.
+"""Which classes of motion apply to a log, sample by sample, from its speed so far and nothing later.
 
-A class that fits judges. One whose speed departs goes on judging for a while, since a contact slows the axis and must
-not excuse itself. Motion that fits no class is not judged until a class fits again.
+The threshold of a class is in use while the class applies. A class that fits applies. One whose speed departs applies
+for a while longer, because a contact slows the axis and must not excuse itself. Motion that fits no class is not
+assessable until a class fits again.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from cdtool.motion.speed_course import fitting_samples
 from cdtool.motion.strokes import Stroke
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
-# A departure that begins while a class fits is judged by that class for so long [s]: the matching window.
+# How long a class still applies after a departure that began while it fitted [s]: the matching window.
 HOLD = 1.0
 # A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
 _COMPLETED = 0.05
@@ -25,7 +26,7 @@ _COMPLETED = 0.05
 
 @dataclass(frozen=True)
 class Judging:
-    """One class in one stroke: `stroke` is its number, `motion` that of the class, and where it judges (n,)."""
+    """One class in one stroke: `stroke` is its number, `motion` that of the class, and where it applies (n,)."""
 
     stroke: int
     motion: int
@@ -39,12 +40,12 @@ def judging_classes(
     clock: FloatArray,
     hold: float = HOLD,
 ) -> list[Judging]:
-    """Return where on `clock` (n,) [s] each class judges in each stroke; a class that judges nowhere is left out.
+    """Return where on `clock` (n,) [s] each class applies in each stroke; a class that applies nowhere is left out.
 
-    Until a class has begun its stroke all of them judge. Then those judge that have fitted since they began; one that
-    has departed judges for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke judges
-    the rest behind it as long. It judges again once it fits and no other class does, or has fitted for `hold`. Where no
-    speed has come for `hold`, none judges.
+    Until a class has begun its stroke all of them apply. Then those apply that have fitted since they began; one that
+    has departed applies for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke
+    applies to the rest after it for as long. It applies again once it fits and no other class does, or has fitted for
+    `hold`. Where there was no speed for `hold`, none applies.
     """
     speed = recording["speed"]
     if not len(speed):
@@ -79,7 +80,7 @@ def judging_classes(
 def speed_is_recent(
     recording: Recording, classes: Sequence[MotionClass], clock: FloatArray, hold: float = HOLD
 ) -> BoolArray:
-    """Return where on `clock` (n,) [s] the last `hold` [s] brought a speed of every joint that leads a class."""
+    """Return where on `clock` (n,) [s] the last `hold` [s] contain a speed of every joint that leads a class."""
     speed = recording["speed"]
     last = speed.time[_known(speed, classes)]
     if not len(last):
@@ -103,13 +104,13 @@ def _on_clock(
     clock: FloatArray,
     recent: BoolArray,
 ) -> list[Judging]:
-    """The decision at the last speed sample at or before each time of `clock`, where one is `recent`."""
+    """Return the decision at the last speed sample at or before each time of `clock`, where one is `recent`."""
     at = np.maximum(np.searchsorted(time, clock, side="right") - 1, 0)
     stroke_of = np.searchsorted(firsts, np.arange(len(time)), side="right") - 1
     stroke = stroke_of[at]
     found = []
     for j in range(now.shape[1]):
-        # What departed in an earlier stroke: the last one that it had begun and judged in.
+        # A class that departed in an earlier stroke: the last one that it had begun and applied to.
         held_from = np.maximum.accumulate(np.where(started[:, j], stroke_of, -1))[at]
         own = now[at, j] & recent
         held = before[at, j] & recent & (held_from >= 0) & (held_from < stroke)
@@ -134,10 +135,10 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
     now: BoolArray,
     before: BoolArray,
 ) -> None:
-    """`now`: classes that judge their current stroke; `before`: those that departed in an earlier one.
+    """Fill `now`: classes that apply to their current stroke, and `before`: those that departed in an earlier one.
 
-    Where a stroke is `fresh`, a class that fitted until `completed_by` [s] has completed the one before. A class joins
-    at its begin, unless one of the `opposed` direction has departed: a contact throws an axis back.
+    If a stroke is `fresh`, a class that fitted until `completed_by` [s] has completed the one before. A class joins
+    when it begins, unless one of the `opposed` direction has departed: a contact throws an axis back.
     """
     count = begun.shape[1]
     member = np.zeros(count, dtype=np.bool_)
@@ -185,7 +186,7 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
         any_member = False
         for j in range(count):
             if begun[k, j] and not started[j]:
-                # At its begin: it judges if it fits, beside others.
+                # At its beginning it applies if it fits, together with others.
                 started[j] = True
                 fitting_since[j] = time[k]
                 member[j] = fits[k, j] and not any_held
@@ -202,8 +203,8 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
         for j in range(count):
             any_started = any_started or (member[j] and started[j])
         for j in range(count):
-            # Once a class has begun, one that rests behind its stroke judges no more, and one that has not begun
-            # judges only while the motion may still be its own.
+            # Once a class has begun, one that rests after its stroke no longer applies, and one that has not begun
+            # applies only while the motion may still be its own.
             now[k, j] = member[j] and (started[j] or not any_started or fits[k, j])
             resting[j] = resting[j] and not any_started
             before[k, j] = held[j] or resting[j]

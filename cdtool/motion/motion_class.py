@@ -25,8 +25,8 @@ _ONE_WAY = 0.2
 class MotionClass:
     """Direction of travel (+1, -1; 0 = no motion), nominal speed [load unit/s] and the joint that leads the motion.
 
-    `course`: speed along the stroke, learned from impact-free runs; None where nothing was learned. `unit`: that of the
-    speed, for messages; empty where it is not known.
+    `course`: speed along the stroke, learned from impact-free runs; None if nothing was learned. `unit`: that of the
+    speed, for messages; empty if it is unknown.
     """
 
     direction: int
@@ -36,7 +36,7 @@ class MotionClass:
     unit: str = field(default="", compare=False)
 
     def matches(self, other: MotionClass, tolerance: float) -> bool:
-        """Same joint and direction, and speeds that differ by at most the share `tolerance`."""
+        """Whether joint and direction are equal, and the speeds differ by at most the share `tolerance`."""
         if self.joint != other.joint or self.direction != other.direction:
             return False
         return abs(self.nominal_speed - other.nominal_speed) <= tolerance * max(self.nominal_speed, other.nominal_speed)
@@ -71,18 +71,18 @@ class MotionClass:
 
 
 def motion_class(recording: Recording) -> MotionClass:
-    """Return direction, nominal speed and leading joint of a whole recording: at rest where no speed is logged.
+    """Return direction, nominal speed and leading joint of a whole recording: at rest if no speed is logged.
 
     The nominal speed is the median of the averaged speeds above 80 % of the usual one in motion, so that an overshoot
     does not count. Averaged over time, a speed that is noisy, or derived from jittering stamps, is not overestimated.
-    The reference speed decides where it is logged: an early contact does not change it. It looks at the whole
-    recording: it serves to name, never to judge.
+    The reference speed decides if it is logged: an early contact does not change it. The whole recording is used: for
+    names, never for an assessment.
     """
     return _class_by(recording, ("reference_speed", "speed"))
 
 
 def measured_class(recording: Recording) -> MotionClass:
-    """Return the same by the measured speed alone: what impact-free runs are learned by, with and without reference."""
+    """Return the class by the measured speed only: impact-free runs are learned by it, with or without a reference."""
     return _class_by(recording, ("speed",))
 
 
@@ -111,7 +111,7 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     if len(time) < 2:
         return speed
     steps = np.diff(time)
-    # The first step is unknown: taken as the second, so that the first sample counts too.
+    # The first step is unknown: the second replaces it, so that the first sample counts too.
     ends = np.concatenate(([time[0] - steps[0]], time))
     travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
     before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
@@ -134,7 +134,7 @@ def _class_of(time: FloatArray, speed: FloatArray, joint: int) -> MotionClass:
     for _ in range(2):
         fast = smooth[size >= _FAST * usual]
         usual = float(np.median(np.abs(fast)))
-    # There and back alike has the direction of its first motion: noise must not decide.
+    # Equal motion in both directions has the direction of the first: noise must not decide.
     lead = float(np.sum(fast)) if abs(float(np.sum(fast))) > _ONE_WAY * float(np.sum(np.abs(fast))) else float(fast[0])
     direction = 1 if lead > 0.0 else -1
     return MotionClass(direction, usual, joint)

@@ -1,4 +1,4 @@
-"""Where in its stroke an operation is, sample by sample and causally: time since motion start, travel, phase."""
+"""Where in its stroke an operation is, sample by sample and causally: time since the motion began, travel, phase."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ _CONFIRM = 3
 
 @dataclass(frozen=True)
 class Progress:
-    """On a signal's clock (n,): `elapsed` s since motion start, `travel` since then, `running` past acceleration.
+    """On a signal's clock (n,): `elapsed` s since the motion began, `travel` since then, `running` after acceleration.
 
-    NaN (and False) before the motion has started. Travel is a running maximum: it freezes where the axis runs backward.
+    NaN (and False) before the motion begins. Travel is a running maximum: it stays constant while the axis runs
+    backward.
     """
 
     elapsed: FloatArray
@@ -37,7 +38,7 @@ def progress(
     running_speed: float,
     joint: int,
 ) -> Progress:
-    """Progress from measured speed and position of the leading joint; everything at or before each sample."""
+    """Return the progress from measured speed and position of the leading joint, each at or before the sample."""
     speed = recording["speed"]
     forward = direction * speed.values[:, joint]
     moving = confirmed(forward >= start_speed)

@@ -1,4 +1,4 @@
-"""The speed of a class of motion along its stroke, learned from impact-free runs: what a log must run like to fit."""
+"""The speed of a class of motion along its stroke, learned from impact-free runs: what the speed of a log must fit."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class SpeedCurve:
         return self.step * max(len(self.mean) - 2, 0)
 
     def at(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean and spread (n,) at the places of `axis`; those of the first point where it is NaN."""
+        """Return mean and spread (n,) at the locations of `axis`; those of the first point where it is NaN."""
         grid = self.step * np.arange(len(self.mean))
         places = np.nan_to_num(axis)
         return np.interp(places, grid, self.mean), np.interp(places, grid, self.spread)
@@ -49,9 +49,9 @@ class SpeedCurve:
 
 @dataclass(frozen=True)
 class SpeedCourse:
-    """Speed over the time since motion start, which counts while accelerating, and over travel, which counts then.
+    """Speed over the time since the motion began, used while accelerating, and over travel, used after that.
 
-    `alignment` is the signature's: with "time" or "position" that one alone counts.
+    `alignment` is the signature's: with "time" or "position" only that one is used.
     """
 
     alignment: str
@@ -69,7 +69,7 @@ class SpeedCourse:
         return mean, spread
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the course as JSON values."""
+        """Return both curves as JSON values."""
         curves = {
             name: {"step": curve.step, "mean": curve.mean.tolist(), "spread": curve.spread.tolist()}
             for name, curve in (("by_time", self.by_time), ("by_travel", self.by_travel))
@@ -78,7 +78,7 @@ class SpeedCourse:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Return the course that `to_dict` has written; raises ValueError where it is damaged."""
+        """Return the curves that `to_dict` has written; raises ValueError if they are damaged."""
         if values["alignment"] not in ALIGNMENTS:
             raise ValueError(f"a speed course aligned by {values['alignment']}")
         return cls(values["alignment"], _curve_from(values["by_time"]), _curve_from(values["by_travel"]))
@@ -89,8 +89,8 @@ def learn_course(
 ) -> SpeedCourse:
     """Return mean and spread of the measured speed over impact-free runs of one class of motion.
 
-    The spread is that of single samples, noise of the speed included, pooled over neighbours together with what the
-    mean departs from its smoothed course.
+    The spread is that of single samples, noise of the speed included, pooled over neighbours together with the
+    deviation of the mean from its smoothed curve.
     """
     courses = []
     for recording in recordings:
@@ -150,7 +150,7 @@ def fitting_samples(
 
 
 def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> SpeedCurve:
-    """The runs' speeds (axis, speed) at each grid point: the first sample that reaches it."""
+    """Return the runs' speeds (axis, speed) at each grid point: of the first sample that reaches it."""
     step = end / _POINTS if end > 0.0 else 1.0
     grid = step * np.arange(_POINTS + 1)
     samples = np.full((len(runs), len(grid)), np.nan)

@@ -1,4 +1,4 @@
-"""Cutting a log into strokes as it comes: each begins where what has been logged so far shows that it does."""
+"""Cut a log into strokes as it comes: each begins where the log so far shows that it does."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CONFIRM = 3
 
 @dataclass(frozen=True)
 class Stroke:
-    """A stroke judged from `applies` [s] on, with what was logged since `start` [s] <= `applies`.
+    """A stroke that applies from `applies` [s], with everything logged since `start` [s] <= `applies`.
 
     `rests` [s]: when the stroke before came to rest, or turned round.
     """
@@ -36,7 +36,7 @@ class Stroke:
 
 
 def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass]) -> list[Stroke]:
-    """Return the strokes of a log, each decided at or before it applies; one of the whole log where it is not cut.
+    """Return the strokes of a log, each decided at or before it applies; one of the whole log if it is not cut.
 
     By "motion" a stroke ends with a rest of 0.2 s after a motion, or where the motion turns round. A joint rests where
     its speed, averaged over the last 0.1 s, is below 10 % of the nominal speed of the slowest class that it leads;
@@ -67,15 +67,15 @@ def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass
     count = _cut(time, level, moves_most.astype(np.int64), SHORTEST_REST, start, applies, turned)
     found = [begin]
     for first, last, turns in zip(start[:count], applies[:count], turned[:count], strict=True):
-        # Where the motion turned round it had begun before its average shows it; behind a rest it had not, and what
-        # the average still held belongs to the stroke before.
+        # A motion that turned round began before its average shows it; after a rest it did not, and the rest of
+        # the average belongs to the stroke before.
         since = float(time[first]) - (_AVERAGED_SECONDS if turns else 0.0)
         found.append(Stroke(since, float(time[last]), float(time[first])))
     return found
 
 
 def averaged_so_far(series: Series) -> FloatArray:
-    """Return the mean (n, J) over the last 0.1 s, and the last 5 samples at least; NaN below 3, and at first."""
+    """Return the mean (n, J) over the last 0.1 s, and at least the last 5 samples; NaN below 3, and at first."""
     time, values = series.time, series.values
     present = np.isfinite(values)
     nothing = np.zeros((1, values.shape[1]))

@@ -1,4 +1,4 @@
-"""Rows as CSV that a spreadsheet may open and a terminal may show: text from files stays text."""
+"""Rows as CSV that is safe in spreadsheets and terminals: text from files stays text."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from io import StringIO
 
 from cdtool.plain_text import plain
 
-# A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). Where its list
-# separator is a semicolon, what follows one begins a cell too, in quotation marks or not.
+# A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). If its list
+# separator is a semicolon, a cell begins after each of them, in quotation marks or not.
 _RUN_BY_SPREADSHEETS = re.compile(r"(^|;)(\s*)(?=[=+\-@＝＋－＠])")
 
 
 def csv_text(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """One line of names and one a row; empty = no figure."""
+    """Return a line of names and a line per row; empty = no value."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)

@@ -1,6 +1,6 @@
-"""Which figures of the latency tables show for a detector: below ten detected contacts median and range, no mean.
+"""Which values of the latency the tables show for a detector: below ten detected contacts median and range, no mean.
 
-Conventions: a column that no row fills is left out. Shared by every table, so that all of them show the same.
+Conventions: a column that no row fills is left out. All tables and plots use this module, so that they show the same.
 """
 
 from __future__ import annotations
@@ -11,22 +11,21 @@ from typing import Final, Literal
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
-from cdtool.report.figure_text import NOTHING, number, with_interval
 
 LatencyColumn = Literal["mean", "std", "median", "range", "P95"]
 
 EXPLAINED: Final = (
     f"Fewer than {FEWEST} contacts detected: median and range, no mean, std or P95. The 95 % interval of the mean of "
-    "four contacts holds the true mean in about 80 of 100 tests, in 47 where 15 % of the contacts are slow. The median "
-    "has an interval from 6 contacts on (docs/statistics.md)."
+    "four contacts contains the true mean in about 80 of 100 tests, in 47 if 15 % of the contacts are slow. The median "
+    "has an interval with 6 or more contacts (docs/statistics.md)."
 )
 GROUPED: Final = (
-    f"No interval where fewer than {FEWEST} recordings or campaigns hold several contacts each: those of one are alike."
+    f"No interval if fewer than {FEWEST} recordings or campaigns contain several contacts each: those of one are alike."
 )
 
 
 def latency_columns(rows: Iterable[Summary]) -> tuple[LatencyColumn, ...]:
-    """The columns of latency that a table of these rows has."""
+    """Return the columns of latency that a table of these rows has."""
     hit = [item for item in rows if item.contacts]
     few, enough = any(item.few for item in hit), any(not item.few for item in hit)
     several: tuple[LatencyColumn, ...] = ("mean", "std") if enough else ()
@@ -35,17 +34,8 @@ def latency_columns(rows: Iterable[Summary]) -> tuple[LatencyColumn, ...]:
     return (*several, "median", *spread, *highest)
 
 
-def latency_words(item: Summary, column: LatencyColumn) -> str:
-    """A cell of a report: the figure with its interval, the range as "25.0 to 28.0", a dash where there is none."""
-    if column == "range":
-        ends = (number(item.min_ms), number(item.max_ms))
-        return ends[0] if ends[0] == ends[1] else " to ".join(ends)
-    figure = latency_figure(item, column)
-    return NOTHING if figure is None else with_interval(figure)
-
-
-def latency_figure(item: Summary, column: LatencyColumn) -> Interval | None:
-    """The figure of a column; None in the range, and where too few contacts were detected for it."""
+def latency_interval(item: Summary, column: LatencyColumn) -> Interval | None:
+    """Return the value of a column with its interval; None for the range, and if too few contacts were detected."""
     if column == "median":
         return item.median
     if item.few or column == "range":
@@ -54,17 +44,17 @@ def latency_figure(item: Summary, column: LatencyColumn) -> Interval | None:
 
 
 def draws_no_interval(item: Summary) -> bool:
-    """Whether a plot shows the median without a bar: below ten contacts, or where it has no interval."""
+    """Return whether a plot shows the median without a bar: below ten contacts, or if it has no interval."""
     return item.assessable < FEWEST or bool(item.median.reason)
 
 
 def grouped(rows: Iterable[Summary]) -> bool:
-    """Whether ten or more contacts have no interval since too few recordings hold them."""
+    """Return whether ten or more contacts have no interval because too few recordings contain them."""
     return any(item.assessable >= FEWEST and item.median.reason for item in rows)
 
 
 def explained(rows: Iterable[Summary]) -> str:
-    """Why rows show no mean or no interval; empty where all show both."""
+    """Return why rows show no mean or no interval; empty if all rows show both."""
     hit = [item for item in rows if item.contacts > item.not_assessable]
     words = [EXPLAINED] if any(item.few for item in hit) else []
     words += [GROUPED] if any(not item.few and item.mean.reason for item in hit) else []

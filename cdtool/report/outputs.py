@@ -1,4 +1,4 @@
-"""Where a report goes: the writer of each target's suffix, or a folder with all of it."""
+"""Where reports are written: by the writer of each target's suffix, or all of them into a folder."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.traces.file import as_read
@@ -15,77 +16,86 @@ from cdtool.files import replaced_folder, resolved
 from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.report.writers import known_suffixes, own_writers, writer_of
-from cdtool.report.writers.base import Report
+from cdtool.report.writers.base import Report, Subject, Writer
 
 _FIGURES_IN_FOLDER = re.compile(r"(latency|survival|amoc|forces|(forces|triggers)_[a-z0-9-]+)\.png")
 
 
-def check_outputs(targets: Sequence[Path], *, force: bool = False) -> None:
-    """Raise UsageError where a target cannot be written: unknown suffix, no such folder, no permission, a dead link.
+def check_outputs(targets: Sequence[Path], *, force: bool = False, subject: Subject = "benchmark") -> None:
+    """Raise UsageError for a target that cannot be written: unknown suffix, missing folder, no permission, a dead link.
 
-    A report may be rewritten. What cdtool did not write is replaced with `force` only: a recording, a file of
-    another program, a folder that holds anything but a report.
+    A report may be rewritten. A file that cdtool did not write is replaced only with `force`: a recording, a file of
+    another program, a folder that contains anything but a report.
     """
     for target in targets:
         resolved(target)
         if target == Path():
-            raise UsageError("--output names no file or folder", "give a name, such as report or results.json")
-        if target.is_dir():
-            _check_writable(target, target)
-            _whole_report(target, force=force)
-            continue
-        writer = writer_of(target) if target.suffix else None
-        if target.suffix and writer is None:
-            known = ", ".join(known_suffixes())
-            raise UsageError(f"--output is '{plain(target)}'", f"a folder, or a name that ends in {known}")
-        if not target.suffix and target.exists():
-            raise UsageError(f"--output '{plain(target)}' exists and is not a folder", "choose another name")
-        if not target.parent.is_dir():
-            raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
-        _check_writable(target, target.parent)
-        if writer is not None:
+            raise UsageError("--output is empty", "give a name, such as report or results.json")
+        if _is_folder(target) and _has_folders(subject):
+            _check_folder(target, force=force)
+        else:
+            writer = _writer_of(target, subject)
+            _check_parent(target)
             for path in writer.files(target):
                 refuse_other_kind(path, writer.kinds[path.suffix.lower()], force=force)
 
 
 def write_outputs(
-    report: Report, targets: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()
+    report: Any,
+    targets: Sequence[Path],
+    *,
+    force: bool = False,
+    inputs: Sequence[Path] = (),
+    subject: Subject = "benchmark",
 ) -> list[Path]:
-    """Write every target; returns what to show: the files, and of a folder its report. Raises CdtoolError.
+    """Write every target and return what to show: the files, and of a folder its report. Raises CdtoolError.
 
-    `inputs` were read and are never written to, `force` or not.
+    `report` is what the writers of the subject write. `inputs` were read and are never overwritten, `force` or not.
     """
     folders = [target for target in targets if target.is_dir()]
-    in_folder = [writer.in_folder for writer in own_writers() if writer.in_folder]
+    in_folder = [writer.in_folder for writer in own_writers(subject) if writer.in_folder]
     refuse_inputs([*targets, *(folder / name for folder in folders for name in in_folder)], inputs)
-    check_outputs(targets, force=force)
-    if targets:
+    check_outputs(targets, force=force, subject=subject)
+    if targets and isinstance(report, Report):
         report = replace(report, traces=as_read(report.traces))
     written = []
     for target in targets:
-        writer = None if _is_folder(target) else writer_of(target)
-        if writer is None:
+        if _is_folder(target):
             written.append(_write_folder(report, target, force=force))
         else:
-            writer.write(report, target)
+            _writer_of(target, subject).write(report, target)
             written.append(target)
     return written
 
 
+def _writer_of(target: Path, subject: Subject) -> Writer[Any]:
+    writer = writer_of(target, subject) if not target.is_dir() else None
+    if writer is None:
+        *others, last = known_suffixes(subject)
+        known = f"{', '.join(others)} or {last}" if others else last
+        folder = "a folder, or " if _has_folders(subject) else ""
+        raise UsageError(f"--output is '{plain(target)}'", f"{folder}a name that ends in {known}")
+    return writer
+
+
+def _has_folders(subject: Subject) -> bool:
+    return any(writer.in_folder for writer in own_writers(subject))
+
+
 def _write_folder(report: Report, target: Path, *, force: bool) -> Path:
-    """Everything, swapped in as a whole: data, figures, the report as HTML and as Markdown that links the figures."""
+    """Write all reports and figures, and replace the folder by them as a whole."""
     from cdtool.report.plots.folder_figures import write_figures
 
     with replaced_folder(target, lambda old: _whole_report(old, force=force)) as folder:
         report = replace(report, images=tuple(write_figures(report, folder)))
-        for writer in own_writers():
+        for writer in own_writers("benchmark"):
             if writer.in_folder and writer.has_content(report):
                 writer.write(report, folder / writer.in_folder)
     return target / "report.html"
 
 
 def _whole_report(folder: Path, *, force: bool) -> bool:
-    """Whether a folder holds nothing but reports, so that all of it may go; if not, UsageError unless `force`."""
+    """Return whether a folder contains only reports, so that all of it may be replaced; else UsageError or `force`."""
     held = [path for path in sorted(folder.iterdir()) if not is_temporary(path.name)]
     kinds = {path: kind for path in held if (kind := _kind_in_folder(path.name))}
     for path, kind in kinds.items():
@@ -94,16 +104,16 @@ def _whole_report(folder: Path, *, force: bool) -> bool:
     if others and not force:
         raise UsageError(
             f"{plain(others[0])}: is not part of a cdtool report, and the folder would be replaced as a whole",
-            "choose another folder, or keep what else is in it with --force",
+            "choose another folder, or keep its other files with --force",
         )
     return not others and all(kind.is_kind_of(path) for path, kind in kinds.items())
 
 
 def _kind_in_folder(name: str) -> Kind | None:
-    """What marks a file of that name in a report's folder; None for a name of no report."""
+    """Return what marks a file of that name in a report folder; None for a name that no report has."""
     if _FIGURES_IN_FOLDER.fullmatch(name):
         return FIGURES[".png"]
-    for writer in own_writers():
+    for writer in own_writers("benchmark"):
         if writer.in_folder and name in {path.name for path in writer.files(Path(writer.in_folder))}:
             return writer.kinds[Path(name).suffix]
     return None
@@ -113,6 +123,22 @@ def _is_folder(target: Path) -> bool:
     return target.is_dir() or not target.suffix
 
 
+def _check_folder(target: Path, *, force: bool) -> None:
+    if target.is_dir():
+        _check_writable(target, target)
+        _whole_report(target, force=force)
+        return
+    if target.exists():
+        raise UsageError(f"--output '{plain(target)}' exists and is not a folder", "choose another name")
+    _check_parent(target)
+
+
+def _check_parent(target: Path) -> None:
+    if not target.parent.is_dir():
+        raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
+    _check_writable(target, target.parent)
+
+
 def _check_writable(target: Path, folder: Path) -> None:
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"--output is '{plain(target)}': {plain(folder)} may not be written to", "choose another")
+        raise UsageError(f"--output is '{plain(target)}': {plain(folder)} is not writable", "choose another")

@@ -1,1 +1,1 @@
-"""Simulated machines: physical models that write measured channels together with their true contacts."""
+"""Simulate a gate and an arm with known ground truth."""

@@ -10,7 +10,7 @@ theta, w = theta', q, qd = q', the friction's bristle z and the motor torque T, 
     T_i' = (u_i - T_i) / lag
 
 with c = cos(q2 - q1), s = sin(q2 - q1) and E_i the elastic drive (thesis 6.21, 6.22 with elastic joints).
-Control, disturbance and encoder are sampled once a log period and held over its sub-steps.
+Control, disturbance and encoder are sampled once per log period and held over its sub-steps.
 """
 
 from __future__ import annotations

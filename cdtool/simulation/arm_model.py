@@ -87,7 +87,7 @@ def simulate_arm_run(
 
 @dataclass(frozen=True)
 class ArmStroke:
-    """What an arm is to do, and what acts on it.
+    """The reference motion of an arm, and what acts on it.
 
     `reference` position [rad] and speed [rad/s] and `disturbance` [N m] (2, n) hold a value per sample; `friction` (2,)
     is each joint's factor on its Coulomb and static friction [-]; `obstacle` is that of `ArmParameters.obstacle`.
@@ -123,7 +123,7 @@ def integrate_arm(
 
 
 def specific_force(parameters: ArmParameters, position: Array, speed: Array, acceleration: Array) -> Array:
-    """What ideal IMUs feel across their links, (2, n) [m/s2], gravity included (thesis 6.7, 6.26 corrected).
+    """Return what ideal IMUs measure across their links, (2, n) [m/s2], gravity included (thesis 6.7, 6.26 corrected).
 
     a1 = l_IMU1 qdd1 + g cos q1; a2 = l_IMU2 qdd2 + g cos q2 + l1 (qdd1 cos(q2 - q1) + qd1^2 sin(q2 - q1)): the second
     rides on the elbow. `position` [rad], `speed` [rad/s] and `acceleration` [rad/s2] are (2, n).
@@ -143,7 +143,7 @@ def _measure(
     noise: Array,
     first_contact: float,
 ) -> ArmRun:
-    """What sensors and drives log of the truth; columns 0 and 1 of `noise` were the disturbances."""
+    """Return what sensors and drives log; columns 0 and 1 of `noise` were the disturbances."""
     ratio, period = np.array(parameters.transmission_ratio), parameters.sample_period
     felt = specific_force(parameters, truth["link_position"], truth["link_speed"], truth["link_acceleration"])
     moving = np.minimum(np.abs(truth["link_speed"][0]) / parameters.nominal_speed, 1.0)

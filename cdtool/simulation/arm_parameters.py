@@ -1,6 +1,6 @@
 """Every number of the simulated two-link arm, and what follows from them at rest: inertias, wind-up, references.
 
-The parameters are assumptions under which the thesis's latencies come out: they show that such a machine is
+The parameters are assumptions that reproduce the thesis's latencies: they show that such a machine is
 plausible, not that it is the thesis's machine.
 """
 
@@ -31,10 +31,10 @@ def require_trial(trial: int) -> None:
 class ArmParameters:
     """On the joint side unless said otherwise; a pair is (arm, forearm), or (trial 1, trial 2) where that is said.
 
-    Choices that carry weight: the torque ripple has a fixed phase to the encoder, as a motor's cogging has; redrawn
+    Choices that matter: the torque ripple has a fixed phase to the encoder, as a motor's cogging has; redrawn
     in each run it would widen the forearm's normal band in trial 2 and make the momentum observer there far slower. The
     speed controller works on the logged, filtered speed. Friction factors and the obstacle's angle are normal, one
-    draw a run (and joint), the factor scaling Coulomb and static friction alike. The bumper's slope changes at its
+    draw per run (and joint), the factor scaling Coulomb and static friction alike. The bumper's slope changes at its
     travel without a step in force, and a contact's factor 1 + damping * penetration speed is held at 0 or above, so
     that no obstacle pulls. Link vibration grows with the arm's speed up to the nominal one, for both links.
     """

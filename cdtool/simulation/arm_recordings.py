@@ -63,7 +63,7 @@ _BENCHMARK_RULES = (
 
 
 def as_recording(run: ArmRun, name: str) -> Recording:
-    """A run as it is logged, without a file between: motors' torque, speed and angle, specific forces, load cell."""
+    """Return a run as logged, without a file in between: motor torque, speed and angle, accelerations, load cell."""
     values = {
         "torque": (run.motor_torque, "N m"),
         "speed": (run.motor_speed, "rad/s"),
@@ -79,10 +79,25 @@ def as_recording(run: ArmRun, name: str) -> Recording:
 
 @dataclass(frozen=True)
 class ArmRecordings:
-    """The recordings to write: `counts` of each group (free, holdout, stiff, soft), simulated from `seed`.
+    """Which recordings of the arm to write.
 
-    `file_format` "mixed": the first two of each group as MCAP, the others as CSV. Without `references` neither logs nor
-    machine file have a reference channel.
+    Parameters
+    ----------
+    counts : mapping of str to int
+        Number of recordings of each group: free, holdout (both impact-free), stiff, soft.
+    seed : int
+        Seed of the noise and of the variations between runs. A run depends only on seed, trial, group and number; the
+        same seed writes the same bytes.
+    trial : {1, 2}, optional
+        Trial of the thesis, chapter 6: the link that is hit is the arm (1) or the forearm (2).
+    file_format : {"csv", "mcap", "mixed"}, optional
+        "mixed": the first two of each group as MCAP, the others as CSV.
+    progress : callable, optional
+        Called after each recording with the number done and the total.
+    parameters : ArmParameters, optional
+        Parameters of the arm.
+    references : bool, optional
+        Log reference channels.
     """
 
     counts: Mapping[str, int]
@@ -95,17 +110,39 @@ class ArmRecordings:
 
 
 def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
-    """Write recordings of an arm below `folder`; returns how many. Same seed, same bytes.
+    """Write recordings of a simulated two-link arm to a folder, with a machine file and a benchmark file.
 
-    The options are those of `ArmRecordings`. A run depends on seed, trial, group and number alone, not on how many are
-    written. Raises UsageError where nothing is to be written, the folder is not empty, the trial is unknown, or the
-    encoders are ideal.
+    Parameters
+    ----------
+    folder : Path
+        An empty or new folder.
+    wanted : ArmRecordings
+        Which recordings to write.
+
+    Returns
+    -------
+    int
+        The number of recordings written.
+
+    Raises
+    ------
+    UsageError
+        No recording is requested, the folder is not empty, the trial is unknown, or the encoders are ideal.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from pathlib import Path
+    >>> cdtool.simulate_arm(Path("myarm"), {"stiff": 1}, seed=1, trial=2)
+    1
+    >>> sorted(path.name for path in Path("myarm/stiff").iterdir())
+    ['01.csv']
     """
     seed, trial, references = wanted.seed, wanted.trial, wanted.references
     require_trial(trial)
     arm = wanted.parameters or ArmParameters()
     if arm.encoder_counts < 1:
-        raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more a revolution.")
+        raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more per revolution.")
 
     def simulate(group: str, number: int) -> ArmRun:
         rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])

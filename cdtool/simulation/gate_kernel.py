@@ -8,9 +8,9 @@ and the force F_m of the current loop, so that its lag is integrated with the sa
     m_f v_f' = F_post - F_contact
     F_m'     = (u - F_m) / lag
 
-F_f holds a stretch of the track that resists, a growing obstruction that the gate still passes: a bump of
+F_f includes a section of the track that resists, a growing obstruction that the gate still passes: a bump of
 cos^2 shape, F_obs cos^2(pi (x - x_obs) / l_obs) tanh(v / v_s) within l_obs / 2 of x_obs.
-Control, disturbance and resolver are sampled once a log period and held over its sub-steps.
+Control, disturbance and resolver are sampled once per log period and held over its sub-steps.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ def integrate_gate(
     substeps: int,
     log: Array,
 ) -> float:
-    """Fill `log` (a row a name of `ROWS`, a column a sample); return the instant of first contact [s] or NaN.
+    """Fill `log` (a row per name of `ROWS`, a column per sample); return the time of first contact [s] or NaN.
 
-    `friction_waves` has a row (length [m], phase [rad], weight [-]) a wave. `reference_speed` [m/s] and
+    `friction_waves` has a row (length [m], phase [rad], weight [-]) per wave. `reference_speed` [m/s] and
     `disturbance` [N] are held over each sample; `run` holds the run's friction factor [-], cogging phase
     [rad] and obstacle position [m].
     """

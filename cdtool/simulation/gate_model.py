@@ -1,7 +1,7 @@
 """A heavy sliding gate that runs against an obstacle: parameters, and a run's measured channels and truth.
 
 A motor drives a leaf with an elastic front post through a rack with lost motion; a speed loop commands a
-slew-limited torque. The parameters are assumptions under which the thesis's latencies come out: they show
+slew-limited torque. The parameters are assumptions that reproduce the thesis's latencies: they show
 that such a machine is plausible, not that it is the thesis's machine.
 """
 
@@ -60,7 +60,7 @@ class GateParameters:
     disturbance_rate: float = 60.0  # its corner [rad/s]
     cogging_force: float = 30.0  # amplitude [N]
     cogging_periods: float = 36.0  # per motor revolution [-]
-    obstruction_force: float = 0.0  # of a stretch of the track that resists, at its middle [N]; 0 = none
+    obstruction_force: float = 0.0  # of a section of the track that resists, at its middle [N]; 0 = none
     obstruction_position: float = 0.9  # where its middle is [m]
     obstruction_length: float = 0.1  # from one end of it to the other [m]
 
@@ -196,8 +196,8 @@ def integrate_gate(
 ) -> tuple[dict[str, Array], float]:
     """The true motion by name (`gate_kernel.ROWS`) and the instant of first contact [s], NaN without one.
 
-    `initial_state` (7,) is in the order of `ROWS`; `reference_speed` [m/s] and `disturbance` [N] hold a value
-    a sample; `run` holds the run's friction factor [-], cogging phase [rad] and obstacle position [m].
+    `initial_state` (7,) is in the order of `ROWS`; `reference_speed` [m/s] and `disturbance` [N] hold one value
+    per sample; `run` holds the run's friction factor [-], cogging phase [rad] and obstacle position [m].
     """
     log = np.zeros((len(gate_kernel.ROWS), reference_speed.size))
     numbers = tuple(float(getattr(parameters, name)) for name in gate_kernel.PARAMETER_ORDER)
@@ -217,7 +217,7 @@ def _measure(
     noise: Array,
     first_contact: float,
 ) -> GateRun:
-    """What sensors and drive log of the truth; column 0 of `noise` was the disturbance."""
+    """Return what sensors and drive log; column 0 of `noise` was the disturbance."""
     ratio, period = parameters.transmission_ratio, parameters.sample_period
     panel = sensors.resonance(
         noise[:, 2],

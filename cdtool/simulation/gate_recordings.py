@@ -36,7 +36,7 @@ _BENCHMARK_RULES = ("[onset]", "above_n = 20.0", "back_to_n = 8.0")
 
 
 def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recording:
-    """A run as it is after reading, without a file between: every channel on the load side."""
+    """Return a run as it is after reading, without a file in between: every channel on the load side."""
     ratio = parameters.transmission_ratio
     values = {
         "torque": (run.motor_torque / ratio, "N"),
@@ -60,11 +60,44 @@ def write_gate_recordings(
     parameters: GateParameters | None = None,
     references: bool = True,
 ) -> int:
-    """Write `counts` recordings of each group of GROUPS below `folder`; returns how many. Same seed, same bytes.
+    """Write recordings of a simulated sliding gate to a folder, with a machine file and a benchmark file.
 
-    A run depends on seed, group and number alone, not on how many are written. `file_format` "mixed": the first two of
-    each group as MCAP, the others as CSV. Raises UsageError where nothing is to be written or the folder is not empty.
-    Without `references` neither logs nor machine file have a reference channel.
+    Parameters
+    ----------
+    folder : Path
+        An empty or new folder.
+    counts : mapping of str to int
+        Number of recordings of each group: free, holdout (both impact-free), stiff, soft.
+    seed : int
+        Seed of the noise and of the variations between runs. A run depends only on seed, group and number; the same
+        seed writes the same bytes.
+    file_format : {"csv", "mcap", "mixed"}, optional
+        "mixed": the first two of each group as MCAP, the others as CSV.
+    progress : callable, optional
+        Called after each recording with the number done and the total.
+    parameters : GateParameters, optional
+        Parameters of the gate.
+    references : bool, optional
+        Log reference channels.
+
+    Returns
+    -------
+    int
+        The number of recordings written.
+
+    Raises
+    ------
+    UsageError
+        No recording is requested, or the folder is not empty.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from pathlib import Path
+    >>> cdtool.simulate_gate(Path("mygate"), {"stiff": 1}, seed=1)
+    1
+    >>> sorted(path.name for path in Path("mygate").iterdir())
+    ['contacts.csv', 'machine.toml', 'stiff']
     """
     gate = parameters or GateParameters()
 
@@ -78,7 +111,7 @@ def write_gate_recordings(
 def gate_bench(
     gate: GateParameters, simulate: Callable[[str, int], GateRun], references: bool = True
 ) -> Bench[GateRun]:
-    """How runs of the gate are logged, whatever `simulate` makes of a group and a number."""
+    """Return how runs of the gate are logged, for any function `simulate` of group and number."""
     log_csv, log_mcap = partial(_write_csv, references=references), partial(_write_mcap, references=references)
     text = _machine_toml(gate) if references else without_references(_machine_toml(gate))
     return Bench(simulate, log_csv, log_mcap, text, _BENCHMARK_SETTINGS, _BENCHMARK_RULES)

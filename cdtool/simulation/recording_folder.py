@@ -23,12 +23,12 @@ EPOCH_NS = 1_700_000_000_000_000_000
 
 # With the format "mixed" this many of each group are MCAP files.
 _MIXED_MCAP = 2
-# From so many runs on something can be learned, and from so many on without being forced.
+# The numbers of runs with which something can be learned at all, and without being forced.
 _LEAST_RUNS, _ENOUGH_RUNS = 2, 10
 
 
 class Run(Protocol):
-    """What the folder needs to know of a run."""
+    """What the folder uses of a run."""
 
     @property
     def contact_start(self) -> float | None:
@@ -41,7 +41,7 @@ AnyRun = TypeVar("AnyRun", bound=Run)
 
 @dataclass(frozen=True)
 class Bench(Generic[AnyRun]):
-    """One simulated machine on its test bench: how a run is made and logged, and what the two TOML files say of it.
+    """One simulated machine on its test bench: how a run is simulated and logged, and the content of the TOML files.
 
     `simulate` takes a group of GROUPS and a number from 1. In benchmark.toml the lines `settings` come before the
     groups and `rules` after them.
@@ -85,7 +85,7 @@ def write_folder(
     """
     planned = list(_plan(counts, file_format))
     if not planned:
-        raise UsageError("no recording is asked for", "give a number above 0 for --free, --holdout, --stiff or --soft")
+        raise UsageError("no recording is requested", "give a number above 0 for --free, --holdout, --stiff or --soft")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
     with replaced_folder(folder) as part:

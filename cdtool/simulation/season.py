@@ -14,16 +14,16 @@ from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_
 from cdtool.simulation.gate_recordings import gate_bench
 from cdtool.simulation.recording_folder import GROUPS, write_folder
 
-# A season's runs are drawn apart from those of `cdtool simulate gate`.
+# A season's runs have other random numbers than those of `cdtool simulate gate`.
 _STREAM = len(GROUPS)
 
 
 @dataclass(frozen=True)
 class Season:
-    """What changes from the first run to the last, both linearly.
+    """The changes from the first run to the last, both linear.
 
     `friction_change`: by which share the leaf's friction grows (0.3: by 30 %) or falls (below 0) over the season.
-    `obstruction_growth` [N a run]: how much more a stretch of 0.1 m about `obstruction_at` [m] resists in each run.
+    `obstruction_growth` [N per run]: how much more a section of 0.1 m about `obstruction_at` [m] resists in each run.
     """
 
     runs: int
@@ -37,9 +37,9 @@ class Season:
         if not -1.0 < self.friction_change < math.inf:
             raise UsageError(f"friction change is {self.friction_change:g}", "a share above -1; 0.3: 30 % more")
         if not 0.0 <= self.obstruction_growth < math.inf:
-            raise UsageError(f"obstruction growth is {self.obstruction_growth:g}", "N a run, at least 0")
+            raise UsageError(f"obstruction growth is {self.obstruction_growth:g}", "N per run, at least 0")
         if not math.isfinite(self.obstruction_at):
-            raise UsageError(f"obstruction at {self.obstruction_at:g}", "a place along the travel in m")
+            raise UsageError(f"obstruction at {self.obstruction_at:g}", "a location along the travel in m")
 
     def gate(self, number: int, new: GateParameters) -> GateParameters:
         """The gate in the run `number` (from 1), of one that is `new` in the first."""

@@ -1,6 +1,6 @@
-"""Causal sensor models: what a resolver, a torque estimate and an accelerometer make of the truth.
+"""Causal sensor models: a resolver, a torque estimate and an accelerometer.
 
-Every filter starts from rest and looks backward only, so no latency is flattered. Noise is handed in as
+Every filter starts from rest and uses only past values, so that latencies are not too small. Noise is passed in as
 standard normal samples: the caller owns the random generator.
 """
 

@@ -1,4 +1,4 @@
-"""Thresholds: what is normal. One file a threshold."""
+"""Thresholds: what is normal for a signal. One file per threshold."""
 
 from __future__ import annotations
 

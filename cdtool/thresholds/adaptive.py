@@ -1,4 +1,4 @@
-"""Limits that widen with what the references ask of the machine (thesis 2.3.3, figure 2.6)."""
+"""Limits that widen with what the references demand of the machine (thesis 2.3.3, figure 2.6)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.recording import FloatArray, Recording, Series
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
+from cdtool.thresholds.sections import sections
 from cdtool.thresholds.settings import check_above, check_sides
-from cdtool.thresholds.stretches import sections
 
 # Never a measured torque: the controller's response to a contact would raise the limit.
 _INPUTS = ("reference_speed", "reference_torque")
@@ -37,13 +37,13 @@ class FittedAdaptive:
     safety_factor: float
 
     def with_safety_factor(self, factor: float) -> FittedAdaptive:
-        """The same with its limits `factor` standard deviations beyond what the references explain."""
+        """Return the threshold with its limits `factor` standard deviations beyond what the references explain."""
         return replace(self, safety_factor=factor)
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and its band, NO_LIMIT where a reference is missing.
+        """Return the signal and its band, NO_LIMIT where a reference is missing.
 
-        Raises RecordingError without a reference, UsageError where the number of joints differs.
+        Raises RecordingError without a reference, UsageError if the number of joints differs.
         """
         joints = signal.values.shape[1]
         excitation = self.rule.excitation(recording, self.inputs, signal.time)
@@ -61,7 +61,7 @@ class FittedAdaptive:
         return with_limits(signal, lower, upper)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the threshold as JSON values."""
         return {
             "settings": asdict(self.rule),
             "inputs": list(self.inputs),
@@ -73,7 +73,7 @@ class FittedAdaptive:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         return cls(
             rule=Adaptive(**values["settings"]),
             inputs=tuple(map(str, values["inputs"])),
@@ -86,14 +86,44 @@ class FittedAdaptive:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Limits -+ (c + sum g_j LP{|HP{u_j}|} + `safety_factor` s) on the signal, u_j the references (figure 2.6).
+    """Limits -+ (c + sum g_j LP{|HP{u_j}|} + `safety_factor` s) on the signal, u_j the references.
 
-    HP = s T1 / (1 + s T1), T1 = `high_pass`; LP = 1 / (1 + s T2), T2 = `low_pass`, both in s, exact for any step. u:
-    reference speed, and reference torque where every run has it, of all joints. c and g by non-negative least squares
-    of |i| over the runs, s the standard deviation of what is left. In the signal's unit. It needs no path that
-    repeats and serves any class of motion; limits hold from the first sample of the references on. Over a gap the
-    filters run on with the longer step. Fails where the model is wrong at constant excitation: c must then grow; with
-    a constant offset such as friction, which both limits have to leave room for.
+    Parameters
+    ----------
+    safety_factor : float
+        k: number of standard deviations s of what the references do not explain.
+    sides : {"one", "two"}, optional
+        "one" monitors the side that opposes the reference speed; None: both.
+    high_pass : float
+        Time constant T1 of HP = s T1 / (1 + s T1) [s].
+    low_pass : float
+        Time constant T2 of LP = 1 / (1 + s T2) [s].
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Thesis 2.3.3 and figure 2.6. u: the reference speed, and the reference torque if every run has it, of all joints. c
+    and g by non-negative least squares of |i| over the runs. Both filters are exact for any step; over a gap they
+    continue with the longer step. Measured torques are never used: the response of the controller to a contact would
+    raise the limit. It needs no repeated path and serves any class of motion. Fails if the model is wrong at constant
+    excitation, because c must then grow, and with a constant offset such as friction, for which both limits must leave
+    room.
+
+    Examples
+    --------
+    With constant references only c is left, the mean of |i|.
+
+    >>> import numpy as np
+    >>> time, valid = np.arange(400) * 1e-3, np.zeros((400, 1), dtype=np.uint8)
+    >>> run = Recording("run", "", ("axis",), {"reference_speed": Series(time, np.full(400, 0.2), "m/s")})
+    >>> signal = Signal(time, np.full((400, 1), 5.0), valid, "N")
+    >>> _, band = Adaptive().fit([(run, signal), (run, signal)]).evaluate(run, signal)
+    >>> band.lower[-1, 0].round(2).item(), band.upper[-1, 0].round(2).item()
+    (-5.0, 5.0)
     """
 
     safety_factor: float = 5.5
@@ -111,7 +141,7 @@ class Adaptive:
         check_above(self.low_pass, 0.0, "low_pass")
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedAdaptive:
-        """Gains from impact-free runs of any class; raises SignatureError, RecordingError without reference speed."""
+        """Learn the gains from at least 2 impact-free runs of any class; see `Threshold.fit`."""
         if len(pairs) < 2:
             raise SignatureError(f"adaptive limits need at least 2 impact-free runs, {len(pairs)} given", "add runs")
         inputs = tuple(
@@ -131,7 +161,7 @@ class Adaptive:
         )
 
     def excitation(self, recording: Recording, inputs: Sequence[str], clock: FloatArray) -> FloatArray:
-        """1 and LP{|HP{u_j}|} of each reference and joint on the signal's clock, (n, 1 + M); NaN where missing."""
+        """Return 1 and LP{|HP{u_j}|} of each reference and joint (n, 1 + M) on the signal's clock; NaN if missing."""
         parts = [np.ones((len(clock), 1))]
         for name in inputs:
             series = recording[name]
@@ -148,7 +178,7 @@ class Adaptive:
 
 
 def _least_squares(signals: Sequence[Signal], excitations: Sequence[FloatArray], j: int) -> tuple[FloatArray, float]:
-    """Non-negative gains of |i| of one column on the excitations, and the standard deviation of what is left."""
+    """Return non-negative gains of |i| of one column on the excitations, and the standard deviation of the rest."""
     from scipy.optimize import nnls
 
     size = excitations[0].shape[1]
@@ -162,7 +192,7 @@ def _least_squares(signals: Sequence[Signal], excitations: Sequence[FloatArray],
         number += len(values)
     if not number:
         raise NothingValidError(f"a joint has no valid sample ({signals[0].why_not()})", "another detector")
-    # Scaled to a unit diagonal, so that a reference in other units is no smaller one; the ridge keeps it definite.
+    # Scaled to a unit diagonal, because references have different units; the ridge keeps it definite.
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     root = np.linalg.cholesky(normal * np.outer(scale, scale) + 1e-9 * np.eye(size))
     gains = scale * nnls(root.T, np.linalg.solve(root, scale * right))[0]
@@ -171,7 +201,7 @@ def _least_squares(signals: Sequence[Signal], excitations: Sequence[FloatArray],
 
 
 def _direction(recording: Recording, clock: FloatArray) -> FloatArray:
-    """Sign of the leading joint's reference speed, held where it is zero; 0 before it first moves.
+    """Return the sign of the leading joint's reference speed, held where it is zero; 0 before it first moves.
 
     The leading joint so far: the one with the fastest reference up to the sample.
     """

@@ -1,4 +1,4 @@
-"""What every threshold is: a rule that is fitted to impact-free runs, and a fitted band that is evaluated causally."""
+"""The contract of a threshold: a rule that is fitted to impact-free runs, and a band that is evaluated causally."""
 
 from __future__ import annotations
 
@@ -13,42 +13,74 @@ from cdtool.recording import FloatArray, Recording
 
 
 class FittedThreshold(Protocol):
-    """A band that is known: `evaluate` gives the statistic that is compared and its limits, sample by sample.
+    """The contract of a fitted threshold: a known band, evaluated sample by sample.
 
-    Causal: limits up to sample k do not change when the samples after k do. One number sets how wide the band is: both
-    limits are linear in the safety factor, and the statistic does not depend on it.
+    Notes
+    -----
+    Causal: limits up to a sample do not depend on later samples. One number sets the width of the band: both limits are
+    linear in the safety factor, and the statistic does not depend on it.
     """
 
     @property
     def safety_factor(self) -> float:
-        """How far the limits are from what is normal, above 0."""
+        """How far the limits are from normal; above 0."""
         ...
 
     def with_safety_factor(self, factor: float) -> Self:
-        """The same with another safety factor."""
+        """Return the threshold with another safety factor."""
         ...
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The statistic (status NO_LIMIT where no limit is known) and the band, both on the signal's clock."""
+        """Return the statistic of a signal and its band.
+
+        Parameters
+        ----------
+        recording : Recording
+            The recording on the load side, without load cell and label.
+        signal : Signal
+            The detector's signal, values (n, J).
+
+        Returns
+        -------
+        statistic : Signal
+            What is compared with the band, on the signal's clock; status NO_LIMIT where no limit is known.
+        band : Band
+            Lower and upper limit (n, J), in the statistic's unit.
+
+        Raises
+        ------
+        CdtoolError
+            The recording has no channel in `needs`, or the joints are not those of the runs.
+        """
         ...
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it as JSON values."""
+        """Return the threshold as JSON values."""
         ...
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         ...
 
 
 class Threshold(Protocol):
-    """The contract: a frozen dataclass of the rule's settings, the channels it needs, what it makes, and `fit`.
+    """The contract of a threshold: a frozen dataclass of the rule's settings.
 
-    `fitted` names the classes of which `fit` makes one: files are read back with them.
-    A rule may have more: `by_class`, True where it learns each class of motion apart; what it fits then has `motion`,
-    the class it serves. A field `sides` that is None becomes the machine's, a field `signature` that is None the
-    benchmark file's [signature].
+    Attributes
+    ----------
+    name : str
+        Name in files and reports, and of the entry point of a plug-in.
+    needs : tuple of str
+        Channels that `fit` and `evaluate` read, next to the signal.
+    fitted : tuple of type
+        The classes of which `fit` returns an instance; files are read back with them.
+
+    Notes
+    -----
+    Optional: `by_class`, True if the rule learns each class of motion separately; what it fits then has `motion`, the
+    class it belongs to. A field `sides` that is None is set to the machine's, a field `signature` that is None to
+    [signature] of the benchmark file. docs/own-detector.md has a complete example.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -58,19 +90,64 @@ class Threshold(Protocol):
 
     @property
     def safety_factor(self) -> float | None:
-        """How far the limits are to be from what is normal, above 0; None where other settings decide."""
+        """How far the limits are to be from normal, above 0; None if other settings decide."""
         ...
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
-        """Learn from impact-free runs; fitting may look at whole runs. Raises SignatureError."""
+        """Learn the threshold from impact-free runs.
+
+        Parameters
+        ----------
+        pairs : sequence of (Recording, Signal)
+            Each run with the detector's signal. Fitting may use whole runs.
+
+        Returns
+        -------
+        FittedThreshold
+            An instance of one of the classes in `fitted`.
+
+        Raises
+        ------
+        SignatureError
+            There are too few runs, or too few valid samples in them.
+        """
         ...
 
 
 def exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
-    """The statistic, and for each sample (n, J) the safety factor at which its limit would be met.
+    """Return for each sample the safety factor at which its limit would be met.
 
-    A sample is outside the band exactly where this is above the safety factor. Limits are linear in the factor k:
-    upper(k) = a + k b, so that k* = k + k (i - upper(k)) / (upper(2 k) - upper(k)); -inf where nothing is limited.
+    Parameters
+    ----------
+    threshold : FittedThreshold
+        The fitted threshold.
+    recording : Recording
+        The recording on the load side.
+    signal : Signal
+        The detector's signal, values (n, J).
+
+    Returns
+    -------
+    statistic : Signal
+        The statistic of the threshold.
+    met_at : ndarray of float, shape (n, J)
+        A sample is outside the band exactly where this is above the safety factor; -inf where nothing is limited.
+
+    Notes
+    -----
+    Limits are linear in the factor k: upper(k) = a + k b. So k* = k + k (i - upper(k)) / (upper(2 k) - upper(k)).
+
+    Examples
+    --------
+    With |i| < 400 N at factor 1, a sample of 600 N meets its limit at factor 1.5.
+
+    >>> import numpy as np
+    >>> from cdtool.recording import Recording
+    >>> from cdtool.thresholds.limit import Limit
+    >>> signal = Signal(np.arange(2.0), np.array([[100.0], [600.0]]), np.zeros((2, 1), dtype=np.uint8), "N")
+    >>> _, met_at = exceedance(Limit.given([400.0]), Recording("run", "", ("axis",), {}), signal)
+    >>> met_at[:, 0].tolist()
+    [0.25, 1.5]
     """
     factor = threshold.safety_factor
     statistic, band = threshold.evaluate(recording, signal)
@@ -89,7 +166,30 @@ def _met_at(value: FloatArray, limit: FloatArray, wider: FloatArray, factor: flo
 
 
 def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[Signal, Band]:
-    """The signal as its own statistic; where it is valid but a limit is NaN, its status becomes NO_LIMIT."""
+    """Return a signal as its own statistic, with its band.
+
+    Parameters
+    ----------
+    signal : Signal
+        The signal, values (n, J).
+    lower, upper : ndarray of float, shape (n, J)
+        Limits in the signal's unit; infinite: not limited, NaN: no limit is known.
+
+    Returns
+    -------
+    statistic : Signal
+        The signal; its status becomes NO_LIMIT where it is valid and a limit is NaN.
+    band : Band
+        The two limits.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> signal = Signal(np.arange(2.0), np.zeros((2, 1)), np.zeros((2, 1), dtype=np.uint8), "N")
+    >>> statistic, _ = with_limits(signal, np.full((2, 1), -np.inf), np.array([[np.nan], [5.0]]))
+    >>> [Status(code).name for code in statistic.status[:, 0]]
+    ['NO_LIMIT', 'VALID']
+    """
     status = signal.status.copy()
     unknown = (np.isnan(lower) | np.isnan(upper)) & (status == Status.VALID)
     status[unknown] = Status.NO_LIMIT

@@ -1,4 +1,4 @@
-"""Several thresholds as one: an alarm where any of them is left, or where all are."""
+"""Several thresholds as one: an alarm if any of them is exceeded, or if all are."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ _RULES: dict[str, type[Threshold]] = {
     for rule in (Signature, Limit, PredictedLimit, Trend, LimitAndTrend, Innovation, Adaptive, Cusum, Glr)
 }
 _FITTED: dict[str, Any] = {item.__name__: item for rule in _RULES.values() for item in rule.fitted}
-# Shares of a limit are cut here: a side without a limit is infinitely far away.
+# Shares of a limit are clipped here: a side without a limit is infinitely far away.
 _FAR = 1e3
 
 
 @dataclass(frozen=True)
 class FittedCombined:
-    """Members with their own safety factors; the statistic is the share of their limits that is met."""
+    """Members with their own safety factors; the statistic is the share of their limits that is reached."""
 
     members: tuple[FittedThreshold, ...]
     activation: str
@@ -50,11 +50,11 @@ class FittedCombined:
         return next((item for item in classes if item is not None), None)
 
     def with_safety_factor(self, factor: float) -> FittedCombined:
-        """The same with every member's safety factor times `factor`."""
+        """Return the threshold with every member's safety factor times `factor`."""
         return replace(self, safety_factor=factor)
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The share and its band (-inf, k); valid where any member is, or all are."""
+        """Return the share and its band (-inf, k); valid where any member is, or all are."""
         shares, states = [], []
         for member in self.members:
             statistic, met_at = exceedance(member, recording, signal)
@@ -75,26 +75,57 @@ class FittedCombined:
         return replace(signal, values=values, status=status, unit="1"), Band(np.full(values.shape, -np.inf), limit)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the threshold as JSON values."""
         members = [{"fitted": type(item).__name__, **item.to_dict()} for item in self.members]
         return {"members": members, "activation": self.activation, "safety_factor": self.safety_factor}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         members = tuple(_FITTED[item["fitted"]].from_dict(item) for item in values["members"])
         return cls(members, known("activation", values["activation"], ACTIVATIONS), float(values["safety_factor"]))
 
 
 @dataclass(frozen=True)
 class Combined:
-    """Several thresholds as one: an alarm where "any" of the `members` is left, or where "all" are (`activation`).
+    """Several thresholds as one: an alarm if any of them is exceeded, or if all are.
 
-    Each member has its own default settings and safety factor k_m. statistic = the largest (any) or smallest (all)
-    share k*/k_m, k* the safety factor at which a member's limit would be met; limit `safety_factor`, without unit: 1
-    leaves the members as they are, 2 moves all their limits to twice their k. `sides` and `signature` are handed to the
-    members that have them. Fails as its members fail: "any" with each false alarm of each, "all" with each contact that
-    one of them does not see, and where members answer at different times.
+    Parameters
+    ----------
+    safety_factor : float
+        Multiplies the members' safety factors k_m: 1 leaves them unchanged, 2 moves all their limits to twice their
+        k_m.
+    sides : {"one", "two"}, optional
+        Passed to the members that have this setting.
+    members : tuple of str
+        Names of two thresholds or more, each with its default settings.
+    activation : {"any", "all"}
+        Whether one member or all of them must be exceeded.
+    signature : Signature, optional
+        Passed to the members that have this setting.
+
+    Raises
+    ------
+    UsageError
+        A setting or a member is unknown, or there are fewer than two members.
+
+    Notes
+    -----
+    The statistic is the largest (any) or smallest (all) share k*/k_m, where k* is the safety factor at which a member's
+    limit would be met (`exceedance`); without unit. Fails if its members fail: "any" with each false alarm of each of
+    them, "all" with each contact that one of them does not detect, and if members respond at different times.
+
+    Examples
+    --------
+    Half sine waves with peaks of 9, 10 and 11 N: the limit of both members is reached at a peak of 10 + 5.5 N.
+
+    >>> import numpy as np
+    >>> time, valid = np.arange(501) * 1e-3, np.zeros((501, 1), dtype=np.uint8)
+    >>> wave, run = np.sin(2.0 * np.pi * time)[:, np.newaxis], Recording("run", "", ("axis",), {})
+    >>> fitted = Combined().fit([(run, Signal(time, peak * wave, valid, "N")) for peak in (9.0, 10.0, 11.0)])
+    >>> share, band = fitted.evaluate(run, Signal(time, 15.5 * wave, valid, "N"))
+    >>> np.nanmax(share.values).round(3).item(), band.upper[0, 0].item()
+    (1.0, 1.0)
     """
 
     safety_factor: float = 1.0
@@ -121,7 +152,7 @@ class Combined:
         return any(getattr(rule, "by_class", False) for rule in self._rules())
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedCombined:
-        """Fit every member to the runs; raises what they raise."""
+        """Fit every member to the runs; see `Threshold.fit`."""
         members = tuple(rule.fit(pairs) for rule in self._rules())
         return FittedCombined(members, self.activation, self.safety_factor)
 

@@ -1,4 +1,4 @@
-"""The class of motion that runs to learn from have in common."""
+"""The class of motion that the runs to learn from have in common."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ SPEED_TOLERANCE = 0.1
 
 
 def common_class(recordings: Sequence[Recording], alignment: str = "time_then_position") -> MotionClass:
-    """Return direction, leading joint, median speed and speed course of runs of one class.
+    """Return direction, leading joint, median speed and speed curve of runs of one class.
 
-    Raises SignatureError where one is of another class: `workflows.fitting` groups the runs before.
+    Raises SignatureError if one is of another class: `workflows.fitting` groups the runs before.
     """
     classes = [measured_class(recording) for recording in recordings]
     nominal = float(np.median([item.nominal_speed for item in classes]))

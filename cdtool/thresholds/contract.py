@@ -13,13 +13,34 @@ from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
 
-_HINT = "a fault of the threshold: see docs/own-detector.md"
+_HINT = "an error in the threshold: see docs/own-detector.md"
 
 
 def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> FittedThreshold:
-    """Return what the rule learns from impact-free runs.
+    """Return what a rule learns from impact-free runs, after checking it against the contract.
 
-    Raises SignatureError if it fails or returns a class that its `fitted` does not name.
+    Parameters
+    ----------
+    rule : Threshold
+        Any threshold; may come from a plug-in.
+    pairs : sequence of (Recording, Signal)
+        Impact-free runs with the detector's signals.
+
+    Returns
+    -------
+    FittedThreshold
+        What `rule.fit` returned.
+
+    Raises
+    ------
+    SignatureError
+        The rule fails, or returns a class that its `fitted` does not name.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.limit import Limit
+    >>> checked_fit(Limit(limits=(400.0,)), []).upper
+    (400.0,)
     """
     try:
         fitted = rule.fit(pairs)
@@ -29,12 +50,45 @@ def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> F
         raise SignatureError(f"threshold {rule.name} fails: {_place(fault)}", _HINT) from fault
     if type(fitted) not in rule.fitted:
         names = ", ".join(item.__name__ for item in rule.fitted) or "none"
-        raise SignatureError(f"threshold {rule.name} makes {type(fitted).__name__}, its `fitted` names {names}", _HINT)
+        raise SignatureError(
+            f"threshold {rule.name} returns {type(fitted).__name__}, its `fitted` names {names}", _HINT
+        )
     return fitted
 
 
 def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-    """Call `threshold.evaluate`; raises RecordingError if it fails or does not return a band of the signal."""
+    """Return the statistic and band of a fitted threshold, after checking them against the contract.
+
+    Parameters
+    ----------
+    threshold : FittedThreshold
+        Any fitted threshold; may come from a plug-in.
+    recording : Recording
+        The recording on the load side.
+    signal : Signal
+        The detector's signal, values (n, J).
+
+    Returns
+    -------
+    statistic : Signal
+        What is compared with the band.
+    band : Band
+        Lower and upper limit (n, J).
+
+    Raises
+    ------
+    RecordingError
+        The threshold fails, returns other shapes than the signal's, or NaN where its status is valid.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.thresholds.limit import Limit
+    >>> signal = Signal(np.arange(2.0), np.zeros((2, 1)), np.zeros((2, 1), dtype=np.uint8), "N")
+    >>> _, band = checked_evaluation(Limit.given([400.0]), Recording("run", "", ("axis",), {}), signal)
+    >>> band.upper[:, 0].tolist()
+    [400.0, 400.0]
+    """
     name = type(threshold).__name__
     try:
         statistic, band = threshold.evaluate(recording, signal)
@@ -44,16 +98,42 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
         raise RecordingError(f"{recording.name}: threshold {name} fails: {_place(fault)}", _HINT) from fault
     shape = signal.values.shape
     if any(np.shape(item) != shape for item in (statistic.values, statistic.status, band.lower, band.upper)):
-        raise RecordingError(f"{recording.name}: threshold {name} gives another shape than the signal's {shape}", _HINT)
+        raise RecordingError(
+            f"{recording.name}: threshold {name} returns another shape than the signal's {shape}", _HINT
+        )
     unknown = np.isnan(statistic.values) | np.isnan(band.lower) | np.isnan(band.upper)
     if np.any(unknown & statistic.valid):
-        # NaN crosses no limit: it would be a threshold that sees nothing and does not say so.
-        raise RecordingError(f"{recording.name}: threshold {name} gives NaN where it says that it judges", _HINT)
+        # NaN exceeds no limit: the threshold would detect nothing without reporting it.
+        raise RecordingError(f"{recording.name}: threshold {name} returns NaN where its status is valid", _HINT)
     return statistic, band
 
 
 def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold:
-    """`threshold.with_safety_factor`; raises SignatureError where it fails."""
+    """Return the threshold with another safety factor.
+
+    Parameters
+    ----------
+    threshold : FittedThreshold
+        Any fitted threshold; may come from a plug-in.
+    factor : float
+        The safety factor, above 0.
+
+    Returns
+    -------
+    FittedThreshold
+        What `threshold.with_safety_factor` returned.
+
+    Raises
+    ------
+    SignatureError
+        The threshold fails.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.limit import Limit
+    >>> checked_factor(Limit.given([400.0]), 1.5).upper
+    (600.0,)
+    """
     try:
         return threshold.with_safety_factor(factor)
     except CdtoolError:
@@ -63,7 +143,33 @@ def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold
 
 
 def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
-    """`base.exceedance`; raises SignatureError where the threshold fails."""
+    """Return `exceedance` of a threshold that may come from a plug-in.
+
+    Parameters
+    ----------
+    threshold : FittedThreshold
+        Any fitted threshold.
+    recording : Recording
+        The recording on the load side.
+    signal : Signal
+        The detector's signal, values (n, J).
+
+    Returns
+    -------
+    statistic : Signal
+        The statistic of the threshold.
+    met_at : ndarray of float, shape (n, J)
+        The safety factor at which the limit of each sample would be met.
+
+    Raises
+    ------
+    SignatureError
+        The threshold fails.
+
+    Examples
+    --------
+    See `exceedance`.
+    """
     try:
         return exceedance(threshold, recording, signal)
     except CdtoolError:

@@ -11,21 +11,53 @@ import numpy as np
 from cdtool.detection import Signal
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.innovation import check_order
+from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_above, check_sides
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.stretches import filtered, section_bounds
 
 
 @dataclass(frozen=True)
 class Cusum:
-    """Limits -+ `safety_factor` on the cumulative sum of the innovations beyond a drift (Page 1954).
+    """Limits -+ `safety_factor` on the cumulative sum of the innovations beyond a drift.
 
-    g+_k = max(0, g+_{k-1} + nu_k - `drift`), g-_k = max(0, g-_{k-1} - nu_k - `drift`); statistic = g+, or -g- where
-    that is larger; with one monitored side, only the sum of that side. nu is the innovation of `innovation`, all in its
-    standard deviations; `drift` is half the shift to be found. The sum is kept over a gap of up to 0.15 s or
-    20 samples and restarts after a longer one. A steady contact force F moves the innovations by (1 - sum a_i) F. Fails
-    if the normal mean has moved (payload, temperature): the sum grows without limit; it clears slowly after an alarm.
+    Parameters
+    ----------
+    safety_factor : float
+        The limit, in standard deviations of the innovation.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    order : int
+        Order p of the autoregressive model, 1 to 20.
+    drift : float
+        Half the shift to be detected, in standard deviations of the innovation.
+    signature : Signature, optional
+        How mean and spread are learned; by default `Signature()`.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Not in the thesis; Page, "Continuous inspection schemes", Biometrika 41, 1954. With nu the innovation of
+    `Innovation`:
+
+        g+_k = max(0, g+_{k-1} + nu_k - drift),   g-_k = max(0, g-_{k-1} - nu_k - drift)
+
+    The statistic is g+, or -g- if that is larger; with one side monitored, only the sum of that side. The sum is kept
+    over a gap of up to 0.15 s or 20 samples and restarts after a longer one. A constant contact force F moves the
+    innovations by (1 - sum a_i) F. Fails if the normal mean has moved (payload, temperature): the sum grows without
+    limit; it clears slowly after an alarm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> values = np.array([0.0, 0.0, 3.0, 3.0, 3.0])[:, np.newaxis]
+    >>> innovations = Signal(np.arange(5) * 1e-3, values, np.zeros((5, 1), dtype=np.uint8), "1")
+    >>> Cusum(drift=1.0).statistic(innovations, side=1, longest_gap=0.15).values[:, 0].tolist()
+    [0.0, 0.0, 2.0, 4.0, 6.0]
     """
 
     safety_factor: float = 15.0
@@ -45,11 +77,11 @@ class Cusum:
         check_above(self.drift, 0.0, "drift")
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
-        """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
+        """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
         return fit_sequential(self, pairs)
 
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
-        """The sum on the watched side, or the larger of both with its sign, in standard deviations."""
+        """Return the sum of the monitored side, or the larger of both with its sign, in standard deviations."""
 
         def test(values: FloatArray, step: FloatArray) -> FloatArray:
             result = np.zeros(len(values))
@@ -63,7 +95,7 @@ class Cusum:
 
 
 def _sum(values: FloatArray) -> FloatArray:
-    """max(0, g + values), sample by sample, from g = 0: the sum less the lowest that it has been."""
+    """Return max(0, g + values) sample by sample, from g = 0: the sum minus its lowest value so far."""
     total = np.cumsum(values)
     result: FloatArray = total - np.minimum.accumulate(np.minimum(total, 0.0))
     return result

@@ -9,10 +9,10 @@ from cdtool.recording import FloatArray
 
 
 def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:
-    """s / (1 + s tau) of `values` (m,): their trend, per s; `step` (m,) s, infinite where the filter starts from rest.
+    """Return s / (1 + s tau) of `values` (m,): their trend, per s; `step` (m,) s is infinite where the filter starts.
 
-    y_k = a y_{k-1} + (1 - a) (i_k - i_{k-1}) / T_k, a = exp(-T_k / tau): exact for a signal that runs straight between
-    two samples, for any T_k. Times tau it is the high-pass s tau / (1 + s tau).
+    y_k = a y_{k-1} + (1 - a) (i_k - i_{k-1}) / T_k, a = exp(-T_k / tau): exact for a signal that is a straight line
+    between two samples, for any T_k. Times tau it is the high-pass s tau / (1 + s tau).
     """
     going = np.isfinite(step)
     forget = np.where(going, np.exp(-step / time_constant), 0.0)
@@ -22,7 +22,10 @@ def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -
 
 
 def low_passed(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:
-    """1 / (1 + s tau) of `values` (m,): y_k = a y_{k-1} + (1 - a) (u_k + u_{k-1}) / 2; starts at the first value."""
+    """Return 1 / (1 + s tau) of `values` (m,), starting at the first value.
+
+    y_k = a y_{k-1} + (1 - a) (u_k + u_{k-1}) / 2, a = exp(-T_k / tau).
+    """
     going = np.isfinite(step)
     forget = np.where(going, np.exp(-step / time_constant), 0.0)
     mean = values.copy()
@@ -31,7 +34,7 @@ def low_passed(values: FloatArray, step: FloatArray, time_constant: float) -> Fl
 
 
 def recursion(forget: FloatArray, drive: FloatArray) -> FloatArray:
-    """y_k = forget_k y_{k-1} + drive_k (m,), from y = 0."""
+    """Return y_k = forget_k y_{k-1} + drive_k (m,), from y = 0."""
     result = np.empty(len(drive))
     _recursion(np.ascontiguousarray(forget), np.ascontiguousarray(drive), result)
     return result

@@ -1,4 +1,4 @@
-"""A learned signature: curves along the stroke and the rule that makes limits of them."""
+"""A learned signature: curves along the stroke and the rule that derives limits from them."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ SIDES = ("one", "two")
 
 @dataclass(frozen=True)
 class FittedSignature:
-    """Statistics of the runs along the stroke, for one class of motion, and the rule that makes limits of them.
+    """Statistics of the runs along the stroke, for one class of motion, and the rule that derives limits from them.
 
-    `evaluate`: time since motion start counts while accelerating, travel afterwards (or one of them alone). Status
-    NO_LIMIT before the motion starts and where too few runs have been.
+    `evaluate` uses the time since the motion began while accelerating, and the travel afterwards (or only one of them).
+    Status NO_LIMIT before the motion begins and where there are too few runs.
     """
 
     motion: MotionClass
@@ -41,9 +41,9 @@ class FittedSignature:
     by_position: Curve
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and its band on the signal's clock; raises RecordingError without speed and position.
+        """Return the signal and its band on the signal's clock; raises RecordingError without speed and position.
 
-        Raises SignatureError where the signal is of other joints than those that were learned.
+        Raises SignatureError if the signal is of other joints than those learned.
         """
         if signal.joints != self.joints:
             learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
@@ -59,7 +59,7 @@ class FittedSignature:
         return with_limits(signal, lower, upper)
 
     def limits(self, curve: Curve) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper limit (g, J) on a curve's grid: mean -+ k s, the side without a limit infinite."""
+        """Return lower and upper limit (g, J) on the grid of a curve: mean -+ k s, infinite without a limit."""
         mean, spread = curve.band(self.pooled)
         reach = self.safety_factor * spread
         lower, upper = mean - reach, mean + reach
@@ -72,9 +72,9 @@ class FittedSignature:
     def with_run(
         self, recording: Recording, signal: Signal, forget: float | None = None, cap: float | None = None
     ) -> FittedSignature:
-        """The signature with one more impact-free run, by Welford's update, or by forgetting with N_eff = `forget`.
+        """Return the signature with one more impact-free run: Welford's update, or forgetting with N_eff = `forget`.
 
-        `cap`: the run counts as no further than that many spreads from the mean, place by place (see `guarded`).
+        `cap`: at each grid point the run counts as no further than that many spreads from the mean (see `guarded`).
         """
         by_time, by_position = self.samples(recording, signal)
         if cap is not None:
@@ -87,12 +87,12 @@ class FittedSignature:
         )
 
     def without_run(self, recording: Recording, signal: Signal) -> FittedSignature:
-        """The signature as learned from all its runs but this one, on the same grid; not where runs were forgotten."""
+        """Return the signature as learned from all its runs except this one, on the same grid; not after forgetting."""
         by_time, by_position = self.samples(recording, signal)
         return replace(self, by_time=self.by_time.without(by_time), by_position=self.by_position.without(by_position))
 
     def samples(self, recording: Recording, signal: Signal) -> tuple[FloatArray, FloatArray]:
-        """One run's values on the grids of `by_time` and `by_position`, each (g, J), NaN where it has none."""
+        """Return the values of one run on the grids of `by_time` and `by_position`, each (g, J); NaN without a value"""
         where = self.progress(recording, signal.time)
         by_time, by_position = (
             resample(signal, where, curve, axis) for curve, axis in axes_of(self.by_time, self.by_position, where)
@@ -100,7 +100,7 @@ class FittedSignature:
         return by_time, by_position
 
     def with_safety_factor(self, factor: float) -> FittedSignature:
-        """The same with its limits at `factor` spreads from the mean."""
+        """Return the signature with its limits at `factor` spreads from the mean."""
         return replace(self, safety_factor=factor)
 
     @property
@@ -121,7 +121,7 @@ class FittedSignature:
         return int(max(self.by_time.count.max(initial=0), self.by_position.count.max(initial=0)))
 
     def changes_curve(self, recording: Recording, clock: FloatArray) -> BoolArray:
-        """True (n,) at the sample from which on travel counts instead of time: mean and spread may jump there."""
+        """Return True (n,) at the sample from which travel counts instead of time: mean and spread may jump there."""
         changes = np.zeros(len(clock), dtype=bool)
         if self.alignment == "time_then_position":
             running = self.progress(recording, clock).running
@@ -129,7 +129,7 @@ class FittedSignature:
         return changes
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the signature as JSON values."""
         return {
             "direction": self.motion.direction,
             "nominal_speed": self.motion.nominal_speed,
@@ -148,7 +148,7 @@ class FittedSignature:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the signature that `to_dict` has written."""
         return cls(
             motion=MotionClass(
                 int(values["direction"]),
@@ -168,7 +168,7 @@ class FittedSignature:
         )
 
     def progress(self, recording: Recording, clock: FloatArray) -> Progress:
-        """Where in its stroke a recording is at the times of `clock`; raises RecordingError without its channels."""
+        """Return where in its stroke a recording is at each time of `clock`; raises RecordingError."""
         speed = self.motion.nominal_speed
         return progress(
             recording,
@@ -192,12 +192,37 @@ class FittedSignature:
 
 
 def axes_of(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[Curve, FloatArray], ...]:
-    """Each curve with the axis along which it runs."""
+    """Return each curve with its axis."""
     return ((by_time, where.elapsed), (by_position, where.travel))
 
 
 def known(what: str, value: Any, allowed: Sequence[str]) -> str:
-    """The value if it is one of those allowed; raises UsageError with the nearest."""
+    """Return a value if it is one of those allowed.
+
+    Parameters
+    ----------
+    what : str
+        Name of the setting, for the message.
+    value : object
+        The value.
+    allowed : sequence of str
+        The values allowed.
+
+    Returns
+    -------
+    str
+        The value.
+
+    Raises
+    ------
+    UsageError
+        The value is not allowed; the hint names the nearest that is.
+
+    Examples
+    --------
+    >>> known("sides", "one", SIDES)
+    'one'
+    """
     if value not in allowed:
         raise UsageError(f"unknown {what} {value_in_words(value)}", nearest(str(value), allowed))
     return str(value)

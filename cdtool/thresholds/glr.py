@@ -12,21 +12,53 @@ from cdtool.detection import Signal
 from cdtool.errors import UsageError
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.innovation import check_order
+from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.stretches import filtered, section_bounds
 
 
 @dataclass(frozen=True)
 class Glr:
-    """Limits -+ `safety_factor` on the window-limited likelihood ratio for a shift of the innovations (Willsky 1976).
+    """Limits -+ `safety_factor` on the window-limited likelihood ratio for a shift of the innovations.
 
-    Z = sum of the last L innovations / sqrt(L), the largest in size over the `windows` L (samples); Z^2 / 2 is the
-    log-likelihood ratio of a mean shift that began L samples ago. With one side watched, the largest on that side. In
-    standard deviations. A window holds over a gap of up to 0.15 s or 20 samples, and never reaches over a longer
-    one. Fails where the normal mean has moved (payload, temperature), and against a shift slower than the longest
-    window.
+    Parameters
+    ----------
+    safety_factor : float
+        The limit, in standard deviations.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    order : int
+        Order p of the autoregressive model, 1 to 20.
+    windows : tuple of int
+        Numbers L of last samples over which a shift is sought.
+    signature : Signature, optional
+        How mean and spread are learned; by default `Signature()`.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Not in the thesis; Willsky and Jones, IEEE Trans. Automatic Control 21, 1976. With nu the innovation of
+    `Innovation`:
+
+        Z = sum of the last L innovations / sqrt(L)
+
+    The statistic is the largest Z in size over the windows, or the largest on the monitored side; Z^2 / 2 is the
+    log-likelihood ratio of a shift of the mean that began L samples ago. A window extends over a gap of up to 0.15 s or
+    20 samples, and never over a longer one. Fails if the normal mean has moved (payload, temperature), and with a shift
+    slower than the longest window.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> values = np.array([0.0, 0.0, 2.0, 2.0, 2.0, 2.0])[:, np.newaxis]
+    >>> innovations = Signal(np.arange(6) * 1e-3, values, np.zeros((6, 1), dtype=np.uint8), "1")
+    >>> Glr(windows=(1, 4)).statistic(innovations, side=1, longest_gap=0.15).values[:, 0].tolist()
+    [0.0, 0.0, 2.0, 2.0, 3.0, 4.0]
     """
 
     safety_factor: float = 9.0
@@ -47,11 +79,11 @@ class Glr:
             raise UsageError(f"windows are {list(self.windows)}", "numbers of samples, each at least 1")
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
-        """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
+        """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
         return fit_sequential(self, pairs)
 
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
-        """Z of the window that speaks most for a shift, in standard deviations; 0 until the shortest one is full."""
+        """Return Z of the window with the strongest evidence, in standard deviations; 0 until a window is full."""
 
         def test(values: FloatArray, step: FloatArray) -> FloatArray:
             result = np.zeros(len(values))

@@ -17,7 +17,7 @@ from cdtool.thresholds.signature_curve import Curve
 # spread comes out 0.3 % smaller than without a cap.
 CAP = 3.0
 # No limit is learned further than this many of the first spreads from where it was first learned. On the simulated
-# gate, where nothing drifts, 14 runs know the spread so badly that 2 would refuse a fifth of all runs, 3 some 3 %.
+# gate, where nothing drifts, 14 runs determine the spread so poorly that 2 would refuse a fifth of all runs; 3: 3 %.
 RESERVE = 3.0
 # A run that covers this share of the learned stroke has completed it.
 _COMPLETE = 0.95
@@ -32,12 +32,40 @@ def guarded(
     cap: float = CAP,
     reserve: float = RESERVE,
 ) -> FittedSignature:
-    """`current` with one more impact-free run, unless a limit would leave the first one's neighbourhood.
+    """Return a signature with one more impact-free run, unless a limit would move too far from the one first learned.
 
-    The run's deviation from the mean is clipped to `cap` spreads s before Welford's update (weight w = 1 / (n + 1)) or
-    forgetting (w = 1 / `forget`): see `largest_move` for how far one run can move a limit. All updates together move
-    no limit by more than `reserve` spreads of `first`. Raises SignatureError, with the place, where they would, or
-    where the run does not complete the stroke; UsageError for a cap or reserve that is not above 0.
+    Parameters
+    ----------
+    first : FittedSignature
+        The signature as first learned.
+    current : FittedSignature
+        The signature to update.
+    recording : Recording
+        The run, on the load side.
+    signal : Signal
+        The detector's signal of the run.
+    forget : float, optional
+        Effective number of runs: the weight of the run is w = 1 / forget. By default Welford's update, w = 1 / (n + 1).
+    cap : float
+        The deviation of the run from the mean is clipped to this many spreads; see `largest_move` for the effect.
+    reserve : float
+        All updates together move no limit by more than this many spreads of `first`.
+
+    Returns
+    -------
+    FittedSignature
+        The updated signature.
+
+    Raises
+    ------
+    SignatureError
+        A limit would move too far, with its location, or the run does not complete the stroke.
+    UsageError
+        `cap` or `reserve` is not above 0.
+
+    Examples
+    --------
+    `cdtool.update_signature` updates a signature file run by run and has an example.
     """
     for name, value in (("cap", cap), ("reserve", reserve)):
         if not value > 0.0:
@@ -52,18 +80,19 @@ def guarded(
 
 
 def largest_move(safety_factor: float, weight: float, cap: float) -> float:
-    """How far one run moves a limit at most, in the largest spread near it: w c + k (sqrt((1 + 2 w c)^2 + w c^2) - 1).
+    """Return how far one run can move a limit, in the largest spread near it.
 
-    `weight` w as in `guarded`, `cap` c, safety factor k. With that spread S the mean moves by at most w c S, its
-    deviation from its smoothed course by twice that, the variance by at most w (c S)^2. A run that is off by c spreads
-    or more all along moves an even limit by w c + k (sqrt((1 - w) (1 + w c^2)) - 1) where runs are forgotten.
+    w c + k (sqrt((1 + 2 w c)^2 + w c^2) - 1), `weight` w as in `guarded`, `cap` c, safety factor k. With that spread S
+    the mean moves by at most w c S, its deviation from its smoothed curve by twice that, the variance by at most
+    w (c S)^2. A run that deviates by c spreads or more everywhere moves an even limit by
+    w c + k (sqrt((1 - w) (1 + w c^2)) - 1) if runs are forgotten.
     """
     shift = weight * cap
     return shift + safety_factor * (float(np.sqrt((1.0 + 2.0 * shift) ** 2 + shift * cap)) - 1.0)
 
 
 def check_complete(signature: FittedSignature, recording: Recording, signal: Signal) -> None:
-    """Raise SignatureError, with the share that was covered, where a run ends before the stroke that was learned."""
+    """Raise SignatureError, with the share that was covered, if a run ends before the stroke that was learned."""
     where = signature.progress(recording, signal.time)
     by_time = signature.alignment == "time"
     reached, end = (where.elapsed, signature.by_time.end) if by_time else (where.travel, signature.by_position.end)
@@ -76,7 +105,7 @@ def check_complete(signature: FittedSignature, recording: Recording, signal: Sig
 
 @dataclass(frozen=True)
 class _Part:
-    """One curve's limits before and after, (g, J), where they count; `spread` is the first one's."""
+    """The limits of one curve before and after, (g, J), where they count; `spread` is that of the first."""
 
     axis: str
     grid: FloatArray
@@ -85,9 +114,9 @@ class _Part:
     spread: FloatArray
 
     def check(self, reserve: float, unit: str) -> None:
-        """Raise SignatureError where a limit is lost, or further than `reserve` spreads from the first one."""
+        """Raise SignatureError if a limit is lost, or further than `reserve` spreads from the first one."""
         for old, new in zip(self.first, self.updated, strict=True):
-            # Where the stroke begins and ends, how many runs have been there changes from run to run.
+            # At both ends of the stroke the number of runs changes from run to run.
             left = np.flatnonzero(~np.isnan(new).all(axis=1))
             within = np.arange(len(new)) > (left[0] if len(left) else 0)
             within &= np.arange(len(new)) < (left[-1] if len(left) else len(new))
@@ -102,8 +131,8 @@ class _Part:
             if moved.max(initial=0.0) > reserve:
                 place = self._place(moved == moved.max(), unit)
                 raise SignatureError(
-                    f"{place} the limit would be {moved.max():.1f} spreads from the one first learned, "
-                    f"{reserve:g} are allowed",
+                    f"{place} the limit would be {moved.max():.1f} spreads from the one first learned; "
+                    f"at most {reserve:g} allowed",
                     "inspect the machine there, then relearn",
                 )
 
@@ -113,7 +142,7 @@ class _Part:
 
 
 def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) -> list[_Part]:
-    """What counts of each curve: that of time up to where this run had accelerated, that of travel from there on."""
+    """Return the part that counts of each curve: of time until this run had accelerated, of travel from then."""
     running = np.flatnonzero(where.running)
     begun = int(running[0]) if len(running) else len(where.elapsed) - 1
     mixed = first.alignment == "time_then_position"

@@ -16,13 +16,50 @@ from cdtool.thresholds.signature import Signature
 
 @dataclass(frozen=True)
 class Innovation:
-    """Limits -+ `safety_factor` on the innovation: the part of a sample that the previous ones do not predict (2.3.1).
+    """Limits -+ `safety_factor` on the innovation: the part of a sample that the previous ones do not predict.
 
-    e = (i - mu(x)) / s(x), nu_k = e_k - sum a_i e_{k-i}, statistic = nu_k / sd(nu), in standard deviations. mu and s
-    are the signature's, learned from at least 10 runs of one class; a of order `order` by Burg's recursion over all
-    runs. Samples are counted, not timed: the rate must be that of the runs. After a gap the model restarts
-    from the normal spread. Does not detect slow ramps, which the model predicts. Fails with soft impacts, if the noise
-    varies along the stroke, and with a debounce: an innovation is large for only a few samples.
+    Parameters
+    ----------
+    safety_factor : float
+        The limit, in standard deviations of the innovation.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    order : int
+        Order p of the autoregressive model, 1 to 20.
+    signature : Signature, optional
+        How mean and spread are learned; by default `Signature()`.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Thesis 2.3.1, stochastic difference equations:
+
+        e = (i - mu(x)) / s(x),   nu_k = e_k - sum a_i e_{k-i},   statistic = nu_k / sd(nu)
+
+    mu and s are those of the signature, learned from at least 10 runs of one class; a is estimated by Burg's recursion
+    over all runs. Samples are counted, not timed: the sample rate must be that of the runs. After a gap the model
+    restarts from the normal spread. It does not detect slow ramps, which the model predicts. Fails with soft impacts,
+    if the noise varies along the stroke, and with a debounce: an innovation is large for only a few samples.
+
+    Examples
+    --------
+    The innovations of impact-free strokes have a standard deviation of 1.
+
+    >>> import numpy as np
+    >>> from cdtool.recording import Series
+    >>> time, valid = np.arange(2001) * 1e-3, np.zeros((2001, 1), dtype=np.uint8)
+    >>> channels = {"speed": Series(time, np.full(2001, 0.2), "m/s"), "position": Series(time, 0.2 * time, "m")}
+    >>> strokes = [Recording(f"{i}", "", ("axis",), channels) for i in range(10)]
+    >>> rng = np.random.default_rng(1)
+    >>> noise = [Signal(time, rng.normal(size=(2001, 1)), valid, "N") for _ in strokes]
+    >>> fitted = Innovation(order=2).fit(list(zip(strokes, noise)))
+    >>> statistic, band = fitted.evaluate(strokes[0], noise[0])
+    >>> statistic.values[statistic.valid].std().round(1).item(), band.upper[-1, 0].item()
+    (1.0, 5.5)
     """
 
     safety_factor: float = 5.5
@@ -40,15 +77,15 @@ class Innovation:
         check_order(self.order)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
-        """Learn from impact-free runs of one class; raises SignatureError where they are too few or differ."""
+        """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
         return fit_sequential(self, pairs)
 
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:  # noqa: ARG002 - both signs serve
-        """The innovations themselves."""
+        """Return the innovations unchanged."""
         return innovations
 
 
 def check_order(order: int) -> None:
-    """Raise UsageError for an order that no model has."""
+    """Raise UsageError for an order outside 1 to `LARGEST_ORDER`."""
     if not 1 <= order <= LARGEST_ORDER:
         raise UsageError(f"order is {order}", f"a whole number from 1 to {LARGEST_ORDER}")

@@ -18,7 +18,20 @@ from cdtool.thresholds.base import with_limits
 class FittedLimit:
     """lower < i < upper, the same at every sample: `safety_factor` spreads from the extremes of normal runs.
 
-    Each has one value for all joints or one per joint; an infinite spread means no limit.
+    Parameters
+    ----------
+    least, greatest : tuple of float
+        Extremes of normal runs in the signal's unit, one value for all joints or one per joint.
+    spread_below, spread_above : tuple of float
+        Their standard deviations; infinite: no limit on that side.
+    safety_factor : float
+        Number of spreads from the extremes to the limits.
+
+    Examples
+    --------
+    >>> limit = FittedLimit((-8.0,), (10.0,), spread_below=(1.0,), spread_above=(2.0,), safety_factor=5.0)
+    >>> limit.lower, limit.upper
+    ((-13.0,), (20.0,))
     """
 
     least: tuple[float, ...]
@@ -51,11 +64,11 @@ class FittedLimit:
         return with_limits(signal, np.broadcast_to(self.lower, shape), np.broadcast_to(self.upper, shape))
 
     def with_safety_factor(self, factor: float) -> FittedLimit:
-        """The same with its limits at `factor` spreads from the extremes."""
+        """Return the threshold with its limits at `factor` spreads from the extremes."""
         return replace(self, safety_factor=factor)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values; an infinite spread is null."""
+        """Return the threshold as JSON values; an infinite spread is null."""
         values = asdict(self)
         for name in ("spread_below", "spread_above"):
             values[name] = [None if np.isinf(x) else x for x in values[name]]
@@ -63,7 +76,7 @@ class FittedLimit:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         names = ("least", "greatest", "spread_below", "spread_above")
         columns = {name: tuple(np.inf if x is None else float(x) for x in values[name]) for name in names}
         return cls(**columns, safety_factor=float(values["safety_factor"]))
@@ -73,8 +86,35 @@ class FittedLimit:
 class Limit:
     """Constant limits: the mean of the runs' extremes, `safety_factor` of their standard deviations further out.
 
-    Fixed `limits`, |i| < limit in the signal's unit, one for all joints or one per joint, replace the learned limits.
-    Fails if friction or gravity vary along the path, if a sensor drifts, or if the speed changes.
+    Parameters
+    ----------
+    safety_factor : float
+        Number of standard deviations (n - 1) from the mean extreme to the limit.
+    limits : tuple of float
+        Fixed limits |i| < limit in the signal's unit, one for all joints or one per joint, in place of learned ones;
+        infinite: the joint is not monitored.
+
+    Raises
+    ------
+    UsageError
+        A fixed limit is not above 0.
+
+    Notes
+    -----
+    Thesis 2.3.1, absolute limits. Fails if friction or gravity vary along the path, if a sensor drifts, or if the speed
+    changes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time, valid = np.arange(3) * 1e-3, np.zeros((3, 1), dtype=np.uint8)
+    >>> runs = [
+    ...     (Recording("run", "", ("axis",), {}), Signal(time, np.array([[0.0], [peak], [0.0]]), valid, "N"))
+    ...     for peak in (9.0, 10.0, 11.0)
+    ... ]
+    >>> limit = Limit(safety_factor=5.0).fit(runs)
+    >>> [round(value, 6) for value in (*limit.lower, *limit.upper)]
+    [0.0, 15.0]
     """
 
     safety_factor: float = 5.5
@@ -89,7 +129,7 @@ class Limit:
             self.given(self.limits)  # raises UsageError for values that are not limits
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
-        """Learn limits from impact-free runs; raises SignatureError with fewer than 2 runs or without valid samples."""
+        """Learn limits from at least 2 impact-free runs; see `Threshold.fit`."""
         if self.limits:
             return self.given(self.limits)
         if len(pairs) < 2:
@@ -117,6 +157,6 @@ class Limit:
         """
         values = tuple(limits)
         if not all(value > 0.0 for value in values):
-            raise UsageError(f"limits are {list(values)}", "numbers above 0 are needed (inf: not watched)")
+            raise UsageError(f"limits are {list(values)}", "numbers above 0 are needed (inf: not monitored)")
         nothing = (0.0,) * len(values)
         return FittedLimit(nothing, nothing, values, values)

@@ -27,10 +27,10 @@ _COVERAGE = 0.8
 
 @dataclass(frozen=True)
 class FittedTrendTable:
-    """Limits on i at each level of its trend: `levels` (s, J) per s as shares of the runs' extremes, `limits` s times.
+    """Limits on i at each level of its trend: `levels` (s, J) per s as shares of the runs' extremes, with s `limits`.
 
-    Level 0 is any trend; at level m the upper limit holds for trends of at least `rising[m]`, the lower one for those
-    of at most `falling[m]`. A trend above the highest level that most runs reach takes that level's limit.
+    Level 0 is any trend; at level m the upper limit applies to trends of at least `rising[m]`, the lower one to those
+    of at most `falling[m]`. A trend above the highest level that most runs reach has the limit of that level.
     """
 
     rising: FloatArray
@@ -41,15 +41,15 @@ class FittedTrendTable:
 
     @property
     def safety_factor(self) -> float:
-        """Standard deviations from the runs' mean extreme to the limit."""
+        """Number of standard deviations from the mean extreme of the runs to the limit."""
         return self.limits[0].safety_factor
 
     def with_safety_factor(self, factor: float) -> FittedTrendTable:
-        """The same with its limits at `factor` standard deviations."""
+        """Return the threshold with its limits at `factor` standard deviations."""
         return replace(self, limits=tuple(item.with_safety_factor(factor) for item in self.limits))
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The signal and the band of its trend; raises UsageError where the number of joints differs."""
+        """Return the signal and the band of its trend; raises UsageError if the number of joints differs."""
         joints = signal.values.shape[1]
         if self.rising.shape[1] != joints:
             raise UsageError(
@@ -63,7 +63,7 @@ class FittedTrendTable:
         return with_limits(replace(signal, status=trend.status), lower, upper)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the threshold as JSON values."""
         return {
             "rising": self.rising.tolist(),
             "falling": self.falling.tolist(),
@@ -74,7 +74,7 @@ class FittedTrendTable:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         return cls(
             rising=np.array(values["rising"], dtype=np.float64),
             falling=np.array(values["falling"], dtype=np.float64),
@@ -86,13 +86,45 @@ class FittedTrendTable:
 
 @dataclass(frozen=True)
 class LimitAndTrend:
-    """Limits on the value that its trend moves: early for what rises fast, wide for what does not (figure 2.5).
+    """Limits on the value that depend on its trend: early for a fast rise, wide otherwise.
 
-    `shape` "line": statistic = i + `lead` di/dt, a straight line in the plane of value and trend: it sees the value
-    `lead` [s] ahead. "table": I_max = f(di/dt), a limit on i for each of `steps` levels of the trend: the runs' extreme
-    of i where the trend is at or above that level. The trend is filtered with `time_constant` [s]; limits as those of
-    `limit`, in the signal's unit. A gap above 3 time constants restarts the trend. Fails where the normal signal
-    rises as fast as a contact makes it rise, and with a noisy signal.
+    Parameters
+    ----------
+    safety_factor : float
+        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    shape : {"line", "table"}
+        "line": statistic = i + `lead` di/dt, a straight line in the plane of value and trend. "table": I_max =
+        f(di/dt), a limit on i for each of `steps` levels of the trend.
+    lead : float
+        How far ahead the line extrapolates [s].
+    time_constant : float
+        Time constant of the low-pass of the trend [s].
+    steps : int
+        Number of levels of the table; at each, the limit is learned from the runs' extremes of i where the trend is at
+        or above it.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Thesis 2.3.2 and figure 2.5; the text has I_max = f(dI_max/dt) for I_max = f(di/dt) (docs/errata.md). In the
+    signal's unit; limits are learned as those of `Limit`. A gap above 3 time constants restarts the trend. Fails if the
+    normal signal rises as fast as a contact makes it rise, and with a noisy signal.
+
+    Examples
+    --------
+    A ramp of 100 N/s, at 49.9 N, is 2 N higher 20 ms later.
+
+    >>> import numpy as np
+    >>> time = np.arange(500) * 1e-3
+    >>> ramp = Signal(time, 100.0 * time[:, np.newaxis], np.zeros((500, 1), dtype=np.uint8), "N")
+    >>> LimitAndTrend(lead=0.02).statistic(ramp, 1e-3).values[-1, 0].round(3).item()
+    51.9
     """
 
     safety_factor: float = 5.5
@@ -115,17 +147,17 @@ class LimitAndTrend:
 
     @property
     def by_class(self) -> bool:
-        """Which side opposes the motion depends on its class."""
+        """True if one side is monitored: which side opposes the motion depends on its class."""
         return self.sides == "one"
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit | FittedTrendTable:
-        """Limits of the line or the table; raises SignatureError with fewer than two runs or without valid samples."""
+        """Learn limits of the line or the table from at least 2 impact-free runs; see `Threshold.fit`."""
         if self.shape == "line":
             return fit_statistic_limit(self, pairs)
         return _fit_trend_table(pairs, self.safety_factor, self.sides, self.time_constant, self.steps)
 
     def statistic(self, signal: Signal, period: float) -> Signal:  # noqa: ARG002 - steps are measured
-        """i + lead di/dt, in the signal's unit."""
+        """Return i + lead di/dt, in the signal's unit."""
         trend = trend_of(signal, self.time_constant)
         return replace(trend, values=signal.values + self.lead * trend.values, unit=signal.unit)
 
@@ -137,7 +169,7 @@ def _fit_trend_table(
     time_constant: float,
     steps: int,
 ) -> FittedTrendTable:
-    """Levels at equal shares of the runs' mean extreme trend, and limits of i at each; raises SignatureError."""
+    """Return levels at equal shares of the runs' mean extreme trend, and limits of i at each; raises SignatureError."""
     trends = [trend_of(signal, time_constant) for _, signal in pairs]
     tops = Limit().fit([(recording, trend) for (recording, _), trend in zip(pairs, trends, strict=True)])
     shares = (np.arange(steps) / steps)[:, np.newaxis]
@@ -157,7 +189,7 @@ def _fit_trend_table(
 
 
 def _highest(signal: Signal, values: FloatArray, there: BoolArray) -> FloatArray:
-    """The largest value (J,) of a run among valid samples `there`; -inf without one."""
+    """Return the largest value (J,) of a run among the valid samples `there`; -inf without one."""
     highest: FloatArray = np.max(np.where(signal.valid & there, values, -np.inf), axis=0)
     return highest
 

@@ -92,15 +92,15 @@ class NormalMotion:
         return Comparison(normal.unit, series.time, value, *samples, level, *means, *reaches)
 
     def serves(self, recording: Recording) -> bool:
-        """Whether a recording has these joints, and what says where in its stroke it is."""
+        """Whether a recording has these joints, and the channels that locate it in its stroke."""
         return recording.joints == self.joints and "speed" in recording and "position" in recording
 
     def progress(self, recording: Recording, clock: FloatArray) -> Progress:
-        """Where in its stroke a recording is at the times of `clock` [s]."""
+        """Return where in its stroke a recording is at each time of `clock` [s]."""
         return _progress(recording, clock, self.motion)
 
     def with_run(self, recording: Recording, cap: float, forget: float | None = None) -> NormalMotion:
-        """With one more impact-free run, by Welford's update or by forgetting, clipped as a signature's run is."""
+        """Return the curves with one more impact-free run, updated and clipped like a signature."""
         channels = dict(self.channels)
         for name, normal in self.channels.items():
             if name not in recording or recording[name].unit != normal.unit:
@@ -116,7 +116,7 @@ class NormalMotion:
         return replace(self, runs=self.runs + 1, channels=channels)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the curves as JSON values."""
         return {
             "direction": self.motion.direction,
             "nominal_speed": self.motion.nominal_speed,
@@ -151,7 +151,29 @@ class NormalMotion:
 def learn_normal_motion(recordings: Sequence[Recording], motion: MotionClass) -> NormalMotion | None:
     """Learn normal curves of every channel from impact-free recordings of one class of motion.
 
-    Return None if fewer than `LEAST_RUNS` of them have speed and position, or if the class does not move.
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Impact-free recordings on the load side.
+    motion : MotionClass
+        Their class: direction, leading joint and nominal speed.
+
+    Returns
+    -------
+    NormalMotion or None
+        None if fewer than 3 of them have speed and position, or if the class does not move.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.recording import Series
+    >>> time, valid = np.arange(2001) * 1e-3, np.zeros((2001, 1), dtype=np.uint8)
+    >>> channels = {"speed": Series(time, np.full(2001, 0.2), "m/s"), "position": Series(time, 0.2 * time, "m")}
+    >>> strokes = [Recording(f"{i}", "", ("axis",), channels) for i in range(10)]
+    >>> from cdtool.motion import measured_class
+    >>> normal = learn_normal_motion(strokes, measured_class(strokes[0]))
+    >>> normal.runs, sorted(normal.channels)
+    (10, ['position', 'speed'])
     """
     usable = [item for item in recordings if "speed" in item and "position" in item]
     usable = [item for item in usable if item.joints == usable[0].joints]
@@ -167,9 +189,27 @@ def learn_normal_motion(recordings: Sequence[Recording], motion: MotionClass) ->
 
 
 def levels(time: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, J): at each sample the mean of the values over the `LEVEL_SECONDS` up to it.
+    """Return at each sample the mean of a channel over the last 50 ms.
 
-    NaN where more than a fifth of the samples that its clock usually has in that time are missing.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    values : ndarray of float, shape (n, J)
+        The channel, in any unit; NaN: no sample.
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        The level, in the unit of the channel; NaN where more than a fifth of the usual number of samples is missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(100) * 1e-3
+    >>> step = np.where(time < 0.05, 0.0, 10.0)[:, np.newaxis]
+    >>> levels(time, step)[[49, 99], 0].round(6).tolist()
+    [0.0, 10.0]
     """
     if len(time) < 2:
         return values.copy()
@@ -230,7 +270,7 @@ def _learn_curves(
 
 
 def _rounded(curve: Curve) -> Curve:
-    """The same to `_DIGITS` digits: spreads are known far worse, and files are read by people."""
+    """Return a curve rounded to `_DIGITS` digits: spreads are far less certain, and people read the files."""
 
     def short(values: FloatArray) -> FloatArray:
         size = np.abs(values).max(initial=0.0)
@@ -241,7 +281,7 @@ def _rounded(curve: Curve) -> Curve:
 
 
 def _from_start(channel: str, values: FloatArray, where: Progress) -> FloatArray:
-    """Positions from where the motion began, other channels as they are."""
+    """Return positions relative to where the motion began, and other channels unchanged."""
     if channel not in POSITIONS:
         return values
     begun = np.flatnonzero(np.isfinite(where.elapsed))
@@ -262,7 +302,7 @@ def _progress(recording: Recording, clock: FloatArray, motion: MotionClass) -> P
 class NormalCurves:
     """Statistics of one quantity (g, J): over time since motion start, and along the travel (None: over time alone).
 
-    `farthest_by_time` and `farthest_by_travel` (J,): the largest distance from the mean that a run keeps to for 3
+    `farthest_by_time` and `farthest_by_travel` (J,): the largest distance from the mean that a run has for 3
     samples, in spreads: over time while accelerating, and along the travel after it. Four of five runs stay within it.
     """
 
@@ -272,7 +312,7 @@ class NormalCurves:
     farthest_by_travel: FloatArray
 
     def at(self, where: Progress, least: float) -> tuple[FloatArray, FloatArray]:
-        """Mean and spread (n, J) at each place of a run; NaN where too few runs have been.
+        """Return mean and spread (n, J) at each location of a run; NaN where there are too few runs.
 
         No spread is below the share `least` of the joint's largest mean.
         """
@@ -292,9 +332,9 @@ class NormalCurves:
         return np.where(running, along[0], mean), np.where(running, along[1], spread)
 
     def updated(self, values: FloatArray, clock: FloatArray, where: Progress, cap: float, forget: float | None) -> Self:
-        """With one more run (n, J), no further than `cap` spreads from the mean; see `Curve.updated`.
+        """Return the curves with one more run (n, J), clipped to `cap` spreads from the mean; see `Curve.updated`.
 
-        How far runs go from the mean stays as first learned.
+        The largest distances of runs from the mean stay as first learned.
         """
         signal = _signal_of(clock, values)
 
@@ -305,7 +345,7 @@ class NormalCurves:
         return replace(self, by_time=one(self.by_time, where.elapsed), by_travel=by_travel)
 
     def distances(self, values: FloatArray, where: Progress) -> tuple[FloatArray, FloatArray]:
-        """How far (J,) a run is from the mean at most for 3 samples [spreads]: while accelerating, and after it."""
+        """Return how far a run is from the mean for 3 samples (J,) [spreads]: while accelerating, and after it."""
         mean, spread = self._looked_up(where)
         with np.errstate(invalid="ignore", divide="ignore"):
             off = np.abs(values - mean) / spread
@@ -319,13 +359,13 @@ class NormalCurves:
         return by_time, along
 
     def reach(self, where: Progress) -> FloatArray:
-        """(n, J): the largest distance [spreads] that impact-free runs kept to, at each place of a run."""
+        """Return the largest distance of impact-free runs from the mean (n, J) [spreads], at each location of a run."""
         running = where.running if self.by_travel is not None else np.zeros(len(where.running), dtype=bool)
         reach: FloatArray = np.where(running[:, np.newaxis], self.farthest_by_travel, self.farthest_by_time)
         return reach
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the curves as JSON values."""
         along = self.by_travel.to_dict() if self.by_travel is not None else None
         return {
             "by_time": self.by_time.to_dict(),
@@ -336,7 +376,7 @@ class NormalCurves:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the curves that `to_dict` has written."""
         along = values["by_travel"]
         by_time, by_travel = Curve.from_dict(values["by_time"]), None if along is None else Curve.from_dict(along)
         farthest = [np.array(values[name], dtype=np.float64) for name in ("farthest_by_time", "farthest_by_travel")]

@@ -1,4 +1,4 @@
-"""Limits on what a polynomial predicts of the signal a few samples ahead (thesis 2.3.1)."""
+"""Limits on the value that a polynomial predicts a few samples ahead (thesis 2.3.1)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from cdtool.detection import Signal
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
-from cdtool.thresholds.stretches import filtered
 
 # What is left of the first samples' weight when the prediction is trusted.
 _SETTLED = 0.01
@@ -23,15 +23,44 @@ _SETTLED = 0.01
 
 @dataclass(frozen=True)
 class PredictedLimit:
-    """Constant limits on the signal's prediction `ahead` samples on, by a polynomial fitted recursively (thesis 2.3.1).
+    """Constant limits on the prediction of the signal, by a polynomial fitted recursively.
 
-    i(n) = theta_0 + theta_1 n + theta_2 n^2 with n = 0 at the newest sample, least squares with weight
-    `forgetting`^age; statistic = sum theta_j `ahead`^j, in the signal's unit. Age and `ahead` are counted in sample
-    periods of the runs learned from; steps are measured. Limits as those of `limit`, learned on the predicted signal.
-    `order` 1 or 2. The longer the prediction, the more noise: order 1, forgetting 0.95 passes on 0.25 of white noise's
-    standard deviation 0 samples ahead, 0.30 at 10; order 2 0.32 and 0.47. A gap that leaves less than 1 % of the weight
-    (90 samples by default) restarts it. Fails at bends of the normal signal, where it overshoots; brings nothing
-    against an impact shorter than its memory, 1 / (1 - forgetting) samples.
+    Parameters
+    ----------
+    safety_factor : float
+        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    order : {1, 2}
+        A line or a parabola.
+    forgetting : float
+        Weight of a sample relative to the next one, 0.5 to below 1; the memory is 1 / (1 - forgetting) samples.
+    ahead : float
+        How far ahead the signal is predicted, in sample periods of the runs learned from.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Thesis 2.3.1. i(n) = theta_0 + theta_1 n + theta_2 n^2 with n = 0 at the newest sample, least squares with weight
+    forgetting^age; the statistic is sum theta_j ahead^j, in the signal's unit. Steps are measured. Limits are learned
+    as those of `Limit`, on the predicted signal. The longer the prediction, the more noise: of the standard deviation
+    of white noise, order 1 with forgetting 0.95 passes 0.25 without prediction and 0.30 at 10 samples ahead; order 2
+    passes 0.32 and 0.47. A gap after which less than 1 % of the weight is left (90 samples by default) restarts it.
+    Fails at bends of the normal signal, where it overshoots; it gains nothing in an impact shorter than its memory.
+
+    Examples
+    --------
+    A ramp of 100 N/s, at 49.9 N, is 1 N higher 10 samples later.
+
+    >>> import numpy as np
+    >>> time = np.arange(500) * 1e-3
+    >>> ramp = Signal(time, 100.0 * time[:, np.newaxis], np.zeros((500, 1), dtype=np.uint8), "N")
+    >>> PredictedLimit(ahead=10.0).statistic(ramp, 1e-3).values[-1, 0].round(3).item()
+    50.9
     """
 
     safety_factor: float = 5.5
@@ -55,15 +84,15 @@ class PredictedLimit:
 
     @property
     def by_class(self) -> bool:
-        """Which side opposes the motion depends on its class."""
+        """True if one side is monitored: which side opposes the motion depends on its class."""
         return self.sides == "one"
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit:
-        """Limits of the predicted signal; raises SignatureError with fewer than two runs or without valid samples."""
+        """Learn limits of the predicted signal from at least 2 impact-free runs; see `Threshold.fit`."""
         return fit_statistic_limit(self, pairs)
 
     def statistic(self, signal: Signal, period: float) -> Signal:
-        """The prediction, in the signal's unit; `period` [s] is what a sample is counted as."""
+        """Return the prediction, in the signal's unit; `period` [s] is the length of a sample."""
 
         def predict(values: FloatArray, step: FloatArray) -> FloatArray:
             result = np.empty(len(values))

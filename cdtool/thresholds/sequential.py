@@ -1,4 +1,4 @@
-"""Constant limits on a statistic of the whitened deviation: what `innovation`, `cusum` and `glr` share."""
+"""Constant limits on a statistic of the whitened deviation, shared by `innovation`, `cusum` and `glr`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LARGEST_ORDER = 20
 
 
 class SequentialRule(Threshold, Protocol):
-    """A threshold that makes a statistic of innovations."""
+    """A threshold that derives a statistic from innovations."""
 
     @property
     def safety_factor(self) -> float:
@@ -44,7 +44,7 @@ class SequentialRule(Threshold, Protocol):
         ...
 
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:
-        """The statistic, causal; `side` +1 or -1 where one is watched; a gap above `longest_gap` [s] restarts it."""
+        """Return the statistic, causal; `side` +1 or -1 if one is monitored; a gap over `longest_gap` s restarts it."""
         ...
 
 
@@ -68,16 +68,16 @@ class FittedSequential:
         return self.limit.safety_factor
 
     def with_safety_factor(self, factor: float) -> FittedSequential:
-        """The same with its limits at -+ `factor`."""
+        """Return the threshold with its limits at -+ `factor`."""
         return replace(self, limit=self.limit.with_safety_factor(factor))
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The statistic and its band; raises SignatureError for other joints or another rate than those learned."""
+        """Return the statistic and its band; raises SignatureError for other joints than those learned."""
         innovations = self.whitening.innovations(recording, signal)
         return self.limit.evaluate(recording, self.rule.statistic(innovations, self.side, self.whitening.longest_gap))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the threshold as JSON values."""
         return {
             # The signature's own settings are in the learned one.
             **rule_to_dict(replace(self.rule, signature=None)),
@@ -88,7 +88,7 @@ class FittedSequential:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         return cls(
             rule=rule_from_dict(values),
             whitening=Whitening.from_dict(values["whitening"]),
@@ -98,7 +98,7 @@ class FittedSequential:
 
 
 def fit_sequential(rule: SequentialRule, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
-    """Signature and autoregressive model of impact-free runs of one class, limits at -+ k; raises SignatureError."""
+    """Learn signature and autoregressive model from runs of one class, with limits -+ k; raises SignatureError."""
     whitening = Whitening.learned(rule.signature or Signature(), rule.order, pairs)
     signature = whitening.signature
     side = watched_side(rule.sides, signature.motion, signature.signed)

@@ -1,4 +1,4 @@
-"""Checks of a rule's settings, and the side that it watches."""
+"""Checks of a rule's settings, and the side that it monitors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Rule = TypeVar("Rule", bound=Threshold)
 
 
 def check_above(value: float, least: float, what: str) -> None:
-    """Raise UsageError where a setting is not above `least`."""
+    """Raise UsageError if a setting is not above `least`."""
     if not value > least:
         raise UsageError(f"{what} is {value:g}", f"a number above {least:g} is needed")
 
@@ -28,7 +28,7 @@ def check_sides(safety_factor: float, sides: str | None) -> None:
 
 
 def watched_side(sides: str | None, motion: MotionClass | None, signed: bool) -> int:
-    """+1: only the upper limit counts, -1: only the lower one, 0: both.
+    """Return +1 if only the upper limit counts, -1 if only the lower one, 0 for both.
 
     An obstacle opposes the motion: a signed signal rises with a motion forward and falls with one backward.
     """
@@ -38,7 +38,7 @@ def watched_side(sides: str | None, motion: MotionClass | None, signed: bool) ->
 
 
 def on_side(limit: FittedLimit, side: int) -> FittedLimit:
-    """The limits of the watched side alone; the other one becomes infinite."""
+    """Return only the limits of the monitored side; the other one becomes infinite."""
     nothing = (float("inf"),) * len(limit.least)
     if side > 0:
         return replace(limit, spread_below=nothing)
@@ -46,7 +46,28 @@ def on_side(limit: FittedLimit, side: int) -> FittedLimit:
 
 
 def with_context(rule: Rule, sides: str | None, signature: Threshold | None) -> Rule:
-    """The rule with these sides where it leaves them open, and this signature's settings where it has such a field."""
+    """Return a rule with the settings that it leaves open filled in.
+
+    Parameters
+    ----------
+    rule : Threshold
+        Any threshold.
+    sides : {"one", "two"} or None
+        Used if the rule has a field `sides` that is None.
+    signature : Signature or None
+        Used if the rule has a field `signature` that is None.
+
+    Returns
+    -------
+    Threshold
+        The rule with its open settings filled in.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.trend import Trend
+    >>> with_context(Trend(), "one", None).sides, with_context(Trend(sides="two"), "one", None).sides
+    ('one', 'two')
+    """
     open_fields = {item.name for item in fields(rule) if getattr(rule, item.name) is None}
     given = {"sides": sides, "signature": signature}
     return replace(rule, **{name: value for name, value in given.items() if name in open_fields})

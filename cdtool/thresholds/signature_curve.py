@@ -29,7 +29,7 @@ _MOST_STEPS = 1e6
 class Curve:
     """On the grid 0, step, 2 step, ...: `count`, `mean` and `squares` (sum of squared deviations), each (g, J).
 
-    `window` is how far neighbours are pooled to either side, in the unit of the grid.
+    `window`: neighbours up to this distance on either side are pooled, in the unit of the grid.
     """
 
     step: float
@@ -40,7 +40,7 @@ class Curve:
 
     @classmethod
     def empty(cls, step: float, window: float, end: float, joints: int) -> Self:
-        """A curve without runs from 0 to `end`."""
+        """Return a curve without runs from 0 to `end`."""
         shape = (math.floor(end / step) + 1, joints)
         return cls(step, window, np.zeros(shape), np.zeros(shape), np.zeros(shape))
 
@@ -57,7 +57,7 @@ class Curve:
         return float(covered[-1] * self.step) if len(covered) else 0.0
 
     def learned(self, samples: FloatArray) -> Curve:
-        """The statistics of runs resampled on the grid, (runs, g, J), NaN where a run has no valid value."""
+        """Return the statistics of runs resampled on the grid, (runs, g, J), NaN where a run has no valid value."""
         present = np.isfinite(samples)
         count = present.sum(axis=0).astype(np.float64)
         total = np.where(present, samples, 0.0).sum(axis=0)
@@ -66,7 +66,7 @@ class Curve:
         return replace(self, count=count, mean=mean, squares=squares)
 
     def updated(self, sample: FloatArray, forget: float | None) -> Curve:
-        """With one more run (g, J): Welford's update, or forgetting with an effective number of runs."""
+        """Return the curve with one more run (g, J): Welford's update, or forgetting with N_eff = `forget`."""
         present = np.isfinite(sample)
         deviation = np.where(present, sample - self.mean, 0.0)
         if forget is None:
@@ -82,7 +82,7 @@ class Curve:
         return replace(self, mean=self.mean + np.where(known, weight * deviation, 0.0), squares=squares)
 
     def without(self, sample: FloatArray) -> Curve:
-        """Without one of the runs (g, J) that it was learned from: Welford's update undone."""
+        """Return the curve without one of the runs (g, J) that it was learned from: Welford's update undone."""
         present = np.isfinite(sample)
         count = self.count - present
         deviation = np.where(present, sample - self.mean, 0.0)
@@ -92,17 +92,17 @@ class Curve:
         return replace(self, count=count, mean=mean, squares=np.where(count > 0, squares, 0.0))
 
     def clipped(self, sample: FloatArray, cap: float, pooled: bool) -> FloatArray:
-        """One more run (g, J), no further than `cap` spreads from the mean; as it is where no spread is known yet."""
+        """Return a run (g, J) clipped to `cap` spreads from the mean; unchanged where no spread is known yet."""
         _, spread = self.band(pooled)
         reach = np.where(np.isfinite(spread), cap * spread, np.inf)
         held: FloatArray = np.clip(sample, self.mean - reach, self.mean + reach)
         return held
 
     def band(self, pooled: bool) -> tuple[FloatArray, FloatArray]:
-        """Mean and spread (g, J), NaN where too few runs have been.
+        """Return mean and spread (g, J), NaN where there are too few runs.
 
-        Pooled: the mean smoothed over the window, and the spread from the variance pooled over the window, the mean's
-        deviation from its smoothed course included. Otherwise point by point. Read-only: both are computed once.
+        Pooled: the mean smoothed over the window, and the spread from the variance pooled over the window, including
+        the deviation of the mean from its smoothed curve. Otherwise point by point. Read-only: both are computed once.
         """
         return self._pooled_band if pooled else self._own_band
 
@@ -130,20 +130,20 @@ class Curve:
         return band
 
     def at(self, values: FloatArray, axis: FloatArray) -> FloatArray:
-        """Values given on the grid, between grid points by a straight line; NaN outside the grid."""
+        """Return values given on the grid at any location, interpolated by straight lines; NaN outside the grid."""
         result: FloatArray = np.interp(axis, self.grid, values, left=np.nan, right=np.nan)
         # A limit of infinity is infinity between two grid points too, where interpolation would give NaN.
         nearest = np.clip(np.rint(np.nan_to_num(axis) / self.step).astype(int), 0, len(values) - 1)
         return np.where(np.isinf(values[nearest]), values[nearest], result)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the curve as JSON values."""
         arrays = {name: getattr(self, name).tolist() for name in ("count", "mean", "squares")}
         return {"step": self.step, "window": self.window, **arrays}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the curve that `to_dict` has written; raises ValueError if it is damaged."""
         count, mean, squares = (np.array(values[name], dtype=np.float64) for name in ("count", "mean", "squares"))
         step, window = float(values["step"]), float(values["window"])
         alike = count.ndim == 2 and count.size and count.shape == mean.shape == squares.shape
@@ -155,7 +155,7 @@ class Curve:
 
     @property
     def enough(self) -> float:
-        """How many runs a grid point needs to have a limit."""
+        """The number of runs that a grid point needs to have a limit."""
         return max(2.0, math.ceil(COVERAGE * float(self.count.max(initial=0.0))))
 
     def _variance(self) -> FloatArray:
@@ -163,10 +163,10 @@ class Curve:
 
 
 def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) -> FloatArray:
-    """One run's values (g, J) on a curve's grid: the sample of the first passage of each grid point, NaN without one.
+    """Return the values of one run (g, J) on the grid of a curve: the sample that first passes each grid point, or NaN.
 
-    A sample, not a value between two: interpolation would average their noise and make the spread too small. Of a log
-    with fewer samples than grid points each sample stands for those that it has passed since the last one.
+    A sample, not a value between two: interpolation would average their noise and make the spread too small. In a log
+    with fewer samples than grid points, each sample represents those that it has passed since the last one.
     """
     result = np.full((len(curve.count), signal.values.shape[1]), np.nan)
     grid = curve.grid

@@ -1,4 +1,4 @@
-"""Constant limits on a statistic that a causal filter makes of the signal, learned like `limit`."""
+"""Constant limits on a statistic that a causal filter derives from the signal, learned like `limit`."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
 
 
 class StatisticRule(Threshold, Protocol):
-    """A threshold that makes a statistic of a signal."""
+    """A threshold that derives a statistic from a signal."""
 
     @property
     def safety_factor(self) -> float:
-        """Standard deviations from the runs' mean extreme to the limit."""
+        """Number of standard deviations from the mean extreme of the runs to the limit."""
         ...
 
     @property
@@ -33,13 +33,13 @@ class StatisticRule(Threshold, Protocol):
         ...
 
     def statistic(self, signal: Signal, period: float) -> Signal:
-        """The statistic, causal; `period` is the sample period of the runs learned from [s]."""
+        """Return the statistic, causal; `period` is the sample period of the runs learned from [s]."""
         ...
 
 
 @dataclass(frozen=True)
 class FittedStatisticLimit:
-    """A rule's statistic and its constant limits; `motion`: the class it was learned for, None: it serves any.
+    """A rule's statistic and its constant limits; `motion`: the class it was learned for, None: any.
 
     `period` [s] is the sample period of the runs.
     """
@@ -51,19 +51,19 @@ class FittedStatisticLimit:
 
     @property
     def safety_factor(self) -> float:
-        """Standard deviations from the runs' mean extreme to the limit."""
+        """Number of standard deviations from the mean extreme of the runs to the limit."""
         return self.limit.safety_factor
 
     def with_safety_factor(self, factor: float) -> FittedStatisticLimit:
-        """The same with its limits at `factor` standard deviations."""
+        """Return the threshold with its limits at `factor` standard deviations."""
         return replace(self, limit=self.limit.with_safety_factor(factor))
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
-        """The statistic and its band; raises UsageError where the number of joints differs."""
+        """Return the statistic and its band; raises UsageError if the number of joints differs."""
         return self.limit.evaluate(recording, self.rule.statistic(signal, self.period))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the threshold as JSON values."""
         return {
             **rule_to_dict(self.rule),
             "limit": self.limit.to_dict(),
@@ -73,7 +73,7 @@ class FittedStatisticLimit:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the threshold that `to_dict` has written."""
         return cls(
             rule=rule_from_dict(values),
             limit=FittedLimit.from_dict(values["limit"]),
@@ -83,9 +83,10 @@ class FittedStatisticLimit:
 
 
 def fit_statistic_limit(rule: StatisticRule, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit:
-    """Mean extremes of the statistic over the runs, and their standard deviation; raises SignatureError.
+    """Learn limits from the mean extremes of the statistic over the runs and their standard deviation.
 
-    A rule that watches one side belongs to a class of motion: its runs must be of one.
+    A rule that monitors one side belongs to a class of motion: its runs must be of one. Raises SignatureError as
+    `Limit`.
     """
     period = common_period(pairs)
     limit = Limit(rule.safety_factor).fit([(recording, rule.statistic(signal, period)) for recording, signal in pairs])
@@ -95,7 +96,7 @@ def fit_statistic_limit(rule: StatisticRule, pairs: Sequence[tuple[Recording, Si
 
 
 def common_period(pairs: Sequence[tuple[Recording, Signal]]) -> float:
-    """The median of the runs' sample periods [s]; raises SignatureError where no run has two samples."""
+    """Return the median of the runs' sample periods [s]; raises SignatureError if no run has two samples."""
     periods = [signal.period for _, signal in pairs if signal.period > 0.0]
     if not periods:
         raise SignatureError("no run has two samples", "add runs")

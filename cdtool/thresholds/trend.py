@@ -9,9 +9,9 @@ from typing import ClassVar
 from cdtool.detection import Signal
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.first_order import filtered_slope
+from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_above, check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
-from cdtool.thresholds.stretches import filtered
 
 # Time constants until a first-order filter has settled to 5 %.
 SETTLE = 3.0
@@ -19,11 +19,36 @@ SETTLE = 3.0
 
 @dataclass(frozen=True)
 class Trend:
-    """Constant limits on the signal's filtered trend, s / (1 + s `time_constant`) i (thesis 2.3.2).
+    """Constant limits on the trend of the signal, s / (1 + s `time_constant`) i.
 
-    In the signal's unit per s; time constant in s, 0.01 to 0.03 is usual; exact for any step. Limits as those of
-    `limit`, learned on the trend. A gap above 3 time constants restarts it. Fails against a soft impact, whose
+    Parameters
+    ----------
+    safety_factor : float
+        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
+    sides : {"one", "two"}, optional
+        "one" monitors the side on which an obstacle opposes the motion; None: both.
+    time_constant : float
+        Time constant of the low-pass [s]; 0.01 to 0.03 is usual.
+
+    Raises
+    ------
+    UsageError
+        A setting is unknown or outside its range.
+
+    Notes
+    -----
+    Thesis 2.3.2: |di/dt| > limit, the derivative low-passed, in the signal's unit per s; exact for any step. Limits are
+    learned as those of `Limit`. A gap above 3 time constants restarts the trend. Fails in soft impacts, in which the
     force rises slowly, and with a noisy signal such as pure torque.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(500) * 1e-3
+    >>> ramp = Signal(time, 100.0 * time[:, np.newaxis], np.zeros((500, 1), dtype=np.uint8), "N")
+    >>> trend = Trend(time_constant=0.02).statistic(ramp, 1e-3)
+    >>> trend.values[-1, 0].round(3).item(), trend.unit
+    (100.0, 'N/s')
     """
 
     safety_factor: float = 5.5
@@ -40,20 +65,20 @@ class Trend:
 
     @property
     def by_class(self) -> bool:
-        """Which side opposes the motion depends on its class."""
+        """True if one side is monitored: which side opposes the motion depends on its class."""
         return self.sides == "one"
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedStatisticLimit:
-        """Limits of the trend; raises SignatureError with fewer than two runs or without valid samples."""
+        """Learn limits of the trend from at least 2 impact-free runs; see `Threshold.fit`."""
         return fit_statistic_limit(self, pairs)
 
     def statistic(self, signal: Signal, period: float) -> Signal:  # noqa: ARG002 - steps are measured
-        """The trend, in the signal's unit per s."""
+        """Return the trend, in the signal's unit per s."""
         return trend_of(signal, self.time_constant)
 
 
 def trend_of(signal: Signal, time_constant: float) -> Signal:
-    """The filtered trend of a signal, per s; its first 3 time constants are START_UP."""
+    """Return the filtered trend of a signal, in its unit per s; its first 3 time constants are START_UP."""
 
     def slope(values: FloatArray, step: FloatArray) -> FloatArray:
         return filtered_slope(values, step, time_constant)

@@ -19,9 +19,9 @@ from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.sections import filtered, section_bounds, sections
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
-from cdtool.thresholds.stretches import filtered, section_bounds, sections
 
 # A cumulative statistic is kept over this many missing samples, or this long [s]: the evidence of a growing contact
 # continues after a gap and does not restart.
@@ -49,7 +49,7 @@ class Whitening:
 
     @classmethod
     def learned(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:
-        """From impact-free runs of one class; raises SignatureError as the signature does, and where nothing varies."""
+        """Learn from runs of one class; raises SignatureError as the signature does, and if nothing varies."""
         # Both sides and one spread: mean and spread are the middle and half the width of its band.
         signature = replace(rule, sides="two", safety_factor=1.0).fit(pairs)
         period = common_period(pairs)
@@ -103,11 +103,11 @@ class Whitening:
 
     @property
     def longest_gap(self) -> float:
-        """The longest step over which the statistic of innovations goes on [s]: 20 missing samples, or 0.15 s."""
+        """The longest step over which the statistic of innovations continues [s]: 20 missing samples, or 0.15 s."""
         return max((_HELD_SAMPLES + 1.5) * self.period, _HELD_SECONDS)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the model as JSON values."""
         return {
             "signature": self.signature.to_dict(),
             "coefficients": self.coefficients.tolist(),
@@ -117,7 +117,7 @@ class Whitening:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """Return the model that `to_dict` has written."""
         return cls(
             signature=FittedSignature.from_dict(values["signature"]),
             coefficients=np.array(values["coefficients"], dtype=np.float64),
@@ -127,10 +127,10 @@ class Whitening:
 
 
 def _deviation(signature: FittedSignature, recording: Recording, signal: Signal) -> Signal:
-    """(i - mu(x)) / s(x), NO_LIMIT where no band is known.
+    """Return (i - mu(x)) / s(x), NO_LIMIT where no band is known.
 
-    START_UP at the sample where the signature changes from one curve to another: the model restarts behind it, since
-    a jump of the mean would look like a contact.
+    START_UP at the sample where the signature changes from one curve to another: the model restarts after it, because a
+    jump of the mean would look like a contact.
     """
     statistic, band = signature.evaluate(recording, signal)
     middle, reach = 0.5 * (band.upper + band.lower), 0.5 * (band.upper - band.lower)
@@ -257,9 +257,9 @@ def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
 
 
 def _stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray:
-    """Covariance (p, p) of the last p values of e, that of nu being 1: P = F P F' + Q, solved by doubling.
+    """Return the covariance (p, p) of the last p values of e for a variance of 1 of nu.
 
-    It is scaled up where the variance of e would be below `least`. The model is stable (see `burg`).
+    P = F P F' + Q is solved by doubling, and scaled up if the variance of e is below `least`. The model is stable.
     """
     order = len(coefficients)
     transition = np.eye(order, k=-1)

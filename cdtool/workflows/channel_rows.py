@@ -12,9 +12,7 @@ from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.pieces import MappedLog, mapped_log
 from cdtool.ingest.channel_pieces import ChannelPieces
-from cdtool.ingest.logged import read_logged
-from cdtool.ingest.part_pieces import FoundParts
-from cdtool.ingest.reading import choose_format
+from cdtool.ingest.reading import FoundParts, choose_format, read_as_logged
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
 
@@ -26,7 +24,7 @@ class ChannelRows:
     """The groups of a recording (the channels of one clock) and their rows; `parts` can be called repeatedly."""
 
     def __init__(self, log: Path, machine_file: MachineFile) -> None:
-        self._recording = read_logged(log, machine_file).recording
+        self._recording = read_as_logged(log, machine_file, unread="loss").recording
         self.origin, self.findings = self._recording.origin, self._recording.findings
         clocks: dict[bytes, list[str]] = {}
         for name, series in self._recording.channels.items():

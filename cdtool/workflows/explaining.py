@@ -30,7 +30,34 @@ class Explained:
 def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
     """Explain why a detector raised each alarm in a log, and why each contact was missed.
 
-    Options and errors are those of `cdtool.workflows.detection.detect_log`.
+    Parameters
+    ----------
+    log : str or Path
+        The log.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    Explained
+        The detections, and one explanation per alarm and per contact without one.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or two are.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        The log cannot be read, or has no channel that the detector needs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> explained = cdtool.explain(log, machine, detector="momentum", limit=[400.0])
+    >>> [type(explanation).__name__ for _, explanation in explained.events]
+    ['AlarmExplanation']
     """
     if benchmark := options.prepared():
         options, machine_file = DetectionOptions(benchmark=benchmark), benchmark.setup.machine_file

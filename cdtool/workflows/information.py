@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -94,10 +94,9 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
 
 def _survey(log: Path) -> Info:
-    from cdtool.formats.csv import TableSource
     from cdtool.ingest.clock_guess import find_clock
     from cdtool.ingest.log_figures import LogFigures
-    from cdtool.ingest.part_pieces import in_time_order, log_pieces
+    from cdtool.ingest.reading import in_time_order, log_pieces
 
     figures = LogFigures(partial(log_pieces, log), in_time_order(log))
     source = figures.source
@@ -107,8 +106,7 @@ def _survey(log: Path) -> Info:
     findings += _clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
     for channel in channels:
         findings += missing_findings(channel.missing, channel.samples, channel.name)
-    dialect = source.dialect if isinstance(source, TableSource) else ""
-    return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), dialect)
+    return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), source.dialect)
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
@@ -130,14 +128,11 @@ def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | 
 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
-    from cdtool.formats.csv import TableSource
-    from cdtool.ingest.logged import read_logged
-    from cdtool.ingest.parts import joined_details
+    from cdtool.ingest.reading import read_as_logged
 
-    read = read_logged(log, machine_file)
-    files, low_pass = read.files, read.speed_low_pass
-    recording: Recording = machine_file.machine.referred_to_load(read.recording, low_pass)
-    del read
+    logged = read_as_logged(log, machine_file, unread="loss")
+    recording = logged.on_load_side(machine_file.machine)
+    logged = replace(logged, recording=recording)  # the one as logged need not be held any longer
     channels = [
         _channel(_label(name, recording, j), series, j)
         for name, series in recording.channels.items()
@@ -147,9 +142,8 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(IN_PROGRESS.format(end=item.end), "force") for item in contacts if item.in_progress]
-    dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
     found = worst_first(findings)
-    return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
+    return Info(str(log), logged.format, logged.details, tuple(channels), found, logged.dialect)
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

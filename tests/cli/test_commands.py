@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import pytest
@@ -182,7 +182,7 @@ def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path)
     provenance = values["provenance"]
     assert provenance["tool_version"] and len(provenance["learned_sha256"]) == 11
     assert len(values["recordings"]) == 6 and len(values["recordings"][0]["sha256"]) == 64
-    assert provenance["gains"]["momentum"] == {"bandwidth": 10.0}
+    assert provenance["gains"]["momentum"] == asdict(DETECTORS.load("momentum")())
     names = {path.name for path in report.iterdir()}
     assert {"report.html", "report.md", "junit.xml", "contacts.csv", "results.json", "latency.png", "amoc.png"} <= names
 

@@ -94,7 +94,7 @@ def log(machine: Any, speeds: Sequence[float], rng: np.random.Generator, contact
 
 
 def on_own_clocks(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Every channel sampled anew on a jittering clock of its own, by its last value."""
+    """Every channel resampled on a jittering clock of its own, by its last value."""
     channels = {}
     for name, series in recording.channels.items():
         steps = PERIOD * rng.uniform(0.7, 1.5, len(series.time))

@@ -74,7 +74,7 @@ def test_a_lasting_contact_may_cost_the_fault_and_20_ms_and_not_a_sample_more():
 
 def test_a_pulse_within_its_fault_is_lost_and_one_beside_it_is_not():
     assert outcome(PULSE, ONSET - 0.005, (ONSET - 0.005, ONSET - 0.005 + LENGTH)) == "evidence lost"
-    # What is not judged behind the fault, or before it, excuses nothing.
+    # Samples that are not assessable after the fault, or before it, excuse nothing.
     assert outcome(PULSE, ONSET - LENGTH, (ONSET - LENGTH, ONSET + 0.1)) == "missed"
     assert outcome(PULSE, ONSET + 0.02, (ONSET, ONSET + 0.05)) == "missed"
     # Half of the pulse shows behind the fault: longer than the whole log needed.

@@ -1,4 +1,4 @@
-"""Lost samples: no detector with any threshold takes a gap for a contact, and none is blind for long behind one.
+"""Lost samples: no detector with any threshold mistakes a gap for a contact, or is unable to assess for long after one.
 
 A reduced form of benchmarks/lost_samples.py.
 """

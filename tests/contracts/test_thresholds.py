@@ -127,7 +127,7 @@ def test_with_one_side_watched_only_the_limit_that_an_obstacle_would_break_is_th
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_its_limits_are_linear_in_the_safety_factor_and_tell_which_samples_are_outside(name, pairs, gate, simulated):
+def test_its_limits_are_linear_in_the_safety_factor_and_decide_which_samples_are_outside(name, pairs, gate, simulated):
     fitted = THRESHOLDS.load(name)().fit(pairs)
     recording = simulated("stiff", 1).without_ground_truth()
     signal = Momentum().signal(recording, gate)

@@ -3,37 +3,46 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import pytest
 
 from cdtool.errors import UsageError
+from cdtool.evaluation.builds.comparison import compare_builds
 from cdtool.foreign_files import refuse_other_kind
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
-from cdtool.report.writers.base import Report
+from cdtool.report.writers.base import Report, Subject
+from tests.made_up.builds import build
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
 
 NAMES = WRITERS.names(plugins=True)
 SUFFIXES = [(name, suffix) for name in NAMES for suffix in WRITERS.load(name).suffixes]
+SUBJECTS = get_args(Subject)
 
 
 @pytest.fixture(scope="module", params=["plain names", "hostile names"])
-def report(request) -> Report:
-    evaluated, traces = case(str if request.param == "plain names" else lambda name: name + "".join(HOSTILE.values()))
+def reports(request) -> dict[str, object]:
+    """What the writers of each subject write."""
+    added = "" if request.param == "plain names" else "".join(HOSTILE.values())
+    evaluated, traces = case(lambda name: name + added)
     provenance = {"tool": "cdtool", **evaluated.results.provenance}
-    del provenance["force_profiles"]  # in the page's case they name no profile, which figures need
-    return Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
+    del provenance["force_profiles"]  # a figure needs profiles with names
+    benchmark = Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
+    builds = [build({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
+    return {"benchmark": benchmark, "comparison": compare_builds(builds[0], builds[1])}
 
 
 @pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
-def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_bytes(name, suffix, report, tmp_path):
-    assert type(writer_of(tmp_path / f"report{suffix.upper()}")) is WRITERS.load(name)
+def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_bytes(name, suffix, reports, tmp_path):
+    subject = WRITERS.load(name).subject
+    assert type(writer_of(tmp_path / f"report{suffix.upper()}", subject)) is WRITERS.load(name)
     contents = []
     for folder in ("a", "b", "a"):  # the third replaces the first
         target = tmp_path / folder / f"report{suffix}"
         target.parent.mkdir(exist_ok=True)
-        assert write_outputs(report, [target]) == [target]
+        assert write_outputs(reports[subject], [target], subject=subject) == [target]
         files = WRITERS.load(name)().files(target)
         assert set(files) == set(target.parent.iterdir())
         contents.append([path.read_bytes() for path in files])
@@ -44,11 +53,12 @@ def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_b
 
 @pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
 def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
+    subject = WRITERS.load(name).subject
     for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
         path.write_bytes(b"written by hand")
         with pytest.raises(UsageError, match="already exists and contains no"):
-            check_outputs([tmp_path / f"report{suffix}"])
-        check_outputs([tmp_path / f"report{suffix}"], force=True)
+            check_outputs([tmp_path / f"report{suffix}"], subject=subject)
+        check_outputs([tmp_path / f"report{suffix}"], force=True, subject=subject)
         path.unlink()
 
 
@@ -56,10 +66,11 @@ def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
 def test_it_says_what_it_writes(name):
     writer = WRITERS.load(name)
     assert writer.__doc__ and (writer.suffixes or writer.in_folder)
-    assert set(writer.suffixes) <= set(known_suffixes())
+    assert writer.subject in SUBJECTS and set(writer.suffixes) <= set(known_suffixes(writer.subject))
 
 
-def test_a_folder_holds_what_every_writer_with_content_writes_there(report, tmp_path):
+def test_a_folder_holds_what_every_writer_with_content_writes_there(reports, tmp_path):
+    report = reports["benchmark"]
     write_outputs(report, [tmp_path / "all"])
     writers = [WRITERS.load(name)() for name in WRITERS.table]
     wanted = {writer.in_folder for writer in writers if writer.in_folder and writer.has_content(report)}
@@ -69,7 +80,13 @@ def test_a_folder_holds_what_every_writer_with_content_writes_there(report, tmp_
     assert {path.name for path in (tmp_path / "all").iterdir()} == names
 
 
-def test_an_unknown_suffix_names_those_that_can_be_written(tmp_path):
+@pytest.mark.parametrize("subject", SUBJECTS)
+def test_an_unknown_suffix_names_those_that_can_be_written(subject, tmp_path):
     with pytest.raises(UsageError) as refused:
-        check_outputs([tmp_path / "report.xyz"])
-    assert all(suffix in str(refused.value) for suffix in known_suffixes())
+        check_outputs([tmp_path / "report.xyz"], subject=subject)
+    assert all(suffix in str(refused.value) for suffix in known_suffixes(subject))
+
+
+def test_a_folder_is_only_written_for_a_benchmark(tmp_path):
+    with pytest.raises(UsageError, match="--output is"):
+        check_outputs([tmp_path / "folder"], subject="comparison")

@@ -23,7 +23,7 @@ ARM = arm_of(
         "link_inertia": [0.012, 0.018],
     }
 )
-# The same figures, written down once more: the motion must not come from the code under test.
+# The same numbers, repeated: the motion must not come from the code under test.
 M11, M22, H, G1, G2 = 0.18148, 0.06984, 0.0864, 6.49422, 2.82528
 BANDWIDTH, CONTACT_AT, END = 50.0, 0.3, 0.8
 READY = np.full(2, -np.inf)
@@ -121,7 +121,7 @@ def test_half_the_sample_period_leaves_a_quarter_of_the_error(motions):
     assert worst[:-1] / worst[1:] == pytest.approx(4.0, rel=0.1)
 
 
-def test_a_balance_without_c_transposed_qd_sees_a_contact_where_there_is_none(motions):
+def test_a_balance_without_c_transposed_qd_shows_a_contact_without_one(motions):
     motion = motions[1e-3]
     time, position, speed, torque = values(motion)
     residual = observed(motion, torque - ARM.gravity(position), ARM.momentum(position, speed))

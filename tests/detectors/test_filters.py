@@ -58,7 +58,7 @@ def test_the_rate_is_the_slope_of_the_filtered_values(time):
     np.testing.assert_allclose(np.diff(filtered[:, 0]) / np.diff(time), mean, atol=1e-9)
 
 
-def test_a_missing_sample_makes_the_next_step_longer_and_a_long_gap_starts_it_anew():
+def test_a_missing_sample_makes_the_next_step_longer_and_a_long_gap_restarts_it():
     values = np.sin(2.0 * TIME)[:, np.newaxis]
     lone, gap = NONE.copy(), NONE.copy()
     lone[1000:1010] = True

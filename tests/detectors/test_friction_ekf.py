@@ -57,7 +57,7 @@ def test_the_covariance_settles_on_the_solution_of_the_riccati_equation():
 
 
 def test_the_poles_are_those_of_the_reference_case():
-    # sigma_acceleration^2 = 900, sigma_speed^2 = 0.25, q_d = 1e-10 a sample.
+    # sigma_acceleration^2 = 900, sigma_speed^2 = 0.25, q_d = 1e-10 per sample.
     ekf = FrictionEkf(30.0, 0.5, np.sqrt(1e-10 / PERIOD), 2.0, 0.1)
     poles, variance = ekf.steady_state(INERTIA, SPEED, FRICTION, PERIOD)
     assert poles == pytest.approx([26.06, 199.58, 9908.0], rel=1e-3)
@@ -188,7 +188,7 @@ def test_a_million_hostile_samples_leave_the_estimate_finite(gate):
     assert 0.05 < signal.valid.mean() < 1.0
 
 
-def test_after_a_rebound_it_starts_up_anew_for_its_estimate_has_the_wrong_sign(gate):
+def test_after_a_rebound_it_starts_up_again_because_its_estimate_has_the_wrong_sign(gate):
     """The reversal takes 5 ms below the minimum speed: too short for a stop, but the direction has changed."""
     n = 6000
     k = np.arange(n)
@@ -200,7 +200,7 @@ def test_after_a_rebound_it_starts_up_anew_for_its_estimate_has_the_wrong_sign(g
     assert signal.status[-1, 0] == Status.VALID
 
 
-def test_a_single_wild_speed_sample_does_not_start_it_anew(gate):
+def test_a_single_outlier_of_the_speed_does_not_restart_it(gate):
     n = 6000
     speed = np.full(n, 0.2)
     speed[4000] = -0.2

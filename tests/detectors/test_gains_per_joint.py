@@ -1,4 +1,4 @@
-"""Gains may be one number, or one a joint: the thesis's diagonal gain matrix (2.13, 2.19)."""
+"""Gains may be one number, or one per joint: the thesis's diagonal gain matrix (2.13, 2.19)."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_one_joints_gains_are_numbers():
         single((1.0, 2.0))
 
 
-def test_the_machine_file_takes_one_number_or_one_a_joint(tmp_path):
+def test_the_machine_file_accepts_one_number_or_one_per_joint(tmp_path):
     text = """
 [machine]
 type = "rotary_axis"

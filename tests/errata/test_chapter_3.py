@@ -1,4 +1,4 @@
-"""Chapter 3: restitution, contact laws and their damping factor, derived and held against a simulated impact."""
+"""Chapter 3: restitution, contact laws and their damping factor, derived and compared with a simulated impact."""
 
 from __future__ import annotations
 

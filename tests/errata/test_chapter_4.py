@@ -266,7 +266,7 @@ def test_4_29_has_a_term_too_many_in_a1():
     assert sp.simplify(g_c(right + J_m / r**2 * d_el) - penetration) != 0
 
 
-def test_4_28_lacks_one_over_r():
+def test_4_28_has_no_factor_one_over_r():
     printed = (d_el * s + k_el) / (J_m * s**2 + D_T * s + k_el)
     angle = solved_4_26()[1]
     assert sp.simplify(printed / r - angle) == 0
@@ -279,7 +279,7 @@ def undamped_denominator(square: sp.Expr) -> sp.Expr:
     return J_m * M_l * square**2 + (J_m * K_c + k_el * M_l + J_m * k_el / r**2) * square + K_c * k_el
 
 
-def test_4_33_and_4_35_lack_the_imaginary_unit():
+def test_4_33_and_4_35_are_without_the_imaginary_unit():
     free = {d_m: 0, d_el: 0, D_c: 0}
     penetration, angle = (part.subs(free) for part in solved_4_26())
     assert sp.simplify(penetration - (J_m * s**2 + k_el) / undamped_denominator(s**2)) == 0
@@ -378,7 +378,7 @@ def test_nothing_ends_63_ms_after_the_first_touch_of_figure_4_3():
     starts = [12.25e-3, 20.14e-3, 26.08e-3, 30.89e-3, 35.00e-3]
     assert [contact.time[0] for contact in bounces[1:6]] == pytest.approx(starts, abs=0.01e-3)
     assert bounces[-1].time[-1] == pytest.approx(44.25e-3, abs=0.01e-3)
-    # Then the motor holds the cart against the wall for good: the force swings about 33.3 N and dies away slowly.
+    # Then the motor presses the cart to the wall permanently: the force oscillates about 33.3 N and decays slowly.
     assert last.time[0] == pytest.approx(44.84e-3, abs=0.01e-3)
     swing = np.abs(last.force / PUSH - 1)
     assert last.time[swing > 0.5][-1] == pytest.approx(61.1e-3, abs=0.1e-3)

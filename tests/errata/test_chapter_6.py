@@ -172,7 +172,7 @@ def tends_to_the_collision(integrand: sp.Expr, torque: sp.Symbol, momentum: sp.E
 T1, T2 = sp.symbols("T1 T2")
 
 
-def test_6_28_has_a_coupling_twice_and_lacks_gravity():
+def test_6_28_has_a_coupling_twice_and_no_gravity():
     momentum = M11 * qd1
     right = T1 - h * COS * qdd2 + h * SIN * qd2**2 - GRAVITY_1 * sp.cos(q1)
     printed = T1 - 2 * h * COS * qdd2 + h * SIN * qd2**2
@@ -224,7 +224,7 @@ def test_6_37_is_6_33_solved_for_the_acceleration():
     assert vanishes(acceleration - ACCELERATION.subs(M_1, M11))
 
 
-def test_6_35_lacks_the_transmission_ratio():
+def test_6_35_has_no_transmission_ratio():
     offset = sp.Symbol("offset", positive=True)
     motor_angle = (q1 - offset) / n1
     motor_speed = motor_angle.diff(t)

@@ -21,8 +21,9 @@ from cdtool.evaluation.results import (
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
 from cdtool.report.html.page import to_html
-from cdtool.report.junit import to_junit
-from cdtool.report.markdown.markdown import to_markdown
+from cdtool.report.markdown.report import to_markdown
+from cdtool.report.writers.base import Report
+from cdtool.report.writers.junit import to_junit
 from tests.command import cdtool
 from tests.evaluation.judged_results import GATE, results
 from tests.made_up.builds import BLIND, MISSED, build
@@ -35,9 +36,10 @@ def averaged(verdict: str, name: str = "A") -> PointResult:
 
 
 def reports(evaluated: Evaluated) -> tuple[str, str, ElementTree.Element, dict]:
-    junit = ElementTree.fromstring(to_junit(evaluated).encode())
+    report = Report(evaluated)
+    junit = ElementTree.fromstring(to_junit(report).encode())
     stored = json.loads(to_json(evaluated.results))["conclusion"]
-    return to_html(evaluated, ()), to_markdown(evaluated), junit, stored
+    return to_html(report), to_markdown(report), junit, stored
 
 
 CASES = {
@@ -175,8 +177,8 @@ def test_without_profile_and_limit_a_miss_is_named_without_a_violation():
         conclusion = evaluated.results.conclusion
         assert (conclusion.outcome, conclusion.exit_status) == (outcome, 0)
         assert "1 detection missed without a limit" in conclusion.headline
-        assert 'class="verdict unknown"' in to_html(evaluated, ())
-        assert 'failures="0"' in to_junit(evaluated)
+        assert 'class="verdict unknown"' in to_html(Report(evaluated))
+        assert 'failures="0"' in to_junit(Report(evaluated))
 
 
 def test_a_limit_without_measurements_is_not_met():

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.formats.arrow_check import check_batches
 from cdtool.formats.container_checks import check_chunks
-from cdtool.formats.parquet_check import check_pages
+from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.ingest.reading import survey
 from tests.formats import bombs
 from tests.noted_times import note

@@ -11,8 +11,8 @@ import cdtool
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.last_line import is_whole
 from cdtool.formats.csv.pins import read_pins
+from cdtool.formats.csv.table import is_whole
 from cdtool.ingest.reading import read_recording
 from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS

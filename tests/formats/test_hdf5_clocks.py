@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import cdtool
-from cdtool.formats.cf_attributes import Packing, times_since
 from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.hdf5 import Packing, times_since
 from cdtool.ingest.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdtool.formats import hdf5_writing
-from cdtool.formats.held_signals import held_signals
+from cdtool.formats.hdf5_writing import held_signals
 from cdtool.workflows.convert.converting import convert
 
 

@@ -23,8 +23,7 @@ from cdtool.ingest.log_figures import LogFigures
 from cdtool.ingest.reading import choose_format
 from cdtool.workflows.convert.converting import convert
 from tests.formats.containers import two_clocks
-
-LIBRARIES = {".parquet": "pyarrow", ".feather": "pyarrow", ".h5": "h5py", ".mf4": "asammdf", ".tdms": "nptdms"}
+from tests.workflows.convert.kinds import needs
 
 
 def pieces_of(path: Path) -> list[Piece]:
@@ -46,7 +45,7 @@ def same(one: Source, other: Source) -> bool:
 
 @pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
 def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path, monkeypatch):
-    pytest.importorskip(LIBRARIES[suffix])
+    needs(suffix)
     path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])
     found = choose_format(path)
     at_once = found.columns(path)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.formats.library_lines import collected_lines
-from cdtool.formats.tdms import Tdms
+from cdtool.formats.tdms import Tdms, collected_lines
 from cdtool.ingest.reading import survey
 
 nptdms = pytest.importorskip("nptdms")

@@ -67,7 +67,7 @@ TARGETS: dict[str, Callable[[bytes, Path], None]] = {"mcap": try_mcap, "messages
 
 
 def without_crcs(data: bytes) -> bytes:
-    """The same file with the CRCs of its chunks and its summary set to 0: there are none."""
+    """The same file with the CRCs of its chunks and its summary set to 0, which means without CRCs."""
     made, at = bytearray(data), len(records.MAGIC)
     while at + 9 <= len(made):
         opcode, length = struct.unpack_from("<BQ", made, at)
@@ -100,7 +100,7 @@ def _same(survey: Source, wanted: Source | None) -> None:
 def _as_others_read(
     given: dict[int, float], payloads: list[bytes], oracle: Callable[[bytes], float | None], exactly: bool
 ) -> None:
-    """Message by message the same number; `exactly`: and none where the other reader gives none."""
+    """Message by message the same number; `exactly`: and no number where the other reader has no number."""
     for i, payload in enumerate(payloads):
         try:
             expected = oracle(payload)

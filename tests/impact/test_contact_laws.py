@@ -57,7 +57,7 @@ def test_arrays_give_what_their_elements_give(law):
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_a_missing_penetration_gives_no_force_that_looks_real(law):
+def test_a_missing_penetration_never_results_in_a_force_that_looks_real(law):
     assert math.isnan(law.force(math.nan, 0.1))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.impact.examples.chapter_3 import loops, restitution_over_damping, restitution_over_speed, two_bodies
-from cdtool.report.plots.impact_plots import plot_course, plot_loops, plot_restitution, write_impact_plots
+from cdtool.report.plots.impact_plots import plot_force_and_speed, plot_loops, plot_restitution, write_impact_plots
 
 
 def test_the_example_of_figure_3_2_loses_half_its_relative_energy():
@@ -35,7 +35,7 @@ def test_the_curves_of_figure_3_4_fall_and_level_out_where_the_first_order_reach
 
 
 def test_the_figures_name_impulses_speeds_and_works():
-    course = plot_course(two_bodies())
+    course = plot_force_and_speed(two_bodies())
     titles = [axes.get_title(loc="left") for axes in course.axes]
     assert all(title.endswith(value) for title, value in zip(titles, ("0.71", "0.71", "0.50"), strict=True))
     panels = plot_loops(loops())

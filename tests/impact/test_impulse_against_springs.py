@@ -87,7 +87,7 @@ def test_where_the_sliding_changes_an_elastic_spring_has_the_restitution_1_of_st
     after = rod.struck(impulse, np.zeros(2)).velocity_at(np.zeros(2))
     assert after[1] / down == pytest.approx(newton, abs=1e-3)
     assert (impulse[1] - compression) / compression == pytest.approx(poisson, abs=1e-3)
-    # Told the coefficient that it would have measured, a hypothesis finds the impulse; told 1, it does not.
+    # Given the coefficient that it would have measured, a hypothesis finds the impulse; given 1, it does not.
     name: Hypothesis = "newton" if newton < 1.0 else "poisson"
     told, elastic = (
         strike(rod, FLOOR, (0.0, 0.0), (0.0, -1.0), e, friction, name) for e in (min(newton, poisson), 1.0)

@@ -101,15 +101,15 @@ def test_a_quicker_low_pass_of_the_same_noise_never_sees_a_growing_force_later(s
 
 
 def test_the_order_is_that_of_figure_4_10(ranking):
-    order = [item.sensor.name for item in ranking.sights]
+    order = [item.sensor.name for item in ranking.responses]
     assert order[0] == "load_cell" and order[-1] == "motor_torque"
     assert set(order[1:3]) == {"accelerometer", "torque_sensor"}
-    times = [item.time for item in ranking.sights]
+    times = [item.time for item in ranking.responses]
     assert times == sorted(times)
 
 
 def test_the_force_is_that_of_the_simulated_impact_at_that_moment(ranking):
-    for item in ranking.sights:
+    for item in ranking.responses:
         assert item.force == pytest.approx(np.interp(item.time, ranking.time, ranking.contact_force))
         assert item.peak_so_far >= item.force
     assert ranking.peak_force == pytest.approx(ranking.contact_force.max())
@@ -122,7 +122,7 @@ def test_a_log_in_whole_counts_is_quiet_before_the_touch_and_sees_it_within_a_co
     plain = replace(example.SENSORS[index], resolution=2.0 * math.pi * 0.015 / counts)
     motion = example.RANKED.simulate()
     touch, speed = motion.motor_position[0], example.RANKED.speed
-    promised = rank_sensors(example.RANKED, [plain]).sights[0].time
+    promised = rank_sensors(example.RANKED, [plain]).responses[0].time
     assert promised is not None
     keep = math.exp(-2.0 * math.pi * plain.bandwidth / plain.sample_rate)
     seen = []
@@ -153,36 +153,36 @@ def test_the_steady_motion_deviates_by_nothing_at_the_touch():
 
 def test_what_limits_names_the_improvement_that_saves_most():
     noisy = replace(example.SENSORS[2], noise=5.0, resolution=0.0)
-    (found,) = rank_sensors(example.RANKED, [noisy]).sights
+    (found,) = rank_sensors(example.RANKED, [noisy]).responses
     assert (found.limited_by, found.remedy) == ("noise", "half the noise")
-    (better,) = rank_sensors(example.RANKED, [noisy.half_the_noise()]).sights
+    (better,) = rank_sensors(example.RANKED, [noisy.half_the_noise()]).responses
     assert found.saving == pytest.approx(found.time - better.time)
     slow = replace(example.SENSORS[0], sample_rate=100.0)
-    (found,) = rank_sensors(example.RANKED, [slow]).sights
+    (found,) = rank_sensors(example.RANKED, [slow]).responses
     assert found.limited_by == "sampling"
 
 
 def test_a_slew_limit_can_be_what_limits_the_control_action():
     case = replace(example.RANKED, controller=replace(example.SPEED_LOOP, slew_limit=0.5))
-    (found,) = rank_sensors(case, [example.SENSORS[-1]]).sights
-    (free,) = rank_sensors(example.RANKED, [example.SENSORS[-1]]).sights
+    (found,) = rank_sensors(case, [example.SENSORS[-1]]).responses
+    (free,) = rank_sensors(example.RANKED, [example.SENSORS[-1]]).responses
     assert found.time > 3.0 * free.time
     quicker = replace(case, controller=replace(case.controller, slew_limit=1.0))
-    (better,) = rank_sensors(quicker, [example.SENSORS[-1]]).sights
+    (better,) = rank_sensors(quicker, [example.SENSORS[-1]]).responses
     assert found.saving >= found.time - better.time > 0.0
 
 
 def test_a_sensor_that_sees_nothing_comes_last_without_a_time():
     deaf = replace(example.SENSORS[0], noise=1e6)
     found = rank_sensors(example.RANKED, [deaf, example.SENSORS[0]])
-    last = found.sights[-1]
+    last = found.responses[-1]
     assert (last.sensor, last.time, last.force, last.peak_so_far, last.saving) == (deaf, None, None, None, None)
     assert last.limited_by == ITSELF
 
 
 def test_without_noise_counts_and_filter_only_sampling_is_left():
     ideal = sensor(noise=0.0, sample_rate=1e4)
-    (found,) = rank_sensors(example.RANKED, [ideal]).sights
+    (found,) = rank_sensors(example.RANKED, [ideal]).responses
     assert found.time is not None and found.time <= 1.1e-4
 
 

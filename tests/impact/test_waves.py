@@ -31,7 +31,7 @@ def test_a_long_contact_needs_no_warning_and_a_shorter_one_says_what_is_lost():
     assert not long.quasi_static
     assert "1.2 periods" in long.warning and "up to 107 %" in long.warning
     longer = check_waves(91.192e-6, rod_first_frequency(2.0, 210e9, 7850.0))
-    assert "before the body has answered" in longer.warning
+    assert "before the body has responded" in longer.warning
 
 
 def test_the_warning_ends_where_four_per_cent_of_a_mode_are_left():

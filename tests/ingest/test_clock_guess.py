@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.formats.csv.excel_days import DAY_S
+from cdtool.formats.csv.number_clock import DAY_S
 from cdtool.workflows.information import info
 
 

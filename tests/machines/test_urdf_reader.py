@@ -1,4 +1,4 @@
-"""URDF -> tree: what pinocchio makes of the same file is the reference, and every fault is told in one line."""
+"""URDF -> tree: pinocchio's result for the same file is the reference, and every error is reported in one line."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ def test_a_folder_is_no_urdf(tmp_path):
     assert "cannot be read" in refused(tmp_path).message
 
 
-def test_broken_xml_is_told_with_line_and_column(tmp_path):
+def test_broken_xml_is_reported_with_line_and_column(tmp_path):
     path = tmp_path / "broken.urdf"
     path.write_text('<robot name="r">\n<link name="a"></robot>\n', encoding="utf-8")
     assert "broken XML in line 2, column 18: mismatched tag" in refused(path).message
@@ -337,6 +337,6 @@ def test_an_inertia_matrix_that_is_not_positive_definite_is_refused(tmp_path):
     assert "drive_inertia" in fault.hint
 
 
-def test_drive_inertias_that_are_not_one_a_joint_are_refused(tmp_path):
+def test_drive_inertias_that_are_not_one_per_joint_are_refused(tmp_path):
     with pytest.raises(ConfigurationError, match="2 values of drive_inertia, 1 joints"):
         read_urdf(write(tmp_path, *ARM), ["j"], {}, drive_inertia=(1.0, 2.0))

@@ -103,7 +103,7 @@ def test_values_that_cannot_be_are_refused_by_name(tmp_path, key, value, message
     assert message in refused(tmp_path, **{key: value}).message
 
 
-def test_a_negative_mass_of_the_urdf_is_told_with_its_link(tmp_path):
+def test_a_negative_mass_of_the_urdf_is_reported_with_its_link(tmp_path):
     with pytest.raises(ConfigurationError, match=r"link 'link2': mass -6\.0 kg is negative"):
         urdf_robot(tmp_path, six_joint_urdf().replace('value="6.0"', 'value="-6.0"'), {"joints": list(JOINTS)})
 

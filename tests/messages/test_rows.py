@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.messages.rows import Rows
+from cdtool.messages.gathering import Rows
 
 
 def started(expected=10, first=2):

@@ -119,7 +119,7 @@ def test_a_log_without_a_single_sample_of_speed_is_judged_by_no_class(how):
     assert judging_classes(silent, (FAST, BACK), strokes_so_far(silent, how, (FAST, BACK)), clock) == []
 
 
-def test_a_class_that_was_not_learned_is_told_by_its_nominal_speed_alone():
+def test_a_class_that_was_not_learned_is_recognised_only_by_its_nominal_speed():
     plain = MotionClass(1, 0.3)
     assert judges(log((0.3, 3.0), seed=8), plain).all()
     other = judges(log((0.2, 5.0), seed=9), plain)[:, 0]

@@ -22,17 +22,25 @@ from cdtool.channels import ChannelMap
 from cdtool.detectors import DETECTORS
 from cdtool.errors import ConfigurationError
 from cdtool.machine_file import read_machine_file
+from cdtool.machines import MACHINES
 from cdtool.recording import CHANNELS
 from cdtool.units import UNITS
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.command import Outcome, cdtool
 from tests.data_folder import DATA, needs_data
+from tests.project.pages import (
+    DOCS,
+    FENCE,
+    PAGES,
+    ROOT,
+    check_detector_page,
+    docs_script,
+    machine_files,
+    name_of,
+    toml_blocks,
+)
 
-ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-
-# Pages and how many commands they show at least; a page that loses its commands is noticed.
+# Pages that would be incomplete without commands or examples, and how many they show at least.
 COMMANDS = {
     "README.md": 4,
     "docs/quick-start.md": 6,
@@ -64,9 +72,6 @@ EXAMPLES = {
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
 NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
 
-_FENCE = re.compile(
-    r"^(?:<!-- exit (?P<status>\d) -->\n)?```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL
-)
 _LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -80,12 +85,8 @@ class Step:
     status: int = 0
 
 
-def name_of(page: Path) -> str:
-    return page.relative_to(ROOT).as_posix()
-
-
 def steps_of(page: Path) -> Iterator[Step]:
-    for block in _FENCE.finditer(page.read_text(encoding="utf-8")):
+    for block in FENCE.finditer(page.read_text(encoding="utf-8")):
         body, status = block["body"], int(block["status"] or 0)
         if block["kind"] == "python":
             yield Step("python", body)
@@ -237,10 +238,19 @@ def the_results_file_has_the_fields_of_the_page() -> None:
 
 
 def the_table_of_the_readme_is_what_its_benchmark_prints() -> None:
-    lines = {" ".join(line.split()) for line in cdtool("benchmark", "sample_logs/gate/benchmark.toml").out.splitlines()}
+    printed = cdtool("benchmark", "sample_logs/gate/benchmark.toml").out
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    rows = [" ".join(line.split()) for line in text.splitlines() if re.match(r"(stiff|soft) +\w+ +\d", line)]
-    assert len(rows) == 10 and set(rows) <= lines
+    assert len(re.findall(r"^(?:stiff|soft) +\w+ +\d", text, re.MULTILINE)) == 10
+    assert docs_script("make_results").with_rows(text, printed) == text, "run python docs/make_results.py"
+
+
+def test_a_result_of_the_readme_that_is_printed_otherwise_is_replaced():
+    script = docs_script("make_results")
+    page, printed = "before\nstiff  momentum  63  4\nafter\n", "stiff momentum 63 4\nsoft momentum 119 4\n"
+    assert script.with_rows(page, printed) == page
+    assert script.with_rows(page, printed.replace("63", "60")) == "before\nstiff momentum 60 4\nafter\n"
+    with pytest.raises(KeyError):
+        script.with_rows(page, "")
 
 
 CLAIMS: dict[str, Callable[[], None]] = {
@@ -278,7 +288,6 @@ def test_every_command_and_example_of_a_page_runs_in_order(page, folder):
 def test_the_pages_show_as_many_commands_and_examples_as_they_should():
     for kind, expected in (("command", COMMANDS), ("python", EXAMPLES)):
         found = {name_of(page): sum(step.kind == kind for step in steps_of(page)) for page in PAGES}
-        assert {name for name, count in found.items() if count} == set(expected)
         for name, least in expected.items():
             assert found[name] >= least, name
     assert set(CLAIMS) <= set(COMMANDS)
@@ -287,7 +296,7 @@ def test_the_pages_show_as_many_commands_and_examples_as_they_should():
 def test_every_link_and_image_resolves():
     checked = 0
     for page in [*PAGES, ROOT / "sample_logs" / "README.md", ROOT / "CONTRIBUTING.md"]:
-        prose = _FENCE.sub("", page.read_text(encoding="utf-8"))
+        prose = FENCE.sub("", page.read_text(encoding="utf-8"))
         for target in _LINK.findall(prose):
             if re.match(r"https?://", target):
                 continue
@@ -318,9 +327,9 @@ def test_every_page_and_image_is_reached_and_no_image_is_large():
         assert image.stat().st_size < 200_000, image.name
 
 
-def test_the_list_of_detectors_is_made_from_the_registry_and_their_pages():
-    made = runpy.run_path(str(DOCS / "make_detector_index.py"))
-    assert made["FILE"].read_text(encoding="utf-8") == made["index_text"](), "run python docs/make_detector_index.py"
+def test_the_lists_of_detectors_and_formats_are_made_from_the_registry_and_their_pages():
+    for file, text in runpy.run_path(str(DOCS / "make_lists.py"))["files"]().items():
+        assert file.read_text(encoding="utf-8") == text, f"{name_of(file)}: run python docs/make_lists.py"
 
 
 def test_every_detector_has_a_page_whose_table_names_each_gain_with_default_and_unit():
@@ -328,18 +337,11 @@ def test_every_detector_has_a_page_whose_table_names_each_gain_with_default_and_
     assert len(detectors) >= len(DETECTORS.table)
     for detector in detectors:
         text = (DOCS / "detectors" / f"{detector['name'].replace('_', '-')}.md").read_text(encoding="utf-8")
-        assert f"`{detector['name']}`" in text and f"`{detector['short_name']}`" in text
-        for channel in detector["needs"]:
-            assert re.search(rf"Needs:[^.]*`{channel}`", text), (detector["name"], channel)
-        for part in ("## Equation", "## Signal", "## Gains", "## Start-up and not applicable", "## When it fails"):
-            assert part in text, (detector["name"], part)
-        rows = [[cell.strip() for cell in line.split("|")[1:4]] for line in text.splitlines() if line.startswith("| `")]
-        stated = {row[0].strip("`"): (float(row[1]), row[2]) for row in rows}
-        assert stated == {gain["name"]: (gain["default"], gain["unit"]) for gain in detector["gains"]}, detector["name"]
+        check_detector_page(detector, text)
 
 
 def named_in(page: str) -> set[str]:
-    return set(re.findall(r"`([^`\n]+)`", _FENCE.sub("", (DOCS / page).read_text(encoding="utf-8"))))
+    return set(re.findall(r"`([^`\n]+)`", FENCE.sub("", (DOCS / page).read_text(encoding="utf-8"))))
 
 
 def known_keys(read: Callable[[Path], object], text: str, folder: Path) -> set[str]:
@@ -352,24 +354,12 @@ def known_keys(read: Callable[[Path], object], text: str, folder: Path) -> set[s
 
 
 LINEAR = '[machine]\ntype = "linear_axis"\ntransmission_ratio = 1e-3\n'
-ARM = """[machine]
-type = "planar_arm"
-transmission_ratio = 0.02
-link_mass = 1
-link_length = 0.3
-centre_of_mass = 0.1
-"""
-ROBOT = """[machine]
-type = "urdf_robot"
-urdf = "scara.urdf"
-joints = ["lift_joint", "shoulder_joint", "elbow_joint"]
-locked = {finger_joint = 0}
-"""
 SECTIONS = {
-    "arm": ARM + "zzz = 1",
-    "robot": ROBOT + "zzz = 1",
-    "linear": LINEAR + "zzz = 1",
-    "rotary": '[machine]\ntype = "rotary_axis"\ntransmission_ratio = 1\nzzz = 1',
+    # The keys of each machine, by the examples of the page.
+    **{
+        f"{kind} {number}": text.replace("[machine]\n", "[machine]\nzzz = 1\n", 1)
+        for number, (kind, text) in enumerate(machine_files(), 1)
+    },
     "file": LINEAR + "[zzz]",
     "channels": LINEAR + "[channels]\ntime = {rate_hz = 1}\nzzz = {}",
     "time": LINEAR + '[channels]\ntime = {column = "t", unit = "s", zzz = 1}',
@@ -385,7 +375,7 @@ SECTIONS = {
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_the_machine_file_page_names_every_key(section, tmp_path):
-    if section == "robot":
+    if section.startswith("urdf_robot"):
         pytest.importorskip("pinocchio")
         shutil.copy(DOCS / "examples" / "scara.urdf", tmp_path)
     known = known_keys(read_machine_file, SECTIONS[section], tmp_path)
@@ -408,31 +398,28 @@ def test_the_machine_file_page_names_every_channel_unit_and_setting():
 def test_the_machine_files_on_the_page_are_valid(tmp_path):
     pytest.importorskip("pinocchio")
     shutil.copy(DOCS / "examples" / "scara.urdf", tmp_path)
-    blocks = [b["body"] for b in _FENCE.finditer((DOCS / "machine-file.md").read_text("utf-8")) if b["kind"] == "toml"]
+    blocks = toml_blocks(DOCS / "machine-file.md")
     whole = [text for text in blocks if "[machine]" in text]
-    kinds = []
+    kinds = set()
     for i, text in enumerate(whole):
         (tmp_path / f"{i}.toml").write_text(text, encoding="utf-8")
         assert read_machine_file(tmp_path / f"{i}.toml").columns.sources
-        kinds.append(tomllib.loads(text)["machine"]["type"])
-    assert sorted(kinds) == ["linear_axis", "linear_axis", "planar_arm", "rotary_axis", "urdf_robot"]
+        kinds.add(tomllib.loads(text)["machine"]["type"])
+    assert kinds == set(MACHINES.names())
     for text in set(blocks) - set(whole):
         (tmp_path / "part.toml").write_text(LINEAR + text, encoding="utf-8")
         assert read_machine_file(tmp_path / "part.toml").gains
 
 
 def test_the_robot_on_the_machine_file_page_is_the_example_in_its_folder():
-    blocks = [b["body"] for b in _FENCE.finditer((DOCS / "machine-file.md").read_text("utf-8")) if b["kind"] == "toml"]
-    shown = [tomllib.loads(text) for text in blocks if "urdf_robot" in text]
+    shown = [tomllib.loads(text) for text in toml_blocks(DOCS / "machine-file.md") if "urdf_robot" in text]
     assert shown == [tomllib.loads((DOCS / "examples" / "scara.toml").read_text(encoding="utf-8"))]
 
 
 def test_the_benchmark_file_page_is_valid_and_names_every_key(tmp_path):
     for item in (ROOT / "sample_logs" / "gate").iterdir():
         (tmp_path / item.name).symlink_to(item)
-    text = next(
-        b["body"] for b in _FENCE.finditer((DOCS / "benchmark-file.md").read_text("utf-8")) if b["kind"] == "toml"
-    )
+    text = toml_blocks(DOCS / "benchmark-file.md")[0]
     (tmp_path / "example.toml").write_text(text, encoding="utf-8")
     assert read_benchmark_file(tmp_path / "example.toml").groups == ("stiff", "soft", "holdout")
     words = " ".join(named_in("benchmark-file.md"))

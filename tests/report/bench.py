@@ -1,4 +1,4 @@
-"""Detectors of a learned gate, and rows of results that a test chooses."""
+"""Detectors with signatures of the gate, and rows of results for tests."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def contact(
 
 
 def contacts_of(detector: str, group: str, latencies: Sequence[float | str | None]) -> list[ContactResult]:
-    """One recording a contact; None is missed, text says why it is not assessable."""
+    """Return a recording per contact; None is missed, a text is the reason for not assessable."""
     made = []
     for i, late in enumerate(latencies, 1):
         name = f"{group}/{i:02}.csv"

@@ -1,4 +1,4 @@
-"""A learned gate: what a detector says of a simulated run, as the workflows would hand it to a report."""
+"""A gate with signatures: detections of simulated runs, as workflows pass them to a report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names that a file or a configuration may bring along."""
+"""Hostile names that may be in a file or a configuration."""
 
 HOSTILE = {
     "math": "$x^2$ \\frac{a}{",

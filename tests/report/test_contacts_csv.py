@@ -1,4 +1,4 @@
-"""Contacts and forces as CSV: untouched numbers, and nothing that a spreadsheet or a terminal would run."""
+"""Contacts and forces as CSV: unchanged numbers, and nothing that a spreadsheet or a terminal would run."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import fields, replace
 import pytest
 
 from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
-from cdtool.report.contacts_csv import contacts_csv
-from cdtool.report.forces_csv import forces_csv
+from cdtool.report.writers.contacts import contacts_csv
+from cdtool.report.writers.forces import forces_csv
 from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 

@@ -1,4 +1,4 @@
-"""JUnit XML: a failure exactly where a limit is not kept, readable by every XML 1.0 parser whatever names there are."""
+"""JUnit XML: a failure exactly where a limit is not met, readable by every XML 1.0 parser whatever the names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import pytest
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule, not_met
 from cdtool.evaluation.results import LimitResult, Results, Skipped
-from cdtool.report.junit import to_junit
+from cdtool.report.writers.base import Report
+from cdtool.report.writers.junit import to_junit
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.named_results import named
@@ -32,7 +33,7 @@ VALID = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
 
 def read(evaluated: Evaluated) -> ElementTree.Element:
     """The root, after checking that it is what Jenkins takes and that its counts are right."""
-    text = to_junit(evaluated)
+    text = to_junit(Report(evaluated))
     assert VALID.fullmatch(text)
     root = ElementTree.fromstring(text.encode("utf-8"))
     for element in root.iter():
@@ -70,7 +71,7 @@ def test_every_recording_is_a_case_of_every_detector(evaluated):
     assert [len(suite) for suite in root] == [1, 4, 4, 30, 30, 40, 40]
 
 
-def test_an_outcome_is_told_in_words(results):
+def test_a_case_shows_the_outcome_of_each_contact(results):
     felt = replace(results.contacts[0], force_at_alarm_n=123.4)
     root = read(evaluate(replace(results, contacts=(felt, *results.contacts[1:]))))
     words = case(root, "friction_ekf.stiff", "stiff/01.csv").findtext("system-out")
@@ -96,16 +97,16 @@ def test_a_recording_that_was_left_out_is_an_error(evaluated):
     assert error is not None and error.get("message") == "broken.csv: empty file"
 
 
-def test_a_limit_is_a_case_and_what_breaks_it_fails_with_it(results):
+def test_a_limit_is_a_case_and_what_violates_it_fails_with_it(results):
     root = read(evaluate(results, [rule("missed", 0), rule("mean_ms", 80), rule("false_alarms", 0, group="holdout")]))
     suite = root[0]
     assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("limits", "3", "2")
-    broken_limit = case(root, "limits", "momentum.stiff.missed (momentum, stiff)").find("failure")
-    assert broken_limit is not None
-    assert broken_limit.get("message") == "violated: missed is 1, at most 0 allowed; 1 is more than 0"
-    assert broken_limit.text == broken_limit.get("message")
-    kept = case(root, "limits", "momentum.stiff.mean_ms (momentum, stiff)")
-    assert kept.find("failure") is None and kept.findtext("system-out") == "mean_ms is 65, at most 80 allowed"
+    violated = case(root, "limits", "momentum.stiff.missed (momentum, stiff)").find("failure")
+    assert violated is not None
+    assert violated.get("message") == "violated: missed is 1; required: at most 0; 1 is more than 0"
+    assert violated.text == violated.get("message")
+    met = case(root, "limits", "momentum.stiff.mean_ms (momentum, stiff)")
+    assert met.find("failure") is None and met.findtext("system-out") == "mean_ms is 65; required: at most 80"
     failing = {
         (item.get("classname"), item.get("name")): failure.get("message")
         for item in root.iter("testcase")
@@ -125,14 +126,14 @@ def test_a_limit_that_cannot_be_assessed_fails(results):
     root = read(evaluate(replace(results, limits=(unknown,))))
     failure = case(root, "limits", "a (momentum, stiff)").find("failure")
     assert failure is not None
-    assert failure.get("message") == "not assessable: force_at_alarm_n is –, at most 9 allowed; no load cell"
+    assert failure.get("message") == "not assessable: force_at_alarm_n is –; required: at most 9; no load cell"
 
 
 @pytest.mark.parametrize("largest", [0.0, 0.5, 1.0, 50.0, 1e9])
 @pytest.mark.parametrize(
     "figure", ["missed", "p95_ms", "std_ms", "mean_ms_upper", "peak_force_n", "hours", "not_assessable"]
 )
-def test_there_are_failures_exactly_where_a_limit_is_not_kept(results, figure, largest):
+def test_there_are_failures_exactly_where_a_limit_is_not_met(results, figure, largest):
     evaluated = evaluate(results, [rule(figure, largest, "*")])
     assert bool(list(read(evaluated).iter("failure"))) == bool(not_met(evaluated.results.limits))
 
@@ -168,11 +169,11 @@ def test_hostile_names_are_text_in_a_file_that_parses(results, kind):
 
 def test_no_name_is_an_attachment(results):
     name = "[[[ATTACHMENT|/etc/passwd]]"
-    text = to_junit(named(results, name))
+    text = to_junit(Report(named(results, name)))
     shown = [item.text or "" for item in ElementTree.fromstring(text).iter() if item.tag != "testsuites"]
     assert any("ATTACHMENT" in item for item in shown)
     assert not any("[[" in item for item in shown)
 
 
 def test_the_same_results_give_the_same_text(results):
-    assert to_junit(evaluate(results)) == to_junit(evaluate(replace(results)))
+    assert to_junit(Report(evaluate(results))) == to_junit(Report(evaluate(replace(results))))

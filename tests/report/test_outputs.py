@@ -1,4 +1,4 @@
-"""Targets and folders: each suffix gets its content, a folder holds everything, nothing leaves it."""
+"""Targets and folders: each suffix gets its content, a folder contains all reports, nothing is written outside."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import evaluate
 from cdtool.evaluation.results import ForceResult, ForceStepResult
 from cdtool.evaluation.traces.file import encode_traces, read_traces
-from cdtool.report.contacts_csv import contacts_csv
-from cdtool.report.junit import to_junit
-from cdtool.report.markdown.markdown import to_markdown
+from cdtool.report.markdown.report import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
+from cdtool.report.writers.contacts import contacts_csv
+from cdtool.report.writers.junit import to_junit
 from tests.report.bench import Bench
 from tests.report.hostile import HOSTILE
 
@@ -27,7 +27,7 @@ WHOLE = {"report.html", "report.md", "results.json", "results.traces.json.gz", "
 
 @pytest.fixture
 def done(bench: Bench, simulated, results) -> Report:
-    """Traces of groups whose names are hostile, or alike once they are file names."""
+    """Traces of groups whose names are hostile, or equal as file names."""
     recording = simulated("stiff", 1)
     groups = (*HOSTILE.values(), "Stiff", "stiff", "stiff_momentum")
     traces = tuple(bench.trace(replace(recording, name=ALL), group, ("momentum",)) for group in groups)
@@ -57,9 +57,9 @@ def test_each_suffix_gets_its_content(done, tmp_path):
     assert write_outputs(done, targets) == targets
     assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 3
     assert encode_traces(read_traces(tmp_path / "a.traces.json.gz")) == encode_traces(done.traces)
-    assert targets[1].read_text(encoding="utf-8") == to_markdown(done.evaluated)
+    assert targets[1].read_text(encoding="utf-8") == to_markdown(Report(done.evaluated))
     assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.evaluated.results)
-    assert targets[3].read_text(encoding="utf-8") == to_junit(done.evaluated)
+    assert targets[3].read_text(encoding="utf-8") == to_junit(done)
     assert ElementTree.parse(targets[3]).getroot().tag == "testsuites"
     assert targets[4].read_text(encoding="utf-8").lower().startswith("<!doctype html>")
     assert [target.read_bytes()[:4] for target in targets[5:]] == [b"\x89PNG", b"<?xm", b"%PDF"]
@@ -85,7 +85,7 @@ def test_good_targets_pass_and_nothing_is_written_yet(tmp_path):
 def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("cdtool.report.outputs.os.access", lambda *_: False)  # root may write everywhere
     for target in (tmp_path, tmp_path / "a.json", tmp_path / "new"):
-        with pytest.raises(UsageError, match="may not be written"):
+        with pytest.raises(UsageError, match="is not writable"):
             check_outputs([target])
 
 

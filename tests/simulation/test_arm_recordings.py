@@ -139,7 +139,7 @@ def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> N
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no recording is asked for"):
+    with pytest.raises(UsageError, match="no recording is requested"):
         write_arm_recordings(tmp_path / "none", {}, seed=1)
     with pytest.raises(UsageError, match="not an empty folder"):
         write_arm_recordings(folder, COUNTS, seed=1)

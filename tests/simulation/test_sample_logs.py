@@ -47,7 +47,7 @@ def test_the_sample_logs_are_what_their_command_gives(folder: str, tmp_path: Pat
     whole = ("benchmark.toml",) if FOLDERS[folder] == GROUPS else ()
     for name in ("machine.toml", *whole):
         assert (made / name).read_text(encoding="utf-8") == (kept / name).read_text(encoding="utf-8")
-    # Without the runs to learn from there is none.
+    # Without runs to learn from there is no benchmark file.
     lines = (made / "benchmark.toml").read_text(encoding="utf-8").splitlines() if "free" in FOLDERS[folder] else []
     assert set(lines) <= set((kept / "benchmark.toml").read_text(encoding="utf-8").splitlines())
     new, old = contacts_of(made), contacts_of(kept)

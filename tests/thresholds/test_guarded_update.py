@@ -102,7 +102,7 @@ def test_a_limit_that_would_leave_the_reserve_is_refused_with_its_place():
         except SignatureError as fault:
             refused = str(fault)
     assert "at 0.3" in refused or "at 0.4" in refused
-    assert f"spreads from the one first learned, {RESERVE:g} are allowed (inspect the machine there" in refused
+    assert f"spreads from the one first learned; at most {RESERVE:g} allowed (inspect the machine there" in refused
 
 
 def test_while_accelerating_the_place_is_a_time():
@@ -132,7 +132,7 @@ def test_a_limit_that_would_be_lost_amid_the_stroke_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [{"cap": 0.0}, {"reserve": -1.0}, {"cap": float("nan")}])
-def test_a_cap_or_reserve_that_is_no_number_above_0_is_refused(wrong):
+def test_a_cap_or_reserve_that_is_not_above_0_is_refused(wrong):
     with pytest.raises(UsageError, match="a number of spreads above 0"):
         guarded(FIRST, FIRST, CLEAN, signal(np.full(N, 100.0)), **wrong)
 

@@ -33,7 +33,7 @@ def fitted():
     return Innovation(order=2).fit(runs())
 
 
-def test_burg_finds_the_model_from_many_short_stretches():
+def test_burg_finds_the_model_from_many_short_sections():
     rng = np.random.default_rng(1)
     coefficients, spread = burg([3.0 * coloured(rng, 700)[200:] for _ in range(100)], 4)
     assert coefficients == pytest.approx((*MODEL, 0.0, 0.0), abs=0.02)
@@ -46,7 +46,7 @@ def test_burg_finds_a_pure_tone_exactly():
     assert spread < 1e-3
 
 
-def test_burg_leaves_out_stretches_that_are_too_short():
+def test_burg_leaves_out_sections_that_are_too_short():
     rng = np.random.default_rng(2)
     long = coloured(rng)
     assert burg([long, np.ones(2)], 2)[0] == pytest.approx(burg([long], 2)[0], rel=1e-12)
@@ -109,7 +109,7 @@ def test_every_sample_behind_a_gap_is_judged_and_as_normal_as_any(fitted, missin
 
 
 @pytest.mark.parametrize("missing", [1, 5, 20])
-def test_a_filter_that_missed_a_sample_itself_and_jumps_is_not_taken_for_a_contact(fitted, missing):
+def test_a_filter_that_missed_a_sample_and_jumps_is_not_mistaken_for_a_contact(fitted, missing):
     # A detector's filter that lost a sample does not go on as the model says: its value jumps by less than normal runs
     # differ, yet by many times what the model leaves unexplained.
     recording, normal = runs(1, seed=9)[0]

@@ -94,7 +94,7 @@ def test_it_survives_json(normal):
         ({"channels": {"force": {}}}, "'force'"),
     ],
 )
-def test_what_is_no_normal_motion_of_these_joints_is_refused(normal, change, message):
+def test_a_damaged_normal_motion_or_one_of_other_joints_is_refused(normal, change, message):
     with pytest.raises(ValueError, match=message):
         NormalMotion.from_dict({**normal.to_dict(), **change})
 
@@ -123,7 +123,7 @@ def test_neither_load_cell_nor_label_is_learned():
     assert found is not None and set(found.channels) == {"speed", "position", "torque"}
 
 
-def test_too_few_runs_and_a_motion_at_rest_have_no_normal_course():
+def test_too_few_runs_and_a_motion_at_rest_have_no_normal_curve():
     assert learn_normal_motion(runs(2), MOTION) is None
     assert learn_normal_motion(runs(5), MotionClass(0, 0.0)) is None
     blind = [replace(item, channels={"torque": item["torque"]}) for item in runs(5)]

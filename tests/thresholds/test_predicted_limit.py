@@ -46,7 +46,7 @@ def test_white_noise_is_passed_on_as_the_reference_says(order, forgetting, ahead
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.8])
-def test_a_parabola_is_foretold_exactly_on_any_clock(share):
+def test_a_parabola_is_predicted_exactly_on_any_clock(share):
     time = jittering_clock(N, share)
     rule = PredictedLimit(order=2, ahead=15.0)
     statistic = rule.statistic(signal(3.0 - 40.0 * time + 25.0 * time**2, time), 1e-3)
@@ -56,7 +56,7 @@ def test_a_parabola_is_foretold_exactly_on_any_clock(share):
     )
 
 
-def test_a_line_over_a_short_gap_is_foretold_as_without_the_gap():
+def test_a_line_over_a_short_gap_is_predicted_as_without_the_gap():
     values = 5.0 + 20.0 * TIME
     holed = signal(values)
     status, held = holed.status.copy(), holed.values.copy()
@@ -66,7 +66,7 @@ def test_a_line_over_a_short_gap_is_foretold_as_without_the_gap():
     np.testing.assert_allclose(statistic.values[2015:, 0], values[2015:] + 0.2, atol=1e-6)
 
 
-def test_a_gap_longer_than_the_memory_starts_it_anew():
+def test_a_gap_longer_than_the_memory_restarts_it():
     holed = signal(np.where(TIME < 2.0, 0.0, 50.0))
     status = holed.status.copy()
     start_up = int(np.ceil(np.log(0.01) / np.log(0.95)))

@@ -77,7 +77,7 @@ def test_glr_finds_small_shifts_with_long_windows_and_large_ones_with_short():
 
 
 @pytest.mark.parametrize("rule", [Cusum(drift=0.5), Glr()])
-def test_a_short_gap_is_stepped_over_and_a_long_one_starts_anew(rule):
+def test_a_short_gap_is_bridged_and_a_long_one_restarts_the_sum(rule):
     values = np.full(N, 1.0)
     whole = rule.statistic(signal(values[:-10]), 1, GAP).values[:, 0]
     for missing, kept in ((10, True), (21, False)):

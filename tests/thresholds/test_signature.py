@@ -120,8 +120,8 @@ def test_too_few_runs_say_how_many_are_missing_unless_forced():
 
 def test_a_run_of_another_speed_or_direction_is_refused_by_name():
     for other in (stroke(speed=0.15), stroke(-1)):
-        odd = replace(other, name="odd one")
-        with pytest.raises(SignatureError, match="odd one"):
+        odd = replace(other, name="other class")
+        with pytest.raises(SignatureError, match="other class"):
             Signature().fit([*runs(11), (odd, signal(np.zeros(N)))])
 
 
@@ -188,7 +188,7 @@ def test_the_spread_has_a_floor_where_a_quantised_signal_does_not_vary():
         (True, 1, "1 impact-free run of one class: 1 more is needed to have 2"),
     ],
 )
-def test_too_few_runs_are_told_with_how_many_are_missing(force, runs, said):
+def test_too_few_runs_are_reported_with_how_many_are_missing(force, runs, said):
     with pytest.raises(SignatureError, match=said) as fault:
         Signature(force=force).fit([(None, None)] * runs)
     assert ("--force" in fault.value.hint and "force = true in [signature]" in fault.value.hint) is not force

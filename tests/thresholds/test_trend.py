@@ -37,7 +37,7 @@ def test_it_is_the_signal_less_its_low_pass_over_the_time_constant():
     )
 
 
-def test_it_runs_on_over_a_short_gap_and_starts_anew_behind_a_long_one():
+def test_it_continues_over_a_short_gap_and_restarts_after_a_long_one():
     ramp = signal(30.0 * TIME)
     status = ramp.status.copy()
     status[1000:1050] = Status.GAP
@@ -48,7 +48,7 @@ def test_it_runs_on_over_a_short_gap_and_starts_anew_behind_a_long_one():
     assert trend.valid[2161:].all()
 
 
-def test_a_stretch_where_the_signal_does_not_apply_starts_it_anew_however_short():
+def test_an_interval_where_the_signal_does_not_apply_restarts_it_however_short():
     step = signal(np.where(TIME < 2.0, 0.0, 500.0))
     status = step.status.copy()
     status[1995:2000] = Status.NOT_APPLICABLE

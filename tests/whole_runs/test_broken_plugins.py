@@ -169,14 +169,14 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
     ("old", "new", "words"),
     [
         ("torque = recording", "1 / 0; torque = recording", "fails: ZeroDivisionError"),
-        ("return Signal(", "return (", "gives tuple, no Signal"),
-        ("torque.time, values", "torque.time, values.tolist()", "no array"),
+        ("return Signal(", "return (", "returns tuple, not a Signal"),
+        ("torque.time, values", "torque.time, values.tolist()", "are not arrays"),
         ("torque.values.copy()", "torque.values[:, 0].copy()", "samples by joints"),
         ("torque.values.copy()", "np.hstack((torque.values, torque.values))", "samples by joints"),
         ("torque.time, values", "torque.time[1:], values", "samples by joints"),
         ("dtype=np.uint8", "dtype=int", "float64 and uint8 are needed"),
         ("torque.time, values", "torque.time[::-1], values", "times that do not strictly increase"),
-        ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "not finite and yet valid"),
+        ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "valid but not finite"),
     ],
 )
 def test_a_signal_that_breaks_the_contract_is_one_line(install, old, new, words):
@@ -262,10 +262,10 @@ def test_the_template_threshold_is_valid(install, tmp_path):
     ("old", "new", "words"),
     [
         ("return Fitted(", "return 1 / 0, (", "threshold odd fails: ZeroDivisionError"),
-        ("return Fitted(", "return FittedLimit(", "threshold odd makes FittedLimit, its `fitted` names Fitted"),
+        ("return Fitted(", "return FittedLimit(", "threshold odd returns FittedLimit, its `fitted` names Fitted"),
         ("return statistic, band", "return 1 / 0", "threshold Fitted fails: ZeroDivisionError"),
         ("return statistic, band", "return statistic, Band(band.lower[1:], band.upper)", "another shape"),
-        ("return statistic, band", "return statistic, Band(band.lower, band.upper + np.nan)", "gives NaN where it"),
+        ("return statistic, band", "return statistic, Band(band.lower, band.upper + np.nan)", "returns NaN where its"),
     ],
 )
 def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old, new, words):

@@ -107,12 +107,37 @@ def compare_builds(
 ) -> BuildComparison:
     """Compare every detector and group present in both results.
 
-    `relevant_change`: the smallest change for the worse that matters, as a share of the old mean latency and force, of
-    the contacts missed or not assessable, and of a false alarm per operation.
-    Latency and force: `paired_difference` by recording or campaign, else `unpaired_difference`; misses and contacts not
-    assessable: McNemar, else Fisher; false alarms: `poisson_difference_p` on counts and hours.
-    Raises ConfigurationError, naming the key, if a setting differs that defines the results; UsageError if nothing is
-    common to both.
+    Parameters
+    ----------
+    old, new : Results
+        The results of two builds.
+    significance : float
+        Family-wise error rate of "worse" and "better".
+    relevant_change : float
+        The smallest change for the worse that matters, as a share of the old mean latency and force, of the contacts
+        missed or not assessable, and of a false alarm per operation.
+
+    Returns
+    -------
+    BuildComparison
+        One row per detector and group, and the verdict over all of them.
+
+    Raises
+    ------
+    ConfigurationError
+        A setting differs that defines the results; the message names the key.
+    UsageError
+        Nothing is common to both, or a share is outside its range.
+
+    Notes
+    -----
+    Latency and force: `paired_difference` by recording or campaign, else `unpaired_difference`. Misses and contacts not
+    assessable: `mcnemar_p`, else `fisher_p`. False alarms: `poisson_difference_p` on counts and hours. All p are
+    corrected together by `holm`.
+
+    Examples
+    --------
+    `cdtool.compare` compares two results files.
     """
     check_significance(significance)
     if not 0.0 < relevant_change <= 1.0:

@@ -1,7 +1,7 @@
-"""Force limits: how much force a contact may have, as a staircase over the time since it began. Data, not code.
+"""Force limits: the largest allowed force of a contact, as steps over the time since it began. Data, not code.
 
-Conventions: time counts from the contact's onset [s]; a step holds from its `from_s` to the next step's, the last one
-to the end of the record. The shipped file is limits.toml beside this module; a user's file replaces it.
+Conventions: time counts from the contact's onset [s]; a step applies from its `from_s` to the next step's, the last one
+to the end of the record. The shipped file is limits.toml in this folder; a user's file replaces it.
 """
 
 from __future__ import annotations
@@ -44,16 +44,38 @@ class ForceProfile:
 
     @property
     def warning(self) -> str:
-        """What a report has to say beside figures of this profile; empty where its values were checked."""
+        """What a report has to state with results of this profile; empty if its values were checked."""
         return "" if self.checked else "values to be checked against the standard"
 
     def ends(self, step: int) -> float:
-        """Until when a step holds [s after the onset]; infinite for the last one."""
+        """Return until when a step applies [s after the onset]; infinite for the last one."""
         return self.steps[step + 1].from_s if step + 1 < len(self.steps) else float("inf")
 
 
 def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
-    """The profiles of a file by name, None: the shipped ones; raises ConfigurationError with file, key and reason."""
+    """Read the force profiles of a file.
+
+    Parameters
+    ----------
+    path : Path, optional
+        A TOML file; by default the shipped one.
+
+    Returns
+    -------
+    dict of str to ForceProfile
+        The profiles by name.
+
+    Raises
+    ------
+    ConfigurationError
+        The file is wrong; the message names file, key and reason.
+
+    Examples
+    --------
+    >>> profile = read_force_limits()["en_12453_reducing_gap"]
+    >>> [(step.name, step.from_s, step.at_most_n) for step in profile.steps]
+    [('dynamic', 0.0, 400.0), ('static', 0.75, 150.0), ('residual', 5.0, 25.0)]
+    """
     file = _SHIPPED if path is None else path
     where = str(file) if path else "the shipped limits.toml"
     root = Table(read_toml(file), where)
@@ -66,7 +88,30 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
 
 
 def profile_of(profiles: Mapping[str, ForceProfile], name: str) -> ForceProfile:
-    """The profile of that name; raises UsageError with the nearest known names."""
+    """Return the force profile of a name.
+
+    Parameters
+    ----------
+    profiles : mapping of str to ForceProfile
+        The profiles of a file.
+    name : str
+        The name.
+
+    Returns
+    -------
+    ForceProfile
+        The profile.
+
+    Raises
+    ------
+    UsageError
+        The name is unknown; the hint lists the nearest known ones.
+
+    Examples
+    --------
+    >>> profile_of(read_force_limits(), "en_12453_reducing_gap").ends(0)
+    0.75
+    """
     if name not in profiles:
         raise UsageError(f"unknown force profile '{name}'", nearest(name, profiles))
     return profiles[name]

@@ -1,4 +1,4 @@
-"""Force over time of the contacts whose curves were kept, with their verdicts: what a figure of forces needs."""
+"""Force over time of the contacts whose curves were stored, with their verdicts: the input of a figure of forces."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _OUTCOMES: tuple[Outcome, ...] = ("pass", "fail", "not_assessable")
 class TracedForce:
     """One contact: load-cell force (n,) [N] at times (n,) [s after the onset], decimated, and its verdict.
 
-    The force is the cell's reading less that at rest, positive where it presses; it holds no correction for a mass
-    before the cell, which the verdict does. `alarms`: seconds from the onset to each detector's alarm.
+    The force is the cell's reading minus that at rest, positive if it presses; unlike the verdict it is not corrected
+    for a mass before the cell. `alarms`: seconds from the onset to each detector's alarm.
     """
 
     recording: str
@@ -38,7 +38,22 @@ class TracedForce:
 
 
 def force_profiles(results: Results) -> dict[str, ForceProfile]:
-    """Return the profiles with which the results were compared, by name."""
+    """Return the profiles with which the results were compared.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    dict of str to ForceProfile
+        The profiles by name.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
+    """
     found = {}
     for values in results.provenance.get("force_profiles", {}).values():
         steps = tuple(ForceStep(**step) for step in values["steps"])
@@ -47,7 +62,24 @@ def force_profiles(results: Results) -> dict[str, ForceProfile]:
 
 
 def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForce, ...]:
-    """Every contact with a force verdict whose load-cell curve was kept, in the order of the traces."""
+    """Return every contact with a force verdict whose load-cell curve was stored.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+    traces : sequence of Trace
+        Its traces.
+
+    Returns
+    -------
+    tuple of TracedForce
+        In the order of the traces.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns results and traces.
+    """
     verdicts = {(row.group, row.recording, row.contact): row for row in results.forces}
     onsets: dict[tuple[str, str], dict[int, float]] = {}
     alarms: dict[tuple[str, str, int], dict[str, float]] = {}
@@ -70,7 +102,7 @@ def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForc
 
 
 def _contacts(trace: Trace, onsets: Mapping[int, float]) -> Iterator[tuple[int, Contact, float]]:
-    """The trace's contacts with their number and their end [s]; one ends where the next begins."""
+    """Yield the trace's contacts with their number and their end [s]; one ends where the next begins."""
     ends = [*(contact.start for contact in trace.contacts[1:]), math.inf]
     for contact, until in zip(trace.contacts, ends, strict=False):
         for number, onset in onsets.items():
@@ -92,7 +124,7 @@ def _curve(trace: Trace, contact: Contact, until: float) -> tuple[FloatArray, Fl
 
 
 def _verdict(row: ForceResult, time: FloatArray, force: FloatArray) -> ForceVerdict:
-    """The row's verdict; where its peaks lie is read from the curve."""
+    """Return the row's verdict; the times of its peaks are read from the curve."""
     ends = [*(step.from_s for step in row.steps[1:]), math.inf]
     steps = []
     for step, until in zip(row.steps, ends, strict=True):

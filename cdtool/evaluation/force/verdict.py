@@ -111,10 +111,33 @@ def judge(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
 
 
 def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVerdict:
-    """Compare the mean of the tests' peaks with every step; if the profile does not average, the highest peak.
+    """Compare the mean of several tests' peaks with every step; if the profile does not average, the highest peak.
 
-    Not assessable: a step with fewer tests than the profile averages, or one that does not fail and that a test could
-    not assess. With more tests all are averaged. Raises UsageError for verdicts of another profile.
+    Parameters
+    ----------
+    verdicts : sequence of ForceVerdict
+        The tests at one point, compared with the same profile.
+    profile : ForceProfile
+        The profile; its `average_of` tests are averaged, and with more tests all of them.
+
+    Returns
+    -------
+    PointVerdict
+        Not assessable: a step with fewer tests than the profile averages, or one that does not fail and that a test
+        could not assess.
+
+    Raises
+    ------
+    UsageError
+        A verdict is on another profile.
+
+    Examples
+    --------
+    >>> from cdtool.evaluation.force.limits import read_force_limits
+    >>> profile = read_force_limits()["en_12453_reducing_gap"]
+    >>> steps = tuple(StepVerdict(step, "pass", 20.0, step.from_s, float("inf")) for step in profile.steps)
+    >>> averaged([ForceVerdict(profile.name, steps, 6.0)] * 3, profile).outcome
+    'pass'
     """
     for verdict in verdicts:
         if verdict.profile != profile.name:

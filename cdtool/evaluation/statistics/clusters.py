@@ -20,7 +20,17 @@ IntArray = npt.NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Clusters:
-    """`values` (n,), cluster by cluster, and the `number` (n,) of each one's cluster, 0 to k - 1; `counts` (k,)."""
+    """Values grouped by recording or test campaign.
+
+    Attributes
+    ----------
+    values : ndarray of float, shape (n,)
+        The values, cluster by cluster.
+    number : ndarray of int, shape (n,)
+        The number of each value's cluster, 0 to k - 1.
+    counts : ndarray of int, shape (k,)
+        The number of values in each cluster.
+    """
 
     values: FloatArray
     number: IntArray
@@ -30,12 +40,36 @@ class Clusters:
         return len(self.counts)
 
     def sums(self, values: FloatArray) -> FloatArray:
-        """Sum (k,) over each cluster of something given for each value (n,)."""
+        """Return the sum over each cluster (k,) of a quantity given for each value (n,)."""
         return np.bincount(self.number, weights=values, minlength=len(self)).astype(np.float64)
 
 
 def clusters_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Clusters:
-    """Group values (n,) by their labels (n,); raises UsageError where they do not fit or a value is not finite."""
+    """Group values by their labels.
+
+    Parameters
+    ----------
+    values : array_like of float, shape (n,)
+        Finite values.
+    labels : iterable of hashable, length n
+        The recording or test campaign of each value.
+
+    Returns
+    -------
+    Clusters
+        The values, sorted within and between clusters.
+
+    Raises
+    ------
+    UsageError
+        The lengths differ, or a value is not finite.
+
+    Examples
+    --------
+    >>> groups = clusters_of([3.0, 1.0, 2.0], ["b", "a", "b"])
+    >>> groups.values.tolist(), groups.counts.tolist()
+    ([1.0, 2.0, 3.0], [1, 2])
+    """
     array, names = np.asarray(values, dtype=np.float64), list(labels)
     if array.shape != (len(names),):
         raise UsageError(f"values {array.shape} and clusters ({len(names)},) do not match", "give one label per value")

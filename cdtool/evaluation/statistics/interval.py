@@ -1,4 +1,4 @@
-"""A figure and the interval that goes with it: what every statistic of the evaluation gives back."""
+"""A value with its confidence interval: the result of most statistics of the evaluation."""
 
 from __future__ import annotations
 
@@ -10,11 +10,23 @@ from cdtool.errors import UsageError
 
 @dataclass(frozen=True)
 class Interval:
-    """A figure with its confidence interval, all in the unit of the figure.
+    """A value with its confidence interval, all in one unit.
 
-    `value` is NaN where the figure is undefined, infinite where a quantile was not reached. A bound is NaN where there
-    is too little data for an interval, infinite where it is open. `level` is the confidence that was asked for.
-    `reason` says why there is no interval.
+    Parameters
+    ----------
+    value : float
+        NaN if undefined, infinite if a quantile was not reached.
+    low, high : float
+        The bounds; NaN if there are too few values for an interval, infinite if the interval is open.
+    level : float
+        The confidence level requested.
+    reason : str
+        Why there is no interval.
+
+    Examples
+    --------
+    >>> Interval(12.0, 10.5, 14.0).known, Interval(float("nan"), 0.0, 1.0).known
+    (True, False)
     """
 
     value: float
@@ -25,11 +37,26 @@ class Interval:
 
     @property
     def known(self) -> bool:
-        """Whether there is a figure at all; "not reached" (infinite) is one."""
+        """Whether there is a value; "not reached" (infinite) is one."""
         return not math.isnan(self.value)
 
 
 def check_level(level: float) -> None:
-    """Raise UsageError unless `level` is a confidence level between 0 and 1."""
+    """Check a confidence level.
+
+    Parameters
+    ----------
+    level : float
+        The confidence level.
+
+    Raises
+    ------
+    UsageError
+        The level is not between 0 and 1.
+
+    Examples
+    --------
+    >>> check_level(0.95)
+    """
     if not 0.0 < level < 1.0:
         raise UsageError(f"confidence level is {level:g}", "give a share between 0 and 1, such as 0.95")

@@ -1,7 +1,7 @@
-"""Latency where contacts were missed: the Kaplan-Meier curve of the share still undetected, and its quantiles.
+"""Latency in the presence of missed contacts: the Kaplan-Meier curve of the share still undetected, and its quantiles.
 
-Conventions: a missed contact is right-censored at the end of the time in which it was watched; at equal times a
-detection comes before a miss. Latencies are not below 0. Contacts are taken as independent of each other.
+Conventions: a missed contact is right-censored at the end of the time in which it was monitored; at equal times a
+detection comes before a miss. Latencies are not below 0. Contacts are treated as independent of each other.
 """
 
 from __future__ import annotations
@@ -24,9 +24,16 @@ _EXACT = math.sqrt(np.finfo(np.float64).eps)
 
 
 class Survival(NamedTuple):
-    """A step curve: from `times` (m,) on, up to the next one, this `share` (m,) is undetected, with its band.
+    """A step curve of the share still undetected, with its confidence band.
 
-    The first time is 0 with share 1.
+    Attributes
+    ----------
+    times : ndarray of float, shape (m,)
+        Where the steps are, in the unit of the latencies; the first is 0.
+    share : ndarray of float, shape (m,)
+        The share undetected from each time to the next; the first is 1.
+    low, high : ndarray of float, shape (m,)
+        The band.
     """
 
     times: FloatArray
@@ -36,13 +43,46 @@ class Survival(NamedTuple):
 
 
 def survival(latency: npt.ArrayLike, censored: npt.ArrayLike, level: float = 0.95) -> Survival:
-    """Share still undetected over time: S(t) = product over t_i <= t of 1 - d_i / n_i (Kaplan and Meier 1958).
+    """Return the share of contacts still undetected over time.
 
-    `latency` (n,) in any unit of time, `censored` (n,) True where the contact was missed. d_i contacts are detected at
-    t_i, n_i were watched and undetected until then. The band holds at each time by itself, not for the whole curve:
-    S ** exp(-+ z sqrt(V) / ln S), V = sum of d_i / (n_i (n_i - d_i)) (log-log of Greenwood's variance). That does not
-    exist at S = 1, where the exact bound of none of n_i stands, nor at S = 0, where the upper limit stays and the lower
-    is 0. Empty input gives the first time alone, its band from 0 to 1. Raises UsageError for arrays that do not fit.
+    Parameters
+    ----------
+    latency : array_like of float, shape (n,)
+        Latency of each contact in any unit of time, not below 0; of a missed contact the time for which it was
+        monitored.
+    censored : array_like of bool, shape (n,)
+        True if the contact was missed.
+    level : float
+        Confidence level of the band.
+
+    Returns
+    -------
+    Survival
+        The curve and its band. Empty input: only the time 0, with a band from 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        The lengths differ, a latency is below 0 or not finite, or the level is not between 0 and 1.
+
+    Notes
+    -----
+    Kaplan and Meier, "Nonparametric estimation from incomplete observations", JASA 53, 1958:
+
+        S(t) = product over t_i <= t of 1 - d_i / n_i
+
+    d_i contacts are detected at t_i, n_i were monitored and undetected until then. The band holds at each time, not for
+    the whole curve: S ** exp(-+ z sqrt(V) / ln S), V = sum of d_i / (n_i (n_i - d_i)) (log-log of Greenwood's
+    variance). At S = 1, where it does not exist, it is the exact bound of 0 of n_i; at S = 0 the upper limit is held
+    and the lower is 0.
+
+    Examples
+    --------
+    Three contacts are detected after 30, 40 and 50 ms; one was missed in 1000 ms.
+
+    >>> curve = survival([30.0, 40.0, 50.0, 1000.0], [False, False, False, True])
+    >>> curve.times[:4].tolist(), curve.share[:4].tolist()
+    ([0.0, 30.0, 40.0, 50.0], [1.0, 0.75, 0.5, 0.25])
     """
     check_level(level)
     time, missed = _checked(latency, censored)
@@ -58,17 +98,47 @@ def survival(latency: npt.ArrayLike, censored: npt.ArrayLike, level: float = 0.9
 
 
 def latency_quantile(latency: npt.ArrayLike, censored: npt.ArrayLike, share: float, level: float = 0.95) -> Interval:
-    """Latency within which `share` of the contacts is detected, misses counted: the time at which S(t) = 1 - share.
+    """Return the latency within which a share of the contacts is detected, counting misses.
 
-    `latency` (n,) in any unit of time; `censored` (n,) True where the contact was missed, `latency` is then the time up
-    to which it was watched. Definition of R's survival::quantile.survfit: the first time at which S is at or below
-    1 - share; where S equals 1 - share on a whole step, the middle of that step (from its beginning to the next
-    detection, or to the last time watched). So the median of an even number of detections is the usual one.
-    Interval of Brookmeyer and Crowley (1982): the times, by the same definition, at which the lower and the upper limit
-    of the log-log band (see `survival`) pass 1 - share. Infinite: not reached in the time watched, too many were missed
-    or there are too few contacts (all detected, the median has an upper limit with 7 contacts or more, the P95 98).
-    Where all were detected at one time, or none was, the curve has no band: exact binomial bounds take its place.
-    Empty input: NaN. Raises UsageError for arrays that do not fit or a share outside 0 to 1.
+    Parameters
+    ----------
+    latency : array_like of float, shape (n,)
+        Latency of each contact in any unit of time, not below 0; of a missed contact the time for which it was
+        monitored.
+    censored : array_like of bool, shape (n,)
+        True if the contact was missed.
+    share : float
+        0.5 for the median, 0.95 for the P95.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    Interval
+        In the unit of the latencies. Infinite: not reached in the time monitored, because too many were missed or there
+        are too few contacts (with all detected, the median has an upper limit with 7 contacts or more, the P95 with
+        98). Empty input: NaN.
+
+    Raises
+    ------
+    UsageError
+        The lengths differ, a latency is below 0 or not finite, or `share` or `level` is not between 0 and 1.
+
+    Notes
+    -----
+    The time at which S(t) = 1 - share (see `survival`), as R's survival::quantile.survfit defines it: the first time at
+    which S is at or below 1 - share; if S equals 1 - share on a whole step, the middle of that step, from its beginning
+    to the next detection or to the last time monitored. So the median of an even number of detections is the usual one.
+    Interval of Brookmeyer and Crowley, "A confidence interval for the median survival time", Biometrics 38, 1982: the
+    times, by the same definition, at which the limits of the log-log band pass 1 - share. If all were detected at one
+    time, or none was, the curve has no band: exact binomial bounds replace it.
+
+    Examples
+    --------
+    >>> latency_quantile([30.0, 40.0, 50.0, 1000.0], [False, False, False, True], 0.5).value
+    45.0
+    >>> latency_quantile([30.0, 40.0, 50.0, 1000.0], [False, False, False, True], 0.95).value
+    inf
     """
     check_level(level)
     if not 0.0 < share < 1.0:
@@ -98,7 +168,7 @@ def _checked(latency: npt.ArrayLike, censored: npt.ArrayLike) -> tuple[FloatArra
 
 
 def _curve(time: FloatArray, missed: BoolArray, level: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Times, S and its log-log band; the lower limit is 0 at S = 0, the upper one NaN; both are NaN at S = 1."""
+    """Return times, S and its log-log band; the lower limit is 0 at S = 0, the upper one NaN; both are NaN at S = 1."""
     from scipy import stats
 
     sample: stats.CensoredData[np.float64] = stats.CensoredData(time[~missed], right=time[missed])
@@ -112,7 +182,7 @@ def _curve(time: FloatArray, missed: BoolArray, level: float) -> tuple[FloatArra
 
 
 def _reached(times: FloatArray, level: FloatArray, target: float) -> float:
-    """When a falling step curve is at `target`; infinite if never."""
+    """Return the time at which a falling step curve is at `target`; infinite if never."""
     at = np.flatnonzero(level <= target + _EXACT)
     if not len(at):
         return math.inf

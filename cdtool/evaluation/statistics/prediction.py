@@ -1,11 +1,11 @@
-"""The chance that the next run goes beyond a limit, predicted from the largest values of a few runs.
+"""The chance that the next run exceeds a limit, predicted from the largest values of a few runs.
 
-Conventions: `values` (n,) are maxima, one a run (critical factors, say); what is predicted is one more run of the same
-kind. The prediction holds its own uncertainty: with few runs neither mean nor spread is sure.
+Conventions: `values` (n,) are maxima, one per run (critical factors, for example); one more run of the same kind is
+predicted. The prediction includes its own uncertainty: with few runs neither mean nor spread is certain.
 
-A run's maximum is taken as the sum of two parts of equal variance: what shifts the run as a whole (normal), and the
-largest of its noise (Gumbel). Measured by `benchmarks/signature_coverage.py`: limits for 1 in 1000 are exceeded by 0.4
-on average; by 1.8 were the maxima taken as normal, by fewer than 0.1 were they taken as Gumbel.
+A run's maximum is modelled as the sum of two parts of equal variance: a normal one that shifts the run as a whole, and
+the largest of its noise (Gumbel). Measured by `benchmarks/signature_coverage.py`: limits for 1 in 1000 are exceeded by
+0.4 on average; by 1.8 if the maxima are modelled as normal, by fewer than 0.1 if they are modelled as Gumbel.
 """
 
 from __future__ import annotations
@@ -36,7 +36,17 @@ _NODES = 61
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of `n` maxima with that mean and standard deviation (ddof 1): what one more will do."""
+    """The maxima of several runs: what one more run will do.
+
+    Attributes
+    ----------
+    n : int
+        Number of maxima.
+    mean, std : float
+        Their mean and standard deviation (n - 1), in their unit.
+    gumbel_share : float
+        The share of the variance that is modelled as Gumbel.
+    """
 
     n: int
     mean: float
@@ -44,17 +54,30 @@ class Prediction:
     gumbel_share: float = GUMBEL_SHARE
 
     def chance_above(self, limit: float) -> float:
-        """P(x > limit) = E[S(m + t s)], t = (limit - mean) / std: m, s are mean and std of n values whose tail is S.
+        """Return the chance that one more run exceeds a limit.
 
-        The expectation is over samples of the standardised distribution, so that the chance is right on average
-        whatever mean and std are truly.
+        Parameters
+        ----------
+        limit : float
+            The limit, in the unit of the maxima.
+
+        Returns
+        -------
+        float
+            The chance.
+
+        Notes
+        -----
+        P(x > limit) = E[S(m + t s)], t = (limit - mean) / std, where m and s are mean and standard deviation of n
+        values whose tail is S. The expectation is over samples of the standardised distribution, so that the chance is
+        right on average for any true mean and standard deviation.
         """
         if self.std == 0.0:
             return 0.0 if limit > self.mean else 1.0
         return _chance((limit - self.mean) / self.std, self.n, self.gumbel_share)
 
     def limit_for(self, chance: float) -> float:
-        """The limit that one more run exceeds with that chance: the inverse of `chance_above`."""
+        """Return the limit that one more run exceeds with that chance: the inverse of `chance_above`."""
         if self.std == 0.0:
             return self.mean
         from scipy import optimize
@@ -72,9 +95,9 @@ class Prediction:
         return self.mean + self.std * float(optimize.brentq(too_much, below, above, xtol=1e-6))
 
     def runs_for(self, limit: float, chance: float) -> int | None:
-        """The least number of runs, mean and std staying as they are, with which `chance_above` is at most `chance`.
+        """Return the smallest number of runs with which `chance_above` is at most `chance`, for equal mean and std.
 
-        More runs make mean and std surer, not smaller: None where even `MOST_RUNS` would not do.
+        More runs make mean and std more certain, not smaller: None if even `MOST_RUNS` are too few.
         """
         if self.std == 0.0:
             return LEAST_VALUES if limit > self.mean else None
@@ -90,7 +113,31 @@ class Prediction:
 
 
 def prediction_of(values: npt.ArrayLike, gumbel_share: float = GUMBEL_SHARE) -> Prediction:
-    """What the maxima (n,) of n runs predict; raises UsageError for fewer than 3 or one that is not finite."""
+    """Return what the maxima of several runs predict for one more run.
+
+    Parameters
+    ----------
+    values : array_like of float, shape (n,)
+        The maxima, at least 3, in any unit.
+    gumbel_share : float
+        The share of the variance that is modelled as Gumbel.
+
+    Returns
+    -------
+    Prediction
+        Their number, mean and standard deviation.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than 3 values, or one is not finite.
+
+    Examples
+    --------
+    >>> prediction = prediction_of([2.8, 3.0, 3.2, 2.9, 3.1, 3.0, 2.7, 3.3, 3.0, 3.0])
+    >>> bool(prediction.chance_above(5.5) < 0.001 < prediction.chance_above(3.5))
+    True
+    """
     given = np.asarray(values, dtype=np.float64)
     if len(given) < LEAST_VALUES or not np.isfinite(given).all():
         raise UsageError(f"{len(given)} values to predict from", f"at least {LEAST_VALUES}, all of them finite")
@@ -105,7 +152,7 @@ def _chance(t: float, n: int, share: float) -> float:
 
 @cache
 def _samples(n: int, share: float) -> tuple[FloatArray, FloatArray]:
-    """Mean and standard deviation of many samples of n from the standardised distribution."""
+    """Return mean and standard deviation of many samples of n from the standardised distribution."""
     rng = np.random.default_rng((_SEED, n))
     number = int(np.clip(_DRAWN // n, _FEWEST, _MOST))
     scale = _gumbel_scale(share)
@@ -116,7 +163,7 @@ def _samples(n: int, share: float) -> tuple[FloatArray, FloatArray]:
 
 @cache
 def _log_tail(share: float) -> FloatArray:
-    """ln P(x > `_TABLE`) of the standardised sum: the Gumbel tail averaged over the normal part (Gauss-Hermite)."""
+    """Return ln P(x > `_TABLE`) of the standardised sum: the Gumbel tail averaged over the normal part."""
     from scipy import stats
 
     if share == 0.0:
@@ -129,5 +176,5 @@ def _log_tail(share: float) -> FloatArray:
 
 
 def _gumbel_scale(share: float) -> float:
-    """Of a Gumbel distribution whose variance is `share`: pi^2 scale^2 / 6."""
+    """Return the scale of a Gumbel distribution with the variance `share`: pi^2 scale^2 / 6."""
     return math.sqrt(6.0 * share) / math.pi

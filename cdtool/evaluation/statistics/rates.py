@@ -1,9 +1,10 @@
 """Rare events: false alarms per hour or operation (Poisson), and the share of missed contacts (binomial), exactly.
 
-Conventions: two questions have two answers. An `Interval` holds the true figure with at least 95 %, whatever it is. "At
-most" is one-sided: all 5 % are spent on one bound, so it is lower than the interval's: 0 events in T hours are "at most
-3.0 / T", the interval goes to 3.7 / T; 0 of 30 are "at most 9.5 %", the interval goes to 11.6 %. To take the one-sided
-bound into the interval where the count is 0 would cover less than 95 % (docs/statistics.md).
+Conventions: there are two kinds of bounds. An `Interval` contains the true value with at least 95 %, whatever it is.
+"At most" is one-sided: all 5 % are spent on one bound, so it is lower than that of the interval. 0 events in T hours
+are "at most 3.0 / T", the interval extends to 3.7 / T; 0 of 30 are "at most 9.5 %", the interval extends to 11.6 %.
+With the one-sided bound as the end of the interval if the count is 0, the coverage would be below 95 %
+(docs/statistics.md).
 """
 
 from __future__ import annotations
@@ -18,12 +19,38 @@ _MOST_COUNT = 10**15
 
 
 def poisson_rate(count: int, exposure: float, level: float = 0.95) -> Interval:
-    """Events per unit of exposure with the exact interval of Garwood (1936).
+    """Return a rate of events with its exact interval.
 
-    Low: chi2((1 - level) / 2; 2 x) / (2 T), 0 for x = 0; high: chi2((1 + level) / 2; 2 x + 2) / (2 T); x = `count`
-    events in T = `exposure` (hours, operations), chi2(p; f) the quantile with f degrees of freedom. Exposure 0: value
-    NaN, [0, inf). Assumes that events come independently at a steady rate: several from one cause are too many.
-    Raises UsageError for a negative count or exposure.
+    Parameters
+    ----------
+    count : int
+        Number of events x.
+    exposure : float
+        T, in hours or operations.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    Interval
+        Events per unit of exposure. Exposure 0: value NaN, interval 0 to infinity.
+
+    Raises
+    ------
+    UsageError
+        The count or the exposure is negative.
+
+    Notes
+    -----
+    Garwood, "Fiducial limits for the Poisson distribution", Biometrika 28, 1936. Low: chi2((1 - level) / 2; 2 x) / (2
+    T), 0 for x = 0. High: chi2((1 + level) / 2; 2 x + 2) / (2 T). chi2(p; f) is the quantile with f degrees of freedom.
+    Events are assumed to be independent, at a constant rate: several with one cause are too many.
+
+    Examples
+    --------
+    >>> rate = poisson_rate(2, 100.0)
+    >>> rate.value, round(rate.low, 5), round(rate.high, 5)
+    (0.02, 0.00242, 0.07225)
     """
     check_level(level)
     _check_exposure(count, exposure)
@@ -38,9 +65,35 @@ def poisson_rate(count: int, exposure: float, level: float = 0.95) -> Interval:
 
 
 def poisson_at_most(count: int, exposure: float, level: float = 0.95) -> float:
-    """The rate that is not exceeded, one-sided: chi2(level; 2 x + 2) / (2 T), 3.0 / T for 0 events; see `poisson_rate`.
+    """Return the one-sided upper bound of a rate.
 
-    Infinite for exposure 0. Raises UsageError as `poisson_rate` does.
+    Parameters
+    ----------
+    count : int
+        Number of events x.
+    exposure : float
+        T, in hours or operations.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    float
+        Events per unit of exposure; infinite for exposure 0.
+
+    Raises
+    ------
+    UsageError
+        The count or the exposure is negative.
+
+    Notes
+    -----
+    chi2(level; 2 x + 2) / (2 T), 3.0 / T for 0 events; see `poisson_rate`.
+
+    Examples
+    --------
+    >>> round(poisson_at_most(0, 100.0), 5)
+    0.02996
     """
     check_level(level)
     _check_exposure(count, exposure)
@@ -52,11 +105,39 @@ def poisson_at_most(count: int, exposure: float, level: float = 0.95) -> float:
 
 
 def binomial_share(count: int, n: int, level: float = 0.95) -> Interval:
-    """Share `count` of `n` with the exact interval of Clopper and Pearson (1934).
+    """Return a share with its exact interval.
 
-    Low: beta((1 - level) / 2; x, n - x + 1), 0 for x = 0; high: beta((1 + level) / 2; x + 1, n - x), 1 for x = n.
-    n = 0: value NaN, [0, 1]. Assumes independent contacts with one probability: contacts of one recording that stand
-    or fall together make it too short. Raises UsageError unless 0 <= count <= n.
+    Parameters
+    ----------
+    count : int
+        Number of events x.
+    n : int
+        Number of cases.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    Interval
+        The share. n = 0: value NaN, interval 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        Not 0 <= count <= n.
+
+    Notes
+    -----
+    Clopper and Pearson, "The use of confidence or fiducial limits illustrated in the case of the binomial", Biometrika
+    26, 1934. Low: beta((1 - level) / 2; x, n - x + 1), 0 for x = 0. High: beta((1 + level) / 2; x + 1, n - x), 1 for x
+    = n. Contacts are assumed to be independent, with one probability: if those of one recording are detected or missed
+    together, the interval is too short.
+
+    Examples
+    --------
+    >>> share = binomial_share(0, 30)
+    >>> share.value, share.low, round(share.high, 4)
+    (0.0, 0.0, 0.1157)
     """
     check_level(level)
     _check_share(count, n)
@@ -69,9 +150,35 @@ def binomial_share(count: int, n: int, level: float = 0.95) -> Interval:
 
 
 def binomial_at_most(count: int, n: int, level: float = 0.95) -> float:
-    """The share that is not exceeded, one-sided: beta(level; x + 1, n - x), 9.5 % for 0 of 30; see `binomial_share`.
+    """Return the one-sided upper bound of a share.
 
-    "At least" for what went well is 1 less this of what did not. 1 for n = 0. Raises UsageError as `binomial_share`.
+    Parameters
+    ----------
+    count : int
+        Number of events x.
+    n : int
+        Number of cases.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    float
+        The bound; 1 for n = 0. "At least", for what succeeded, is 1 minus the bound of what did not.
+
+    Raises
+    ------
+    UsageError
+        Not 0 <= count <= n.
+
+    Notes
+    -----
+    beta(level; x + 1, n - x), 9.5 % for 0 of 30; see `binomial_share`.
+
+    Examples
+    --------
+    >>> round(binomial_at_most(0, 30), 4)
+    0.095
     """
     check_level(level)
     _check_share(count, n)
@@ -83,11 +190,37 @@ def binomial_at_most(count: int, n: int, level: float = 0.95) -> float:
 
 
 def binomial_increase_at_most(count_a: int, n_a: int, count_b: int, n_b: int, level: float = 0.95) -> float:
-    """How much larger the share behind a may be than that behind b, one-sided.
+    """Return the one-sided upper bound of the difference of two shares, a minus b.
 
-    Newcombe's (1998) hybrid of the two exact one-sided bounds: d + sqrt((u_a - p_a)^2 + (p_b - l_b)^2) with d = p_a -
-    p_b. 0 of 30 after 0 of n: the bound of 0 of 30 alone, 9.5 %. At most 1; 1 where a set is empty. Raises UsageError
-    as `binomial_share`.
+    Parameters
+    ----------
+    count_a, n_a : int
+        Number of events and of cases of a.
+    count_b, n_b : int
+        Number of events and of cases of b.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    float
+        The bound, at most 1; 1 if a set is empty.
+
+    Raises
+    ------
+    UsageError
+        Not 0 <= count <= n.
+
+    Notes
+    -----
+    Hybrid of the two exact one-sided bounds, after Newcombe, "Interval estimation for the difference between
+    independent proportions", Statistics in Medicine 17, 1998: d + sqrt((u_a - p_a)^2 + (p_b - l_b)^2) with d = p_a -
+    p_b. For 0 of 30 after 0 of n it is the bound of 0 of 30, 9.5 %.
+
+    Examples
+    --------
+    >>> round(binomial_increase_at_most(0, 30, 0, 50), 4)
+    0.095
     """
     if not n_a or not n_b:
         return 1.0
@@ -99,9 +232,39 @@ def binomial_increase_at_most(count_a: int, n_a: int, count_b: int, n_b: int, le
 def poisson_increase_at_most(
     count_a: int, exposure_a: float, count_b: int, exposure_b: float, level: float = 0.95
 ) -> float:
-    """How much larger the rate behind a may be than that behind b, one-sided: as `binomial_increase_at_most`.
+    """Return the one-sided upper bound of the difference of two rates, a minus b.
 
-    None in either: -ln(1 - level) / T_a, 3.0 / T_a. Infinite without exposure. Raises UsageError as `poisson_rate`.
+    Parameters
+    ----------
+    count_a : int
+        Number of events of a.
+    exposure_a : float
+        Hours or operations of a.
+    count_b : int
+        Number of events of b.
+    exposure_b : float
+        Hours or operations of b.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    float
+        Events per unit of exposure; infinite without exposure.
+
+    Raises
+    ------
+    UsageError
+        A count or an exposure is negative.
+
+    Notes
+    -----
+    As `binomial_increase_at_most`; without events -ln(1 - level) / T_a, 3.0 / T_a.
+
+    Examples
+    --------
+    >>> round(poisson_increase_at_most(0, 100.0, 0, 50.0), 5)
+    0.02996
     """
     if not exposure_a or not exposure_b:
         return math.inf
@@ -114,10 +277,38 @@ def poisson_increase_at_most(
 
 
 def poisson_difference_p(count_a: int, exposure_a: float, count_b: int, exposure_b: float) -> float:
-    """Exact two-sided p of two equal rates, such as false alarms per hour of two builds.
+    """Return the exact two-sided p of two equal rates, such as the false alarms per hour of two builds.
 
-    Given their sum, `count_a` is binomial with the share T_a / (T_a + T_b) (Przyborowski and Wilenski 1940). No events
-    at all: 1. An exposure of 0: NaN. Raises UsageError as `poisson_rate` does.
+    Parameters
+    ----------
+    count_a : int
+        Number of events of a.
+    exposure_a : float
+        Hours or operations of a.
+    count_b : int
+        Number of events of b.
+    exposure_b : float
+        Hours or operations of b.
+
+    Returns
+    -------
+    float
+        p; 1 without events, NaN if an exposure is 0.
+
+    Raises
+    ------
+    UsageError
+        A count or an exposure is negative.
+
+    Notes
+    -----
+    Given their sum, `count_a` is binomial with the share T_a / (T_a + T_b): Przyborowski and Wilenski, "Homogeneity of
+    results in testing samples from Poisson series", Biometrika 31, 1940.
+
+    Examples
+    --------
+    >>> poisson_difference_p(0, 10.0, 6, 10.0)
+    0.03125
     """
     _check_exposure(count_a, exposure_a)
     _check_exposure(count_b, exposure_b)
@@ -131,7 +322,24 @@ def poisson_difference_p(count_a: int, exposure_a: float, count_b: int, exposure
 
 
 def check_count(name: str, count: int) -> None:
-    """Raise UsageError unless `count` is a whole number from 0 to 10^15: beyond, float64 does not count."""
+    """Check a number of events.
+
+    Parameters
+    ----------
+    name : str
+        What is counted, for the message.
+    count : int
+        The number.
+
+    Raises
+    ------
+    UsageError
+        It is not a whole number from 0 to 10^15, beyond which float64 does not count.
+
+    Examples
+    --------
+    >>> check_count("number of events", 3)
+    """
     if not isinstance(count, Integral) or not 0 <= count <= _MOST_COUNT:
         raise UsageError(f"{name} is {count}", "give a whole number, 0 or more, at most 10^15")
 

@@ -1,8 +1,8 @@
-"""How many impacts, or how many hours, a test needs before it is made.
+"""How many impacts, or how many hours, a test needs before it is run.
 
 Conventions: `level` is the confidence of the result (two-sided for differences, one-sided for "at most"), `power` the
-chance that a difference of that size is then seen. Standard deviations are guesses from earlier tests. Contacts are
-taken as independent: with several in a recording, count recordings.
+chance that a difference of that size is then shown. Standard deviations are estimates from earlier tests. Contacts are
+treated as independent: with several per recording, count recordings.
 """
 
 from __future__ import annotations
@@ -21,29 +21,112 @@ _MOST = 10_000_000
 def impacts_for_difference(
     difference: float, std_of_differences: float, power: float = 0.8, level: float = 0.95
 ) -> int:
-    """Impacts for which a paired t-test sees a mean `difference` between two detectors.
+    """Return the number of impacts for which a paired t-test shows a mean difference between two detectors.
 
-    Least n with P(|T| > t) >= power, T noncentral t with n - 1 degrees of freedom and noncentrality
-    difference / std * sqrt(n), t its central quantile at (1 + level) / 2. Both in one unit. Skewed differences
-    need some more. Raises UsageError for a difference or std that is not above 0, or where ten million are too few.
+    Parameters
+    ----------
+    difference : float
+        The difference to be shown, above 0.
+    std_of_differences : float
+        Standard deviation of the differences within pairs, in the same unit.
+    power : float
+        Chance that the test shows it.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    int
+        The smallest sufficient number.
+
+    Raises
+    ------
+    UsageError
+        A number is not above 0, a share is outside its range, or more than ten million impacts are needed.
+
+    Notes
+    -----
+    The smallest n with P(|T| > t) >= power, T noncentral t with n - 1 degrees of freedom and noncentrality
+    difference / std * sqrt(n), t its central quantile at (1 + level) / 2. Skewed differences need a few more.
+
+    Examples
+    --------
+    >>> impacts_for_difference(5.0, 8.0)
+    23
     """
     effect = _effect(difference, std_of_differences, power, level)
     return _least(2, lambda n: _power(effect * math.sqrt(n), n - 1, level) >= power)
 
 
 def impacts_for_unpaired(difference: float, std: float, power: float = 0.8, level: float = 0.95) -> int:
-    """Impacts in each of two groups for which a t-test sees a `difference` of their means; `std` within a group.
+    """Return the number of impacts in each of two groups for which a t-test shows a difference of their means.
 
+    Parameters
+    ----------
+    difference : float
+        The difference to be shown, above 0.
+    std : float
+        Standard deviation within a group, in the same unit.
+    power : float
+        Chance that the test shows it.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    int
+        The smallest sufficient number per group.
+
+    Raises
+    ------
+    UsageError
+        A number is not above 0, a share is outside its range, or more than ten million impacts are needed.
+
+    Notes
+    -----
     As `impacts_for_difference`, with 2 n - 2 degrees of freedom and noncentrality difference / std * sqrt(n / 2).
+
+    Examples
+    --------
+    >>> impacts_for_unpaired(5.0, 8.0)
+    42
     """
     effect = _effect(difference, std, power, level)
     return _least(2, lambda n: _power(effect * math.sqrt(0.5 * n), 2 * n - 2, level) >= power)
 
 
 def detectable_difference(n: int, std: float, power: float = 0.8, level: float = 0.95) -> float:
-    """Mean difference that a paired t-test sees with `n` impacts, in the unit of `std` (of the differences).
+    """Return the mean difference that a paired t-test shows with a given number of impacts.
 
-    The inverse of `impacts_for_difference`. Raises UsageError for fewer than 2 impacts.
+    Parameters
+    ----------
+    n : int
+        Number of impacts, at least 2.
+    std : float
+        Standard deviation of the differences within pairs.
+    power : float
+        Chance that the test shows it.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    float
+        The difference, in the unit of `std`.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than 2 impacts, `std` is not above 0, or a share is outside its range.
+
+    Notes
+    -----
+    The inverse of `impacts_for_difference`.
+
+    Examples
+    --------
+    >>> bool(detectable_difference(23, 8.0) <= 5.0 < detectable_difference(22, 8.0))
+    True
     """
     _check_power(power, level)
     _check_above_zero("standard deviation", std)
@@ -62,10 +145,35 @@ def detectable_difference(n: int, std: float, power: float = 0.8, level: float =
 
 
 def impacts_for_missed_share(share: float, allowed_missed: int = 0, level: float = 0.95) -> int:
-    """Impacts of which at most `allowed_missed` may be missed to show that no more than `share` is, one-sided.
+    """Return the number of impacts that show that no more than a share of them is missed.
 
-    Least n whose bound `binomial_at_most(allowed_missed, n)` is at most `share`: ln(1 - level) / ln(1 - share) for 0.
-    Raises UsageError for a share outside 0 to 1, or where ten million are too few.
+    Parameters
+    ----------
+    share : float
+        The share to be excluded, between 0 and 1.
+    allowed_missed : int
+        Number of misses allowed in the test.
+    level : float
+        Confidence level, one-sided.
+
+    Returns
+    -------
+    int
+        The smallest sufficient number.
+
+    Raises
+    ------
+    UsageError
+        The share or the level is outside 0 to 1, or more than ten million impacts are needed.
+
+    Notes
+    -----
+    The smallest n whose `binomial_at_most` is at most `share`: ln(1 - level) / ln(1 - share) without a miss.
+
+    Examples
+    --------
+    >>> impacts_for_missed_share(0.05)
+    59
     """
     check_level(level)
     check_count("allowed_missed", allowed_missed)
@@ -75,10 +183,35 @@ def impacts_for_missed_share(share: float, allowed_missed: int = 0, level: float
 
 
 def exposure_for_rate(rate: float, allowed: int = 0, level: float = 0.95) -> float:
-    """Hours (or operations) with at most `allowed` false alarms that show a rate of no more than `rate`, one-sided.
+    """Return the exposure that shows that a rate of false alarms is not exceeded.
 
-    chi2(level; 2 x + 2) / (2 rate): 3.0 / rate for none. `rate` per hour gives hours. Raises UsageError for a rate that
-    is not above 0.
+    Parameters
+    ----------
+    rate : float
+        The rate to be shown, per hour or operation.
+    allowed : int
+        Number of false alarms allowed in the test.
+    level : float
+        Confidence level, one-sided.
+
+    Returns
+    -------
+    float
+        Hours or operations, as in the rate.
+
+    Raises
+    ------
+    UsageError
+        The rate is not above 0, or the level is outside 0 to 1.
+
+    Notes
+    -----
+    chi2(level; 2 x + 2) / (2 rate): 3.0 / rate without a false alarm.
+
+    Examples
+    --------
+    >>> round(exposure_for_rate(0.001))
+    2996
     """
     if not (rate > 0.0 and math.isfinite(rate)):
         raise UsageError(f"rate is {rate:g}", "give events per hour or operation, above 0")
@@ -86,7 +219,7 @@ def exposure_for_rate(rate: float, allowed: int = 0, level: float = 0.95) -> flo
 
 
 def _effect(difference: float, std: float, power: float, level: float) -> float:
-    """The difference in standard deviations, once all four arguments are sound."""
+    """Return the difference in standard deviations, after checking all four arguments."""
     _check_power(power, level)
     _check_above_zero("difference", difference)
     _check_above_zero("standard deviation", std)
@@ -107,7 +240,7 @@ def _check_above_zero(name: str, value: float) -> None:
 
 
 def _power(noncentrality: float, freedom: int, level: float) -> float:
-    """Power of a two-sided t-test, both tails."""
+    """Return the power of a two-sided t-test, both tails."""
     from scipy import stats
 
     limit = stats.t.ppf(0.5 + 0.5 * level, freedom)
@@ -116,7 +249,7 @@ def _power(noncentrality: float, freedom: int, level: float) -> float:
 
 
 def _least(fewest: int, enough: Callable[[int], bool]) -> int:
-    """The least n from `fewest` on that is enough, by doubling and halving: what is enough stays enough with more."""
+    """Return the smallest n, at least `fewest`, that is enough, by doubling and halving; more is enough too."""
     above = fewest
     while not enough(above):
         if above >= _MOST:

@@ -1,4 +1,4 @@
-"""How far the mean of clustered values can be trusted, as the spread that independent recordings would have."""
+"""How certain the mean of clustered values is, as the spread that independent recordings would have."""
 
 from __future__ import annotations
 
@@ -14,10 +14,20 @@ from cdtool.evaluation.statistics.clusters import clusters_of
 
 @dataclass(frozen=True)
 class Spread:
-    """`n` values in `clusters` recordings or campaigns: their `mean`, and `std` in their unit.
+    """Mean and standard deviation of clustered values.
 
-    `std` is that of `clusters` independent values with the same standard error of the mean: the plain standard
-    deviation where each recording holds one value, that of the recordings' means where each holds as many.
+    Attributes
+    ----------
+    mean : float
+        The mean.
+    std : float
+        The standard deviation of as many independent values as there are clusters, with the same standard error of the
+        mean: the plain standard deviation if each recording has one value, that of the recordings' means if all have
+        equally many.
+    n : int
+        Number of values.
+    clusters : int
+        Number of recordings or campaigns.
     """
 
     mean: float
@@ -32,10 +42,37 @@ class Spread:
 
 
 def spread_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Spread:
-    """Spread of values (n,) whose recording or campaign is given by labels (n,).
+    """Return mean and standard deviation of clustered values.
 
+    Parameters
+    ----------
+    values : array_like of float, shape (n,)
+        Finite values, in any unit.
+    labels : iterable of hashable, length n
+        The recording or test campaign of each.
+
+    Returns
+    -------
+    Spread
+        In the unit of the values; the standard deviation is NaN with fewer than two clusters.
+
+    Raises
+    ------
+    UsageError
+        A value is not finite, or the lengths differ.
+
+    Notes
+    -----
     std^2 = k^2 / (k - 1) sum over the k clusters of (S_c - n_c m)^2 / n^2, with the mean m and the clusters' sums S_c
-    of n_c values. NaN with fewer than two clusters. Raises UsageError for values that are not finite.
+    of n_c values.
+
+    Examples
+    --------
+    Two recordings with two contacts each: the standard deviation is that of their means, 2 and 4.
+
+    >>> spread = spread_of([1.0, 3.0, 3.0, 5.0], ["a", "a", "b", "b"])
+    >>> spread.mean, round(spread.std, 6)
+    (3.0, 1.414214)
     """
     groups = clusters_of(values, labels)
     n, k = len(groups.values), len(groups)

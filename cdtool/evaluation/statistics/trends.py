@@ -1,7 +1,7 @@
-"""Does a figure drift from run to run, or does it step at one of them? Rank tests and robust slopes.
+"""Does a value drift from run to run, or does it step at one of them? Rank tests and robust slopes.
 
-Conventions: values are in order of time, one a run, NaN where a run has none; runs count from 0. The tests take runs as
-independent of one another: a figure that wanders (a temperature over the day, read every few minutes) looks like a
+Conventions: values are in order of time, one per run, NaN where a run has none; runs count from 0. The tests treat runs
+as independent of one another: a value that wanders (a temperature over the day, read every few minutes) looks like a
 drift to them. All p are two-sided.
 """
 
@@ -25,20 +25,20 @@ SIGNIFICANT = 0.01
 
 @dataclass(frozen=True)
 class Trend:
-    """A steady change: `slope` a run in the unit of the values, `intercept` at run 0, and p of Mann and Kendall."""
+    """A steady change: `slope` per run in the unit of the values, `intercept` at run 0, and p of Mann and Kendall."""
 
     slope: Interval
     intercept: float
     p: float
 
     def at(self, run: float) -> float:
-        """The line's value at a run."""
+        """Return the value of the line at a run."""
         return self.intercept + self.slope.value * run
 
 
 @dataclass(frozen=True)
 class Step:
-    """A change at once: the first run after it, the medians `before` and `after`, and p of Pettitt."""
+    """A sudden change: the first run after it, the medians `before` and `after`, and p of Pettitt."""
 
     run: int
     before: float
@@ -53,9 +53,9 @@ class Step:
 
 @dataclass(frozen=True)
 class Course:
-    """What a figure did over `n` runs: "drift" or "step", whichever is shown and fits better, else "steady".
+    """What a value did over `n` runs: "drift" or "step", whichever is shown and fits better, else "steady".
 
-    `trend` and `step` are what was found, shown or not; None below `LEAST_RUNS` runs with a value.
+    `trend` and `step` are the estimates, shown or not; None below `LEAST_RUNS` runs with a value.
     """
 
     kind: Literal["steady", "drift", "step"]
@@ -65,18 +65,41 @@ class Course:
 
     @property
     def change(self) -> float:
-        """By how much the figure rose over the runs, as told by what is shown; 0 where it is steady."""
+        """The rise of the value over the runs, by what is shown; 0 if it is steady."""
         if self.kind == "drift" and self.trend is not None:
             return self.trend.slope.value * (self.n - 1)
         return self.step.height if self.kind == "step" and self.step is not None else 0.0
 
 
 def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) -> Course:
-    """Drift, step or neither of values (n,), where that many `comparisons` are made at once (Bonferroni's correction).
+    """Decide between drift, step and neither.
 
-    Each comparison is two tests, so that something is shown where p of Mann and Kendall's or of Pettitt's test is at
-    most 0.01 / (2 comparisons). A drift gives Pettitt's test a small p too, a step Mann and Kendall's: where both are
-    shown, told is what leaves the smaller sum of absolute deviations, the line or the two medians.
+    Parameters
+    ----------
+    values : array_like of float, shape (n,)
+        One value per run, in order of time; NaN if a run has none.
+    comparisons : int
+        Number of comparisons made together (Bonferroni's correction).
+    level : float
+        Confidence level of the slope's interval.
+
+    Returns
+    -------
+    Course
+        "steady", "drift" or "step", with the estimates.
+
+    Notes
+    -----
+    Each comparison is two tests: a change is shown if p of Mann and Kendall's or of Pettitt's test is at most 0.01 / (2
+    comparisons). A drift makes p of Pettitt's test small too, and a step that of Mann and Kendall's: if both are shown,
+    the model with the smaller sum of absolute deviations is chosen, the line or the two medians.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> runs, noise = np.arange(40), np.tile([0.0, 0.1], 20)
+    >>> course_of(noise).kind, course_of(noise + runs).kind, course_of(noise + 5.0 * (runs >= 20)).kind
+    ('steady', 'drift', 'step')
     """
     given = np.asarray(values, dtype=np.float64)
     runs = np.flatnonzero(np.isfinite(given))
@@ -95,7 +118,25 @@ def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) 
 
 
 def may_change(values: npt.ArrayLike, comparisons: int = 1) -> bool:
-    """Whether `course_of` would show anything: its tests without slope and step, which take n^2 steps."""
+    """Return whether `course_of` would show a change.
+
+    Parameters
+    ----------
+    values : array_like of float, shape (n,)
+        One value per run, in order of time; NaN if a run has none.
+    comparisons : int
+        Number of comparisons made together (Bonferroni's correction).
+
+    Returns
+    -------
+    bool
+        Its two tests, without the estimates of slope and step, which need n^2 operations.
+
+    Examples
+    --------
+    >>> may_change([float(run) for run in range(20)]), may_change([0.0, 1.0] * 10)
+    (True, False)
+    """
     given = np.asarray(values, dtype=np.float64)
     runs = np.flatnonzero(np.isfinite(given))
     if len(runs) < LEAST_RUNS:
@@ -106,10 +147,33 @@ def may_change(values: npt.ArrayLike, comparisons: int = 1) -> bool:
 
 
 def trend_of(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95) -> Trend:
-    """Theil and Sen's slope (median of all pairs' slopes) with Sen's interval, and p of Mann and Kendall's test.
+    """Return Theil and Sen's slope with its interval, and p of Mann and Kendall's test.
 
-    The test is Kendall's rank correlation with the order of the runs: no slope of any shape is assumed. Equal values
-    all along: slope 0, p 1.
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Finite values, in order of time.
+    runs : ndarray of int, shape (n,)
+        The number of each run.
+    level : float
+        Confidence level.
+
+    Returns
+    -------
+    Trend
+        The slope per run; 0 with p = 1 if all values are equal.
+
+    Notes
+    -----
+    The slope is the median of the slopes of all pairs, with Sen's interval. The test is Kendall's rank correlation with
+    the order of the runs: no shape of the trend is assumed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> trend = trend_of(2.0 * np.arange(10), np.arange(10))
+    >>> trend.slope.value, trend.intercept
+    (2.0, 0.0)
     """
     if np.all(values == values[0]):
         return Trend(Interval(0.0, 0.0, 0.0, level), float(values[0]), 1.0)
@@ -121,7 +185,26 @@ def trend_of(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95
 
 
 def rank_p(values: FloatArray, runs: npt.NDArray[np.int_]) -> float:
-    """Two-sided p of Kendall's rank correlation with the order of the runs; 1 for equal values."""
+    """Return the two-sided p of Kendall's rank correlation with the order of the runs.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Finite values, in order of time.
+    runs : ndarray of int, shape (n,)
+        The number of each run.
+
+    Returns
+    -------
+    float
+        p; 1 for equal values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rank_p(np.zeros(5), np.arange(5))
+    1.0
+    """
     from scipy import stats
 
     p = float(stats.kendalltau(runs, values).pvalue)
@@ -129,7 +212,27 @@ def rank_p(values: FloatArray, runs: npt.NDArray[np.int_]) -> float:
 
 
 def step_of(values: FloatArray, runs: npt.NDArray[np.int_]) -> Step:
-    """The split into two medians that leaves the smallest sum of absolute deviations, with Pettitt's p."""
+    """Return the split into two medians with the smallest sum of absolute deviations, with Pettitt's p.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Finite values, in order of time.
+    runs : ndarray of int, shape (n,)
+        The number of each run.
+
+    Returns
+    -------
+    Step
+        The first run after the step, and the medians before and after.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> step = step_of(np.repeat([1.0, 4.0], 6), np.arange(12))
+    >>> step.run, step.height
+    (6, 3.0)
+    """
     sums = [_deviations(values[:first]) + _deviations(values[first:]) for first in range(1, len(values))]
     first = int(np.argmin(sums)) + 1
     before, after = float(np.median(values[:first])), float(np.median(values[first:]))
@@ -137,10 +240,31 @@ def step_of(values: FloatArray, runs: npt.NDArray[np.int_]) -> Step:
 
 
 def pettitt_p(values: FloatArray) -> float:
-    """Pettitt's test (1979) of one step at an unknown run: K = max |U_t|, U_t = 2 (first t ranks) - t (n + 1).
+    """Return p of Pettitt's test of one step at an unknown run.
 
-    p = min(1, 2 exp(-6 K^2 / (n^3 + n^2))), on the safe side for few runs. The t of K is not where the step is: chance
-    draws it towards the middle of the runs.
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Finite values, in order of time.
+
+    Returns
+    -------
+    float
+        p, approximate and conservative for few runs.
+
+    Notes
+    -----
+    Pettitt, "A non-parametric approach to the change-point problem", Applied Statistics 28, 1979:
+
+        K = max |U_t|,   U_t = 2 (sum of the first t ranks) - t (n + 1),   p = min(1, 2 exp(-6 K^2 / (n^3 + n^2)))
+
+    The t of K is not the location of the step: chance draws it towards the middle of the runs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(pettitt_p(np.repeat([1.0, 4.0], 6)), 4)
+    0.0314
     """
     from scipy import stats
 

@@ -12,17 +12,67 @@ IndexArray = npt.NDArray[np.intp]
 
 
 def decimate(time: FloatArray, values: FloatArray, pixels: int) -> tuple[FloatArray, FloatArray]:
-    """At most 4 * pixels samples of `values` (n,) that draw alike; short series are returned as they are.
+    """Decimate a curve to the pixels of a plot, without losing a spike.
 
-    Kept are the first and the last sample, and of each column of pixels its least and largest value and one NaN where
-    there is one: a gap stays a gap. `time` increases strictly. Raises UsageError for fewer than 2 pixels.
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    values : ndarray of float, shape (n,)
+        The curve, in any unit; NaN is a gap.
+    pixels : int
+        Width of the plot.
+
+    Returns
+    -------
+    time, values : ndarray of float, shape (m,)
+        At most 4 * pixels samples that look the same: the first and the last, and of each column of pixels the smallest
+        and largest value and one NaN if there is one. Short series are returned unchanged.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than 2 pixels.
+
+    Examples
+    --------
+    >>> time, values = np.arange(100_000.0), np.zeros(100_000)
+    >>> values[54_321] = 9.0
+    >>> at, drawn = decimate(time, values, pixels=100)
+    >>> len(at) <= 400, at[drawn == 9.0].tolist()
+    (True, [54321.0])
     """
     kept = kept_samples(time, values, pixels)
     return time[kept], values[kept]
 
 
 def kept_samples(time: FloatArray, values: FloatArray, pixels: int) -> IndexArray:
-    """The indices that `decimate` keeps, in order of time."""
+    """Return which samples of a curve `decimate` keeps.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Strictly increasing times [s].
+    values : ndarray of float, shape (n,)
+        The curve; NaN is a gap.
+    pixels : int
+        Width of the plot.
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+        Their indices, in order of time.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than 2 pixels.
+
+    Examples
+    --------
+    >>> kept_samples(np.arange(3.0), np.zeros(3), pixels=100).tolist()
+    [0, 1, 2]
+    """
     if pixels < 2:
         raise UsageError(f"pixels is {pixels}", "a plot is at least 2 pixels wide")
     if len(time) <= 4 * pixels:
@@ -40,7 +90,7 @@ def kept_samples(time: FloatArray, values: FloatArray, pixels: int) -> IndexArra
 
 
 def _first_of_each(mark: BoolArray, column: IndexArray) -> IndexArray:
-    """The first marked sample of each column of pixels that has one."""
+    """Return the first marked sample of each column of pixels that has one."""
     at = np.flatnonzero(mark)
     first = np.ones(len(at), dtype=bool)
     first[1:] = column[at[1:]] != column[at[:-1]]

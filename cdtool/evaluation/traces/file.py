@@ -37,12 +37,46 @@ _LONGEST, _LARGEST = 1e9, 1e300
 
 
 def traces_path(results: Path) -> Path:
-    """Where the traces of a results file are kept."""
+    """Return where the traces of a results file are stored.
+
+    Parameters
+    ----------
+    results : Path
+        The results file.
+
+    Returns
+    -------
+    Path
+        The file of the traces, in the same folder.
+
+    Examples
+    --------
+    >>> traces_path(Path("results.json")).name
+    'results.traces.json.gz'
+    """
     return results.with_name(f"{results.stem}.traces.json.gz")
 
 
 def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
-    """All traces as gzipped JSON; the same bytes for the same traces. `results`: the text of the file beside them."""
+    """Return traces as gzipped JSON.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+        The traces of a benchmark.
+    results : str
+        The text of the results file that they belong to.
+
+    Returns
+    -------
+    bytes
+        The content of the file; equal for equal traces.
+
+    Examples
+    --------
+    >>> encode_traces([]) == encode_traces([])
+    True
+    """
     values = {
         "schema_version": SCHEMA_VERSION,
         "results_sha256": _digest(results),
@@ -56,7 +90,31 @@ def _digest(text: str) -> str:
 
 
 def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
-    """Return the traces of a file; raises RecordingError for another file, or one of other `results` (text)."""
+    """Read a file of traces.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    results : str, optional
+        The text of the results file that it must belong to.
+
+    Returns
+    -------
+    tuple of Trace
+        The traces.
+
+    Raises
+    ------
+    RecordingError
+        The file is not a traces file, is damaged, is of an unknown version, or belongs to other results.
+
+    Examples
+    --------
+    >>> _ = Path("results.traces.json.gz").write_bytes(encode_traces([]))
+    >>> read_traces(Path("results.traces.json.gz"))
+    ()
+    """
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = unpack_json(content)
@@ -76,7 +134,7 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
 
 
 def _checked(trace: Trace) -> Trace:
-    """The trace; raises ValueError for what no figure can be drawn of."""
+    """Return the trace; raises ValueError for one that cannot be drawn."""
     _check_curves(trace.start, trace.force_time, trace.force)
     known = [trace.start, trace.end, *trace.view, *(time for item in trace.contacts for time in (item.start, item.end))]
     if (not trace.contacts and trace.contact != -1) or trace.contact not in range(-1, len(trace.contacts)):
@@ -100,12 +158,43 @@ def _check_curves(start: float, time: FloatArray, *curves: npt.NDArray[Any]) -> 
 
 
 def as_read(traces: Sequence[Trace]) -> tuple[Trace, ...]:
-    """The traces as their file gives them back: what is drawn of them is the same before and after."""
+    """Return traces as their file returns them, rounded: figures are equal before and after storing.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+        The traces of a benchmark.
+
+    Returns
+    -------
+    tuple of Trace
+        The same, with values rounded as in the file.
+
+    Examples
+    --------
+    >>> as_read([])
+    ()
+    """
     return tuple(_trace(trace_values(trace)) for trace in traces)
 
 
 def trace_values(trace: Trace) -> dict[str, Any]:
-    """One trace as JSON values."""
+    """Return one trace as JSON values.
+
+    Parameters
+    ----------
+    trace : Trace
+        The trace.
+
+    Returns
+    -------
+    dict
+        Its values; curves are coded in whole steps of their range.
+
+    Examples
+    --------
+    `encode_traces` writes them.
+    """
     low, step = _scale([trace.force])
     return {
         "recording": trace.recording,
@@ -211,5 +300,5 @@ def _decoded(values: dict[str, Any]) -> FloatArray:
 
 
 def _numbers(values: dict[str, Any]) -> dict[str, Any]:
-    """The inverse of `finite`: every null of a contact or an outcome is a number that is not known."""
+    """Return the inverse of `finite`: every null of a contact or an outcome is an unknown number."""
     return {key: math.nan if item is None else item for key, item in values.items()}

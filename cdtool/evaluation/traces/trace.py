@@ -138,7 +138,34 @@ def make_trace(
     why: Sequence[Sequence[str]] = (),
     chosen: str = "",
 ) -> Trace:
-    """Decimate an operation's detections; the contact shown is the first that most detectors noticed."""
+    """Return the decimated curves of an operation, for figures.
+
+    Parameters
+    ----------
+    group : str
+        The group of impacts.
+    operation : Operation
+        The operation.
+    contacts : sequence of Contact
+        Its contacts.
+    detections : sequence of Detection
+        One per detector.
+    matchings : sequence of Matching
+        Their alarms and contacts, in the order of `detections`.
+    why : sequence of sequence of str
+        Explanations of each detection's alarms.
+    chosen : str
+        Why the trace is stored.
+
+    Returns
+    -------
+    Trace
+        The contact shown is the first that most detectors noticed.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the traces.
+    """
     recording = operation.recording
     contact = _most_noticed(contacts, matchings)
     found = [matching.matches[contact] if contact >= 0 else None for matching in matchings]

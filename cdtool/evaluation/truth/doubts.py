@@ -29,7 +29,27 @@ _SIGMAS, _OF_NORMAL = 3.0, 1.4826
 
 
 def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Finding]:
-    """Warnings about the load cell of a recording as the truth of its contacts; none without a load cell."""
+    """Return warnings about the load cell of a recording as the ground truth of its contacts.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    contacts : sequence of Contact
+        Its contacts.
+    rule : OnsetRule
+        The rule by which they were found.
+
+    Returns
+    -------
+    list of Finding
+        A drift, an offset, a force that does not return to rest, a late start, or a force that is a copy of a torque.
+        Empty without a load cell.
+
+    Examples
+    --------
+    `cdtool.info` reports them.
+    """
     if "force" not in recording:
         return []
     found = [_drifted(contact) for contact in contacts if _has_drifted(contact, rule)]

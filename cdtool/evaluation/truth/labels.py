@@ -32,12 +32,12 @@ class Labels:
     lines: Mapping[str, tuple[str, ...]]
 
     def name_of(self, recording: str) -> str | None:
-        """What the file calls a recording: its path, or its file's name; None where the file does not name it."""
+        """Return the name of a recording in the file: its path, or only the file's name; None if it is not there."""
         short = PurePosixPath(recording).name
         return recording if recording in self.contacts else short if short in self.contacts else None
 
     def check(self, recording: str, start: float, end: float) -> None:
-        """Raise RecordingError, naming the row, where a contact begins outside a recording of `start` to `end` [s]."""
+        """Raise RecordingError, naming the row, if a contact begins outside a recording of `start` to `end` [s]."""
         name = self.name_of(recording)
         if name is None:
             return
@@ -51,7 +51,29 @@ class Labels:
 
 
 def read_labels(path: Path) -> Labels:
-    """Read and check a label file; raises ConfigurationError with the line."""
+    r"""Read and check a label file.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV with the columns recording, start_s, end_s and, optionally, kind and uncertainty_s.
+
+    Returns
+    -------
+    Labels
+        The contacts of each recording, in order of time.
+
+    Raises
+    ------
+    ConfigurationError
+        The file is wrong; the message names the line.
+
+    Examples
+    --------
+    >>> _ = Path("labels.csv").write_text("recording,start_s,end_s\nstiff/01.mcap,5.94,6.2\n")
+    >>> read_labels(Path("labels.csv")).contacts["stiff/01.mcap"][0].start
+    5.94
+    """
     first: dict[str, str] = {}
     found: dict[str, list[tuple[Contact, str]]] = {}
     for row in read_named_rows(path, _REQUIRED, _OPTIONAL, "label"):

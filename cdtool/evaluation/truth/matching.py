@@ -55,7 +55,27 @@ class Matching:
 
 
 def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:
-    """Each contact in order of time with the beginning and the end [s] of its window; no two windows overlap."""
+    """Return for each contact the window in which an alarm detects it.
+
+    Parameters
+    ----------
+    contacts : sequence of Contact
+        The contacts of a log.
+    window : float
+        How long after its onset a contact may be detected [s].
+
+    Returns
+    -------
+    list of (Contact, float, float)
+        Each contact in order of time, with the beginning and the end of its window [s]. The beginning is earlier than
+        the onset by its uncertainty; no two windows overlap.
+
+    Examples
+    --------
+    >>> contacts = [Contact(start=1.0, end=1.2, uncertainty=0.1), Contact(start=1.5, end=1.6, uncertainty=0.1)]
+    >>> [(begin, end) for _, begin, end in windows(contacts, 1.0)]
+    [(0.9, 1.4), (1.4, 2.5)]
+    """
     ordered = sorted(contacts, key=lambda item: item.start)
     opens = [-np.inf if contact.in_progress else contact.start - contact.uncertainty for contact in ordered]
     for i in range(1, len(ordered)):
@@ -75,12 +95,45 @@ def match(
     crossings: Sequence[Alarm] = (),
     rearm: float = REARM,
 ) -> Matching:
-    """Match in order of time: each contact takes the first crossing in its window that no earlier contact took.
+    """Match alarms with contacts in order of time: each contact takes the first crossing in its window.
 
-    An alarm outside every window, and not while the load cell still feels a contact, is false. One before a contact is
-    counted as false and does not hide the contact's own detection: any new crossing detects, armed again or not. Alarms
-    of several joints within `rearm` [s] are one false alarm. Where a log is cut into operations, `of_log` are all its
-    contacts and `crossings` those of all its operations: an alarm belongs to its contact whatever the cut lies between.
+    Parameters
+    ----------
+    verdict : Verdict
+        Alarms and crossings of the operation.
+    contacts : sequence of Contact
+        Its contacts.
+    statistic : Signal
+        Its statistic: a contact in whose window it is nowhere valid is not assessable.
+    window : float
+        How long after its onset a contact may be detected [s].
+    of_log : sequence of Contact
+        All contacts of the log, if it is cut into operations.
+    crossings : sequence of Alarm
+        Those of all operations of the log: an alarm belongs to its contact wherever the log is cut.
+    rearm : float
+        Alarms of several joints within this time are one false alarm [s].
+
+    Returns
+    -------
+    Matching
+        Every contact with its outcome and latency [s], and the false alarms.
+
+    Notes
+    -----
+    A crossing is taken by one contact only. An alarm outside every window, and not while the load cell still shows a
+    contact, is false. One before a contact counts as false and does not hide the detection of the contact: any new
+    crossing detects, whether the alarm is armed again or not.
+
+    Examples
+    --------
+    >>> alarm = Alarm(time=1.05, joint=0, side="above", statistic=450.0, limit=400.0)
+    >>> time = np.arange(3000) * 1e-3
+    >>> statistic = Signal(time, np.zeros((3000, 1)), np.zeros((3000, 1), dtype=np.uint8), "N")
+    >>> verdict = Verdict("alarm", (alarm,), crossings=(alarm,))
+    >>> matching = match(verdict, [Contact(start=1.0, end=1.2, uncertainty=0.001)], statistic)
+    >>> matching.matches[0].outcome, round(matching.matches[0].latency, 6), matching.false_alarms
+    ('detected', 0.05, ())
     """
     taken: set[Alarm] = set()
     matches = []
@@ -114,12 +167,12 @@ def match(
 
 
 def unknown_onset(contact: Contact) -> str:
-    """Why nothing can be said of the latency of a contact that began where load-cell samples are missing."""
+    """Return why a contact that began where load-cell samples are missing has no latency."""
     return f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where it begins: its onset is not known"
 
 
 def one_an_event(times: Sequence[float], rearm: float) -> list[int]:
-    """Which alarms count where several joints raise one: those later than `rearm` [s] after the last that counts."""
+    """Return which alarms count if several joints raise one: those later than `rearm` [s] after the last one."""
     counted: list[int] = []
     for i in sorted(range(len(times)), key=lambda i: times[i]):
         if not counted or times[i] - times[counted[-1]] > rearm:
@@ -128,7 +181,26 @@ def one_an_event(times: Sequence[float], rearm: float) -> list[int]:
 
 
 def belongs(time: float, spans: Sequence[tuple[Contact, float, float]]) -> bool:
-    """Whether an alarm at that time [s] lies in a contact's window, or while the contact still presses."""
+    """Return whether an alarm belongs to a contact.
+
+    Parameters
+    ----------
+    time : float
+        Time of the alarm [s].
+    spans : sequence of (Contact, float, float)
+        What `windows` returned.
+
+    Returns
+    -------
+    bool
+        True in a contact's window, or while the contact is still in progress.
+
+    Examples
+    --------
+    >>> spans = windows([Contact(start=1.0, end=3.0, uncertainty=0.0)], 1.0)
+    >>> belongs(2.5, spans), belongs(3.5, spans)
+    (True, False)
+    """
     return any(opens <= time <= max(closes, contact.end) for contact, opens, closes in spans)
 
 

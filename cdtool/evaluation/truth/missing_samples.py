@@ -1,9 +1,9 @@
-"""Which samples of a load cell are missing: what is a hole in the force, and what only its clock's rhythm.
+"""Missing samples of a load cell: what is a hole in the force, and what only the rhythm of its clock.
 
-Conventions: times in s. A step between two samples is a hole where it is longer than 5 ms and than the clock makes it
-with one sample lost: 2.5 periods, of a clock with jitter one period and 1.1 times the step that one in 20 exceeds. 5 ms
-is the interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12445): what lies closer together
-hides nothing from it.
+Conventions: times in s. A step between two samples is a hole if it is longer than 5 ms and than the clock makes it with
+one sample lost: 2.5 periods, or with jitter one period and 1.1 times the step that one in 20 exceeds. 5 ms is the
+interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12445): samples that are closer together
+hide nothing from it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,23 @@ _BATCH = 5.0
 
 
 def longest_step(time: FloatArray) -> float:
-    """How far apart samples of a load cell at these times (n,) [s] may be without a hole between them [s]."""
+    """Return the longest step between samples of a load cell that is not a hole.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Times of the samples [s].
+
+    Returns
+    -------
+    float
+        The step [s].
+
+    Examples
+    --------
+    >>> longest_step(np.arange(1000) * 1e-3), round(longest_step(np.arange(100) * 1e-2), 6)
+    (0.005, 0.025)
+    """
     if len(time) < 2:
         return CLOSE_ENOUGH
     steps = np.diff(time)
@@ -29,7 +45,7 @@ def longest_step(time: FloatArray) -> float:
 
 
 def batch_length(time: FloatArray) -> float:
-    """How far a stamp may be behind its sample, where samples come in batches that are stamped together [s]; else 0.
+    """Return how far a stamp may be behind its sample if samples are stamped in batches [s]; else 0.
 
     In batches the step that one in 20 exceeds is many times the usual one.
     """
@@ -41,11 +57,11 @@ def batch_length(time: FloatArray) -> float:
 
 
 def time_to_shoulder(time: FloatArray, force: FloatArray, period: float) -> float:
-    """How long after its first sample a contact's force stops rising as it did at first [s].
+    """Return how long after its first sample a contact's force stops rising as it did at first [s].
 
-    `force` (n,) [N] is that over the rest level, positive where it presses, from the onset on. It stops where over
-    5 ms, or three periods, it rises by less than a quarter of its steepest rise so far. A touch of the same two bodies
-    takes about twice as long at least, however fast they meet: stiffness and mass are the same.
+    `force` (n,) [N] is relative to the rest level, positive if it presses, from the onset. It stops where over 5 ms, or
+    three periods, it rises by less than a quarter of its steepest rise so far. A touch of the same two bodies takes at
+    least about twice as long, however fast they meet: stiffness and mass are the same.
     """
     span = max(CLOSE_ENOUGH, 3.0 * period)
     after = np.searchsorted(time, time + span)

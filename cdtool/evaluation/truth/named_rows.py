@@ -20,18 +20,18 @@ from cdtool.plain_text import counted, first_of
 
 @dataclass(frozen=True)
 class NamedRow:
-    """One row: the recording that it is about, its cells by column, and file and line for messages."""
+    """One row: its recording, its cells by column, and file and line for messages."""
 
     where: str
     recording: str
     cells: Mapping[str, str]
 
     def text(self, name: str) -> str:
-        """A cell without the blanks around it; empty where the column is absent."""
+        """Return a cell without the blanks around it; empty if the column is missing."""
         return self.cells.get(name, "").strip()
 
     def seconds(self, name: str) -> float | None:
-        """A finite number, None where the cell is empty; raises ConfigurationError."""
+        """Return a finite number, None if the cell is empty; raises ConfigurationError."""
         text = self.text(name)
         if not text:
             return None

@@ -1,7 +1,7 @@
-"""Ground truth: which contacts does a recording show? By the load cell, by labels or by events.
+"""Ground truth: the contacts of a recording, by the load cell, by labels or by events.
 
-Conventions: a contact begins where the force, followed back from the first sample of a stay above the upper level,
-left the lower level over the cell's rest level. State the rule in every report: in soft impacts the cell feels the
+Conventions: a contact begins where the force, followed back from the first sample of a stay above the upper level, left
+the lower level over the cell's rest level. State the rule in every report: in soft impacts the cell responds to the
 contact tens of milliseconds after touch.
 """
 
@@ -16,9 +16,37 @@ from cdtool.recording import Contact, Recording
 
 
 def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
-    """Contacts by the load cell, else by the label channel, else by events; raises RecordingError without any.
+    """Return the contacts of a recording, by the load cell, else by the label channel, else by events.
 
-    A load cell's level from the noise is at least `steps` of the steps in which it reads.
+    Parameters
+    ----------
+    recording : Recording
+        A recording with one of the channels force [N], label or event.
+    rule : OnsetRule
+        When a contact begins on the load cell.
+    steps : float
+        A level derived from the noise of the load cell is at least this many steps of its reading.
+
+    Returns
+    -------
+    list of Contact
+        In order of time.
+
+    Raises
+    ------
+    RecordingError
+        The recording has none of the channels.
+
+    Examples
+    --------
+    A load cell reads 100 N from 1.0 s to 1.5 s.
+
+    >>> from cdtool.recording import Series
+    >>> time = np.arange(3000) * 1e-3
+    >>> force = Series(time, np.where((time >= 1.0) & (time <= 1.5), 100.0, 0.0), "N")
+    >>> contacts = find_contacts(Recording("run", "", ("axis",), {"force": force}), OnsetRule(above=20.0, back_to=8.0))
+    >>> len(contacts), round(contacts[0].start, 2), contacts[0].peak_force
+    (1, 1.0, 100.0)
     """
     if "force" in recording:
         return load_cell_contacts(recording["force"], rule, steps)

@@ -15,12 +15,29 @@ SAMPLE = 1e-3
 
 @dataclass(frozen=True)
 class OnsetRule:
-    """Upper level `above` and lower level `back_to` [N], over the rest level; None: from the noise (`sigmas`, half).
+    """When a contact begins on the load cell.
 
-    The force stays above the upper level, on one side, for `hold` [s], where each sample stands for one period of the
-    load cell: of a cell slower than that one sample is enough. Contacts closer than `separation` [s] are one (a
-    rebound). Raises UsageError for a setting outside its range.
+    Parameters
+    ----------
+    above : float, optional
+        Upper level over the rest level [N]; by default `sigmas` standard deviations of the noise.
+    back_to : float, optional
+        Lower level [N], to which the onset is followed back; by default half of the upper level.
+    hold : float
+        How long the force stays above the upper level, on one side [s]. Each sample stands for one period of the load
+        cell: if that is longer, one sample is enough.
+    sigmas : float
+        Upper level in standard deviations of the noise.
+    separation : float
+        Contacts closer than this are one contact with a rebound [s].
 
+    Raises
+    ------
+    UsageError
+        A setting is outside its range.
+
+    Examples
+    --------
     >>> OnsetRule(above=20.0, back_to=8.0).described
     'load cell above 20 N for 3 ms, followed back to 8 N'
     """
@@ -49,6 +66,6 @@ class OnsetRule:
         return f"load cell above {above} for {1e3 * self.hold:g} ms, followed back to {back}"
 
     def levels(self, noise: float, least: float = 0.0) -> tuple[float, float]:
-        """The upper and the lower level [N] of a cell with that noise; one from the noise is at least `least` [N]."""
+        """Return upper and lower level [N] for a noise [N]; an upper level from the noise is at least `least` [N]."""
         above = self.above if self.above is not None else max(self.sigmas * noise, least, 1e-9)
         return above, min(self.back_to if self.back_to is not None else 0.5 * above, above)

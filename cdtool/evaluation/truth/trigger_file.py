@@ -26,16 +26,16 @@ class Triggered:
 
 @dataclass(frozen=True)
 class TriggerFile:
-    """The rows of a trigger file by detector and recording, as the file names them."""
+    """The rows of a trigger file by detector and recording, with the names of the file."""
 
     path: Path
     rows: Mapping[str, Mapping[str, Triggered]]
     digest: str
 
     def assigned(self, recordings: Collection[str]) -> tuple[dict[str, dict[str, Triggered]], list[str]]:
-        """What each detector said of each of the recordings, and the names that mean none of them.
+        """Return each detector's rows for each of the recordings, and the names that belong to none of them.
 
-        Raises ConfigurationError where a file's name alone fits several.
+        Raises ConfigurationError if a file name fits several.
         """
         meant = by_recording(self.path, {name for by_name in self.rows.values() for name in by_name}, recordings)
         said: dict[str, dict[str, Triggered]] = {}
@@ -51,7 +51,29 @@ class TriggerFile:
 
 
 def read_triggers(path: Path) -> TriggerFile:
-    """Read and check a trigger file; raises ConfigurationError with the line."""
+    """Read and check a trigger file.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV with the columns recording, time_s and, optionally, detector and blind_until_s.
+
+    Returns
+    -------
+    TriggerFile
+        The rows by detector and recording.
+
+    Raises
+    ------
+    ConfigurationError
+        The file is wrong; the message names the line.
+
+    Examples
+    --------
+    >>> triggers = read_triggers(Path("docs/examples/triggers.csv"))
+    >>> triggers.rows["plc"]["stiff/01.mcap"].alarms
+    [6.001]
+    """
     rows: dict[str, dict[str, Triggered]] = {}
     for row in read_named_rows(path, ("recording", "time_s"), ("detector", "blind_until_s"), "trigger"):
         by_name = rows.setdefault(row.text("detector") or path.stem, {})

@@ -1,4 +1,4 @@
-"""What to do with a signature, from what its runs and a season since say of it."""
+"""What to do with a signature, from the coverage of its runs and the drift of a season."""
 
 from __future__ import annotations
 
@@ -9,12 +9,31 @@ from cdtool.evaluation.upkeep.words import place_of
 
 
 def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
-    """What to do, in a line, the most urgent first.
+    """Return what to do with a signature, the most urgent step first.
 
-    Resistance that grows at a place comes before everything: relearned, an obstruction would be normal. Then drift of
-    the whole stroke; too few runs are reported where neither is shown, since a relearned signature is checked again.
-    Alarms without a drift are left to `cdtool explain`. A season that is too short to show a drift is no reason to
-    keep a signature.
+    Parameters
+    ----------
+    coverage : Coverage or None
+        What the runs show that it was learned from.
+    drift : DriftAudit or None
+        What the runs since then show.
+
+    Returns
+    -------
+    str
+        One line.
+
+    Notes
+    -----
+    Resistance that grows at one location comes before everything: relearned, an obstruction would be normal. Then a
+    drift of the whole stroke; too few runs are reported only if neither is shown, because a relearned signature is
+    checked again. Alarms without a drift are left to `cdtool explain`. A season that is too short to show a drift is
+    not a reason to keep a signature.
+
+    Examples
+    --------
+    >>> advice(None, None)
+    'nothing was assessable'
     """
     if coverage is None and drift is None:
         return "nothing was assessable"

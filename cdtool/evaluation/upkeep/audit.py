@@ -1,4 +1,4 @@
-"""What an audit of a season found: runs, joints, and the changes that are shown."""
+"""The result of an audit of a season: runs, joints, and the changes that are shown."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class Shown:
 
 @dataclass(frozen=True)
 class JointDrift:
-    """One joint over the season: runs, deviation (runs, places), and changes of the whole stroke and of a location.
+    """One joint over the season: runs, deviation (runs, locations), and changes of the whole stroke and of a location.
 
-    `course` is that of the runs' `overall`; `overall` and `local` are None where no change is shown. `deviation` is in
+    `course` is that of the runs' `overall`; `overall` and `local` are None if no change is shown. `deviation` is in
     spreads, at the `places` along `axis`, in its `unit`.
     """
 
@@ -67,17 +67,17 @@ class JointDrift:
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """What is shown, the place first: it is to be looked at before anything is learned."""
+        """The changes shown, a location first: it must be inspected before anything is learned."""
         return tuple(item for item in (self.local, self.overall) if item is not None)
 
     def at_place(self, place: float) -> FloatArray:
-        """The runs' deviation (runs,) at the nearest of the places."""
+        """Return the runs' deviation (runs,) at the nearest location."""
         column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
         return column
 
     @property
     def runs_left(self) -> float:
-        """In how many more runs a typical run alarms if it goes on like this; infinite where nothing comes nearer."""
+        """The number of runs until a typical run alarms if the changes continue; infinite if it never does."""
         return min((item.runs_left.value for item in self.shown), default=math.inf)
 
 
@@ -99,7 +99,7 @@ class DriftAudit:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The runs that were judged."""
+        """The runs that were assessed."""
         return tuple(item.name for item in self.joints[0].runs)
 
     @property

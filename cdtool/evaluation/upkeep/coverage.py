@@ -1,4 +1,4 @@
-"""Were there enough runs? Each is judged by the signature of all the others, and predicts what the next will do."""
+"""Are there enough runs? Each is assessed with the signature of all the others; together they predict the next one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cdtool.thresholds.signature_curve import COVERAGE
 
 @dataclass(frozen=True)
 class LeftOut:
-    """One run judged by the signature of all the others: the factor below which it alarms, and whether it does."""
+    """One run, assessed with the signature of all the others: the factor below which it alarms, and whether it does."""
 
     name: str
     critical_factor: float
@@ -35,12 +35,12 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the runs of one class of motion say of the signature that is learned from them.
+    """What the runs of one class of motion show about the signature that is learned from them.
 
-    `chance`: predicted, that the next impact-free operation alarms; `target` the one that is wanted. `runs_needed`:
-    with how many runs in all it would be kept, None where no number would do; `factor_needed`: the safety factor that
-    keeps it with these runs. The last three are NaN (None) if fewer than 3 runs were assessable. `gaps`: parts of
-    the stroke without a limit.
+    `chance`: predicted, that the next impact-free operation alarms; `target`: the required one. `runs_needed`: the
+    total number of runs with which it would be met, None if no number would do; `factor_needed`: the safety factor that
+    meets it with these runs. The last three are NaN (None) if fewer than 3 runs were assessable. `gaps`: parts of the
+    stroke without a limit.
     """
 
     motion: MotionClass
@@ -55,17 +55,17 @@ class Coverage:
 
     @property
     def alarms(self) -> int:
-        """How many runs alarm with the signature of all the others."""
+        """The number of runs that alarm with the signature of all the others."""
         return sum(run.alarm for run in self.runs)
 
     @property
     def enough(self) -> bool:
-        """Whether the target is kept with the runs that there are."""
+        """Whether the target is met with the present runs."""
         return self.chance <= self.target
 
     @property
     def more_runs(self) -> int | None:
-        """How many more runs keep the target: 0 where these do, None where no number would."""
+        """The number of further runs that meet the target: 0 if these do, None if no number would."""
         if self.enough:
             return 0
         return None if self.runs_needed is None else max(self.runs_needed - len(self.runs), 1)
@@ -89,17 +89,43 @@ class Coverage:
 def check_coverage(
     pairs: Sequence[tuple[Operation, Signal]], rule: Signature, activation: Activation, target: float = 1e-3
 ) -> Coverage:
-    """Leave one run out: judge each impact-free run of a class of motion by the signature of all the others.
+    """Assess each impact-free run of a class of motion with the signature of all the others, and predict the next run.
 
-    The critical factors of the n runs, each a run's maximum in spreads, are taken as a sample; the chance that the next
-    one is above the safety factor is predicted with the uncertainty of so small a sample (see `Prediction`). A
-    signature of n - 1 runs is less sure than one of all n: its critical factors are up to 3 % larger at 14 runs. That
-    is not corrected, so that the chance comes out too large rather than too small. "Needs more runs" assumes that the
-    critical factors stay as they are and only become better known. Measured on simulated runs by
+    Parameters
+    ----------
+    pairs : sequence of (Operation, Signal)
+        Impact-free runs of one class, with the detector's signals.
+    rule : Signature
+        How the signature is learned; `rule.sides` must be given.
+    activation : Activation
+        What raises an alarm.
+    target : float
+        The chance of a false alarm per operation that the runs have to show.
+
+    Returns
+    -------
+    Coverage
+        The alarms, the predicted chance, and what would meet the target.
+
+    Raises
+    ------
+    SignatureError
+        The runs are too few or differ.
+    UsageError
+        The target is not a probability.
+
+    Notes
+    -----
+    The critical factors of the n runs, each a run's maximum in spreads, are treated as a sample; the chance that the
+    next one is above the safety factor is predicted with the uncertainty of so small a sample (see `Prediction`). A
+    signature of n - 1 runs is less certain than one of all n: its critical factors are up to 3 % larger at 14 runs.
+    That is not corrected, so that the predicted chance is too large rather than too small. "Needs more runs" assumes
+    that the critical factors stay as they are and only become better known. Measured on simulated runs by
     `benchmarks/signature_coverage.py`; runs of one day do not represent other days.
 
-    `rule.sides` has to be given. Raises SignatureError where the runs are too few or differ, UsageError for a target
-    that is not a probability.
+    Examples
+    --------
+    `cdtool.check_signature` returns it for each class.
     """
     if not 0.0 < target < 1.0:
         raise UsageError(f"target is {target:g}", "give a probability between 0 and 1, such as 0.001")
@@ -137,7 +163,7 @@ def _prediction(runs: Sequence[LeftOut]) -> Prediction | None:
 
 
 def _chance(share: float) -> str:
-    """A chance as one in so many."""
+    """Return a chance as one in a number."""
     if share >= 0.1:
         return f"{100.0 * share:.0f} %"
     if share < 1e-6:
@@ -146,7 +172,7 @@ def _chance(share: float) -> str:
 
 
 def _raised(factor: float) -> str:
-    """Rounded up to a tenth: rounded down it would not keep the target."""
+    """Round up to a tenth: rounded down it would not meet the target."""
     return f"at least {np.ceil(10.0 * factor - 1e-9) / 10.0:.1f}"
 
 
@@ -154,7 +180,7 @@ def _raised(factor: float) -> str:
 class NoLimit:
     """A part of the stroke without a limit for a joint, from `start` to `end` in m or rad (`unit`) of travel, or s.
 
-    `share`: no place in it was reached with a valid signal by more of the runs; 80 % are needed.
+    `share`: no location in it was reached with a valid signal by more of the runs; 80 % are needed.
     """
 
     joint: str
@@ -166,7 +192,7 @@ class NoLimit:
 
     @property
     def described(self) -> str:
-        """Where and why."""
+        """The location and the reason."""
         at = self.start == self.end
         where = f"at {self.start:.3f}" if at else f"from {self.start:.3f} to {self.end:.3f}"
         unit = f" {self.unit}" if self.unit else ""
@@ -185,7 +211,7 @@ class _Changeover:
 
 
 def _changeover(signature: FittedSignature, runs: Sequence[tuple[Recording, Signal]]) -> _Changeover:
-    """The latest and nearest end of acceleration in some runs; without one where only time or only travel counts."""
+    """Return the latest and nearest end of acceleration in some runs; the default if only one axis counts."""
     if signature.alignment != "time_then_position":
         return _Changeover()
     times, travels = [], []
@@ -199,7 +225,7 @@ def _changeover(signature: FittedSignature, runs: Sequence[tuple[Recording, Sign
 
 
 def gaps_of(signature: FittedSignature, change: _Changeover | None = None) -> tuple[NoLimit, ...]:
-    """The parts without a limit, joint after joint; without a `change`, all of both curves is looked at."""
+    """Return the parts without a limit, joint by joint; without a `change`, of the whole of both curves."""
     at = change or _Changeover()
     found: list[NoLimit] = []
     for joint in range(len(signature.joints)):

@@ -31,11 +31,36 @@ def audit_drift(
 ) -> DriftAudit:
     """Compare runs in order of time with a signature, and test for changes from run to run.
 
+    Parameters
+    ----------
+    signature : FittedSignature
+        The signature; it does not change meanwhile.
+    pairs : sequence of (Operation, Signal)
+        Impact-free runs of its class in order of time, with the detector's signals.
+    activation : Activation
+        What raises an alarm.
+
+    Returns
+    -------
+    DriftAudit
+        The runs, and the changes that are shown.
+
+    Raises
+    ------
+    SignatureError
+        No run is assessable.
+
+    Notes
+    -----
     Drift: Mann-Kendall test with the Theil-Sen slope; step: Pettitt's test (see `course_of`). The whole stroke and its
     locations are tested separately, each at 1 % for all joints (and locations) together: at most 2 % of steady seasons
     show a change. A location is reported only if it changes by more than a quarter of the change of the whole stroke.
     With one monitored side, a location that moves away from the limit is not reported. Runs are assumed independent: a
-    temperature that varies within a day looks like a drift. Raises SignatureError if no run is assessable.
+    temperature that varies within a day looks like a drift.
+
+    Examples
+    --------
+    `cdtool.check_signature` returns it for each class.
     """
     detections: list[Detection] = []
     refused: list[tuple[str, str]] = []

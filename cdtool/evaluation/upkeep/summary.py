@@ -1,4 +1,4 @@
-"""What a stored signature holds, in a few figures: stroke, spread, and how far its limits moved since first learned."""
+"""A stored signature in a few numbers: stroke, spread, and how far its limits have moved since first learned."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdtool.thresholds.signature_curve import Curve
 class JointSummary:
     """One joint of a signature: its typical spread [signal's unit], and the largest move of a limit [spreads].
 
-    `moved` is 0 where no run was added; `moved_at` is its place on `moved_along` (travel or time), NaN without one.
+    `moved` is 0 if no run was added; `moved_at` is its location on `moved_along` (travel or time), NaN without one.
     """
 
     joint: str
@@ -40,7 +40,24 @@ class SignatureSummary:
 
 
 def summarise_signature(current: FittedSignature, first: FittedSignature) -> SignatureSummary:
-    """Figures of a signature; `first` is the one that was first learned, on the same grid."""
+    """Summarise a stored signature.
+
+    Parameters
+    ----------
+    current : FittedSignature
+        The signature.
+    first : FittedSignature
+        The signature as first learned, on the same grid.
+
+    Returns
+    -------
+    SignatureSummary
+        Runs, stroke, spread, and the largest move of a limit per joint.
+
+    Examples
+    --------
+    `cdtool.learn_signature` learns one; `cdtool signature show` shows the summary.
+    """
     along = [("travel", current.by_position, first.by_position), ("time", current.by_time, first.by_time)]
     parts = [
         part for part in along if current.alignment in (part[0].replace("travel", "position"), "time_then_position")

@@ -1,4 +1,4 @@
-"""What an audit of a season found, in plain sentences for the screen and for figures."""
+"""The result of an audit of a season, in plain sentences for the screen and for figures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,22 @@ _MANY = 100_000
 
 
 def verdicts(item: JointDrift) -> tuple[str, ...]:
-    """Return the changes shown for a joint, locations first; or that none is, with the drift not excluded."""
+    """Return the changes shown for a joint, locations first; or that none is, with the drift not excluded.
+
+    Parameters
+    ----------
+    item : JointDrift
+        One joint over the season.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each.
+
+    Examples
+    --------
+    `cdtool.check_signature` returns the joints of each class.
+    """
     lines = [_alarms(item)] if any(run.alarm for run in item.runs) else []
     if item.course.trend is None:
         many = counted(item.course.n, "run")

@@ -24,13 +24,15 @@ from cdtool.recording import FloatArray
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect
     from cdtool.formats.csv.table import Table
+import math
+from itertools import takewhile
 
+from cdtool.formats.groups import PREFIX
 
-@dataclass(frozen=True)
-class TableSource(Source):
-    """A table's columns; `dialect` is how it is written, as `[csv]` of a machine file."""
-
-    dialect: str = ""
+_MARK = b"# " + PREFIX.encode()
+_KEY = _MARK + b"origin_s: "
+# A long list of parts, or of what was lost, may follow it.
+_HEAD = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -49,14 +51,14 @@ class Csv:
         sample = read_sample(path)
         return bool(sample.strip()) and looks_like_text(sample)
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> TableSource:
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The columns that `wanted` names, or all numeric ones; raises RecordingError with the line number."""
         dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
         return _survey(path, dialect) if wanted is None else _wanted(path, dialect, wanted)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """All numeric columns, or those of `keys`, a MiB of the file at a time; raises RecordingError."""
-        from cdtool.formats.csv.table_pieces import table_pieces
+        from cdtool.formats.csv.table import table_pieces
 
         dialect = _dialect(path, TablePins())
         # The last column, too: it shows whether the file's end is whole.
@@ -75,19 +77,18 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     return find_dialect(path, sample, pins)
 
 
-def _survey(path: Path, dialect: Dialect) -> TableSource:
+def _survey(path: Path, dialect: Dialect) -> Source:
     from cdtool.formats.csv.several_clocks import Clocks, clock_findings
     from cdtool.formats.csv.table import read_table
 
-    table = read_table(path, dialect, dialect.names, None, None)
+    table = read_table(path, dialect, dialect.names)
     table.findings += clock_findings(dialect, Clocks.by_names(dialect), table.values)
     return _source(path, dialect, table)
 
 
-def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
+def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
     from cdtool.formats.csv.table import read_table
-    from cdtool.formats.csv.written_origin import written_origin
 
     names, time = dialect.names, wanted.time
     clock = column_key(time.column, names) if time.column is not None else None
@@ -112,15 +113,14 @@ def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> TableSource:
     return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
 
 
-def _source(path: Path, dialect: Dialect, table: Table) -> TableSource:
+def _source(path: Path, dialect: Dialect, table: Table) -> Source:
     from cdtool.formats.csv.several_clocks import told_unit
-    from cdtool.formats.csv.written_origin import written_origin
 
     columns = {
         key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
         for key, values in table.values.items()
     }
-    return TableSource(
+    return Source(
         path=path,
         format=Csv.name,
         columns=columns,
@@ -142,3 +142,16 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
     values = np.column_stack(list(columns.values()))
     body = (row * len(values)) % tuple(values.ravel().tolist())
     path.write_text(",".join(columns) + "\n" + body, encoding="utf-8", newline="\n")
+
+
+def written_origin(path: Path) -> float:
+    """Return the origin [s] that a text table's own head gives; 0 where it gives no origin."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
+    written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
+    try:
+        origin = float(written)
+    except ValueError:  # somebody has edited it
+        return 0.0
+    return origin if math.isfinite(origin) else 0.0

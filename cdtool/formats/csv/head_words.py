@@ -11,41 +11,16 @@ from cdtool.units import find_unit
 # Units that have no factor to SI here, and words that stand for one.
 _UNIT_WORDS = frozenset(
     (
-        *(
-            "volt",
-            "volts",
-            "ampere",
-            "amperes",
-            "amp",
-            "amps",
-            "second",
-            "seconds",
-            "msec",
-            "newton",
-            "newtons",
-            "degree",
-        ),
-        *("degrees", "hz", "khz", "mhz", "°c", "degc", "k", "w", "kw", "bar", "mbar", "pa", "kpa", "l/min", "ohm", "-"),
-        *("db", "lsb", "inc", "incr", "digit", "digits"),
+        *("volt", "volts", "ampere", "amperes", "amp", "amps", "second", "seconds", "msec", "newton", "newtons"),
+        *("degree", "degrees", "hz", "khz", "mhz", "°c", "degc", "k", "w", "kw", "bar", "mbar", "pa", "kpa", "l/min"),
+        *("ohm", "-", "db", "lsb", "inc", "incr", "digit", "digits"),
     )
 )
 _TYPES = frozenset(
     (
         *("real", "lreal", "int", "dint", "lint", "sint", "uint", "udint", "usint", "bool", "byte", "word", "dword"),
-        *(
-            "float",
-            "double",
-            "float32",
-            "float64",
-            "single",
-            "string",
-            "date",
-            "boolean",
-            "integer",
-            "number",
-            "numeric",
-        ),
-        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+        *("float", "double", "float32", "float64", "single", "string", "date", "boolean", "integer", "number"),
+        *("numeric", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))),
     )
 )
 

@@ -37,10 +37,10 @@ class OddLines:
     `targets` (width,) is which column goes where, as the loop over the plain ones has it: a column that is left out
     later is left out there too.
     With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
-    `unread` are these cells by column, each with its line. `dropped` are the rows that are none, with their lines;
-    `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0: none);
-    `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold nothing,
-    `empty` those of them that are rows, `words` perhaps a footer.
+    `unread` are these cells by column, each with its line. `dropped` are the rows of a block that are not rows, with
+    their lines; `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0:
+    none); `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold
+    nothing, `empty` those of them that are rows, `words` (row, line, text) are perhaps a footer.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class OddLines:
     ends_skipped: bool = False
     blank: list[int] = field(default_factory=list)
     empty: list[int] = field(default_factory=list)
-    words: list[tuple[int, int, str]] = field(default_factory=list)
+    words: tuple[int, int, str] | None = None
 
     def take(self, item: OddLine, first_line: int, rows: Rows) -> None:
         """Read one line into `rows`, in the file's order; `first_line` is that of its block."""
@@ -125,7 +125,7 @@ class OddLines:
                 f"{self.path}: line {line} is no line of a table: a quote is not closed", "are the quotes in pairs?"
             )
         cells = split_line(text, self.dialect.separator)
-        if len(cells) != self.dialect.width or self.words:
+        if len(cells) != self.dialect.width or self.words is not None:
             self._not_a_row(item, line, cells, text)
             return
         for column, target in enumerate(self.targets.tolist()):
@@ -136,23 +136,30 @@ class OddLines:
         """Words below the rows are a footer, if nothing but words follows; anything else is a row of another width."""
         if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not holds_numbers(text):
             self._drop(item, line, "words below the rows")
-            self.words.append((item.row, line, text))
+            self.words = self.words or (item.row, line, text)
             return
-        if self.words:
-            self._refuse_footer()
+        if self.words is not None:
+            self._refuse_words(*self.words[1:])
         has = f"the header has {self.dialect.width}" if self.dialect.header else f"the first has {self.dialect.width}"
         raise RecordingError(
             f"{self.path}: line {line} has {counted(len(cells), 'cell')}, {has}",
             "repair or remove the line; the first row sets the width",
         )
 
-    def finish(self, last_row: int) -> None:
-        """Raise if a row, the last of which is given, follows the words that would be a footer."""
-        if self.words and last_row > self.words[0][0]:
-            self._refuse_footer()
+    def end_block(self, rows: range) -> dict[int, int]:
+        """Return those of a block's rows that are dropped, with their lines, and forget them.
 
-    def _refuse_footer(self) -> None:
-        _, line, text = self.words[0]
+        Raises RecordingError where a row follows words that would be a footer.
+        """
+        dropped, self.dropped = self.dropped, {}
+        if self.words is not None:
+            row, line, text = self.words
+            if any(other > row and other not in dropped for other in reversed(rows)):
+                self._refuse_words(line, text)
+            self.words = -1, line, text
+        return dropped
+
+    def _refuse_words(self, line: int, text: str) -> None:
         raise RecordingError(
             f"{self.path}: line {line} has 1 cell, the header has {self.dialect.width}: "
             f"{text.strip()[:40]!r} between the rows",

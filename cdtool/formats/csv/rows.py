@@ -1,4 +1,4 @@
-"""The rows of a text table: read block by block with a compiled loop, every line accounted for.
+"""The rows of a text table, all or block by block: read with a compiled loop, every line accounted for.
 
 A plain line is read by the loop. Every other one comes here: it is a row written in an unusual way, a line that is
 skipped and named (comment, blank line, the header again, NUL bytes, the half-written end), or an error with its line.
@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import chain, islice, starmap
 from pathlib import Path
 
 import numpy as np
@@ -30,9 +31,14 @@ _THREADS = 4
 
 
 @dataclass(frozen=True)
-class _Read:
-    """What one block gave: its rows and lines, and those that are not plain; `empty` are blank lines that are rows."""
+class _Block:
+    """What one block gave: `rows` rows of `room` from `first` on, its lines, and those that are not plain.
 
+    `empty` are blank lines that are rows.
+    """
+
+    room: Rows
+    first: int
     rows: int
     lines: int
     blank: Integers
@@ -58,71 +64,67 @@ class RowReader:
         self.ended = True
 
     def read(self, odd: OddLines) -> Rows:
-        """All rows; lines that are not plain go to `odd`. Raises RecordingError with the line of the first bad one."""
-        lines = self.dialect.text.count_lines(self.dialect.offset, count_lines)
-        rows = Rows(
-            np.empty((self.shape[0], lines)),
-            np.empty((self.shape[1], lines), dtype=np.int64),
-            0,
-            self.dialect.first_line,
-        )
-        runs: list[tuple[int, int]] = []
-        blank: list[Integers] = []
-        line = self.dialect.first_line
-        place = 0
-        for done, room in self._blocks(rows):
-            blank.append(done.blank + line)
-            odd.empty += (done.empty + line).tolist()
-            for item in done.odd:
-                odd.take(item, line, rows)
-            runs.append((place, done.rows))
-            place += room
-            line += done.lines
-        skipped = odd.dropped
-        places = (row for start, count in reversed(runs) for row in range(start + count - 1, start - 1, -1))
-        odd.finish(next((row for row in places if row not in skipped), -1))
-        rows.count = _close_up(rows, runs, sorted(skipped))
-        odd.blank = [line for part in blank for line in part.tolist()]
-        rows.not_rows = np.sort(np.concatenate([*blank, np.array(sorted(skipped.values()), dtype=np.int64)]))
-        rows.numbers, rows.stamps = rows.numbers[:, : rows.count], rows.stamps[:, : rows.count]
-        return rows
+        """Return the rows of all pieces side by side, which threads write where they stay; raises RecordingError."""
+        whole = self.room(self.dialect.text.count_lines(self.dialect.offset, count_lines))
+        parts = list(self.pieces(odd, whole))
+        count = sum(part.count for part in parts)
+        not_rows = np.concatenate([whole.not_rows, *(part.not_rows for part in parts)])
+        return Rows(whole.numbers[:, :count], whole.stamps[:, :count], count, whole.first_line, not_rows)
 
-    def _counted(self) -> Iterator[tuple[bytearray, int, int]]:
-        """Blocks, the bytes that belong to their lines, and how many lines these are."""
-        end = self.dialect.text.line_end[0]
+    def pieces(self, odd: OddLines, whole: Rows | None = None) -> Iterator[Rows]:
+        """Yield the rows block by block, in memory of their own or one behind the other in `whole`.
+
+        Lines that are not plain go to `odd`. Raises RecordingError with the line of the first bad one.
+        """
+        line, end = self.dialect.first_line, 0
+        for block in self._ahead(whole):
+            for item in block.odd:
+                odd.take(item, line, block.room)
+            odd.blank += (block.blank + line).tolist()
+            odd.empty += (block.empty + line).tolist()
+            dropped = odd.end_block(range(block.first, block.first + block.rows))
+            not_rows = np.sort(np.concatenate([block.blank + line, np.array([*dropped.values()], dtype=np.int64)]))
+            begin = 0 if whole is None else end
+            end = _close_up(block, sorted(dropped), begin)
+            numbers, stamps = block.room.numbers[:, begin:end], block.room.stamps[:, begin:end]
+            yield Rows(numbers, stamps, end - begin, line, not_rows)
+            line += block.lines
+
+    def room(self, count: int) -> Rows:
+        """Return memory for so many rows."""
+        numbers, stamps = np.empty((self.shape[0], count)), np.empty((self.shape[1], count), dtype=np.int64)
+        return Rows(numbers, stamps, 0, self.dialect.first_line)
+
+    def _raw(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
+        """Blocks, the bytes that belong to their lines, and where in which memory how many rows may be theirs."""
+        end, first = self.dialect.text.line_end[0], 0
         for block, size in self.dialect.text.blocks(self.dialect.offset):
-            count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end))
-            yield block, size, count + (block[size - 1] != end)
+            count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end)) + (block[size - 1] != end)
+            yield block, size, first, count, self.room(count) if whole is None else whole
+            first += 0 if whole is None else count
 
-    def _blocks(self, rows: Rows) -> Iterator[tuple[_Read, int]]:
+    def _ahead(self, whole: Rows | None) -> Iterator[_Block]:
         """Blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
-        place = 0
         workers = min(_THREADS, usable_cores())
-        pending: deque[tuple[Future[_Read], int]] = deque()
-        blocks = self._counted()
-        first = next(blocks, None)
-        second = next(blocks, None) if first else None
-        if second is None or workers == 1:
-            for block, size, count in (item for part in ([first], [second], blocks) for item in part if item):
-                yield self._block(block, size, place, count, rows), count
-                place += count
+        blocks = self._raw(whole)
+        begin = list(islice(blocks, 2))
+        if len(begin) < 2 or workers == 1:
+            yield from starmap(self._block, chain(begin, blocks))
             return
         _ = read_rows.compiled  # once, not in every thread
+        pending: deque[Future[_Block]] = deque()
         with ThreadPoolExecutor(workers) as pool:
             try:
-                for block, size, count in (item for part in ([first], [second], blocks) for item in part if item):
-                    pending.append((pool.submit(self._block, block, size, place, count, rows), count))
-                    place += count
+                for block in chain(begin, blocks):
+                    pending.append(pool.submit(self._block, *block))
                     if len(pending) > workers:
-                        future, room = pending.popleft()
-                        yield future.result(), room
+                        yield pending.popleft().result()
                 while pending:
-                    future, room = pending.popleft()
-                    yield future.result(), room
+                    yield pending.popleft().result()
             finally:
                 pool.shutdown(cancel_futures=True)
 
-    def _block(self, block: bytearray, size: int, place: int, count: int, rows: Rows) -> _Read:
+    def _block(self, block: bytearray, size: int, first: int, count: int, room: Rows) -> _Block:
         end = self.dialect.text.line_end
         unfinished = block[size - 1] not in b"\r\n"
         self.ended = self.ended and not unfinished
@@ -145,9 +147,9 @@ class RowReader:
             self._marks(),
             self.targets,
             self.programs,
-            rows.numbers,
-            rows.stamps,
-            place,
+            room.numbers,
+            room.stamps,
+            first,
             blank,
             odd,
             counts,
@@ -155,10 +157,10 @@ class RowReader:
         )
         final = count - 1 if unfinished else -1
         listed = [
-            OddLine(line, row, bytes(block[first:last]), line == final)
-            for line, row, first, last in odd[: counts[3]].tolist()
+            OddLine(line, row, bytes(block[begin:stop]), line == final)
+            for line, row, begin, stop in odd[: counts[3]].tolist()
         ]
-        return _Read(int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
+        return _Block(room, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
 
     def _marks(self) -> Integers:
         dialect = self.dialect
@@ -176,17 +178,13 @@ class RowReader:
         )
 
 
-def _close_up(rows: Rows, runs: Sequence[tuple[int, int]], dropped: Sequence[int]) -> int:
-    """Move the rows together over the places of lines that are no rows; returns how many rows there are."""
-    to = 0
-    gone = deque(dropped)
-    for place, count in runs:
-        start, end = place, place + count
-        while start < end:
-            stop = gone.popleft() if gone and gone[0] < end else end
-            if to != start and stop > start:
-                for table in (rows.numbers, rows.stamps):
-                    table[:, to : to + stop - start] = table[:, start:stop]
-            to += stop - start
-            start = stop + 1 if stop < end else end
+def _close_up(block: _Block, dropped: Sequence[int], to: int) -> int:
+    """Move a block's rows together from row `to` on, without those that are dropped; return where they end."""
+    start = block.first
+    for stop in (*dropped, block.first + block.rows):
+        if to != start and stop > start:
+            for table in (block.room.numbers, block.room.stamps):
+                table[:, to : to + stop - start] = table[:, start:stop]
+        to += stop - start
+        start = stop + 1
     return to

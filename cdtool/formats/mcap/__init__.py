@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Column
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.records import MAGIC
-from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
-from cdtool.formats.mcap.mapped_pieces import MappedFields
+from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.uniform import UniformTaker
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source
-from cdtool.large_integers import rounding_finding
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
 from cdtool.messages.taken import Bound
+from cdtool.messages.topic import Taken, Topic, in_order, wanted_columns, wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
 from cdtool.recording import Finding
 
@@ -66,18 +64,16 @@ class Mcap:
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
-                name = messages.stream.channel.topic
+                name = messages.stream.topic
                 survey = topics.setdefault(name, TopicSurvey(name))
                 yield from survey.pieces(messages.stream, messages.batch, origin)
         findings = log.findings()
         columns: dict[str, Column] = {}
-        for name in log.topics:
-            for item in topics[name].found() if name in topics else ():
-                if isinstance(item, Finding):
-                    findings.append(item)
-                else:
-                    columns[item.name] = item
-        return _source(path, log, columns, findings + jumps.findings(), log.origin)
+        for name in (name for name in log.topics if name in topics):
+            of_topic, found = topics[name].found()
+            columns |= of_topic
+            findings += found
+        return source_of(log, columns, findings + jumps.findings(), log.origin)
 
     def exact_pieces(self, path: Path) -> Pieces:
         """What `pieces` gives; of a log that cdtool converted with the times that were written."""
@@ -102,47 +98,22 @@ class Mcap:
 
 
 def _wanted(path: Path, wanted: ChannelMap) -> Source:
-    texts: dict[str, list[str]] = {}
-    for source in wanted.sources:
-        fields = texts.setdefault(source.topic, [])
-        if source.field not in fields:
-            fields.append(source.field)
+    asked = {source.topic for source in wanted.sources}
     taker = UniformTaker(publish=wanted.time.clock == "publish")
-    log = Log(path, texts.__contains__, taker=taker)
-    topics = {
-        name: Gathering(
-            f"{path}: {name}",
-            name,
-            [parse_field(text, f"{path}: {name}") for text in fields],
-            wanted.time.clock,
-            wanted.joint_names,
-            log.expected(name),
-        )
-        for name, fields in texts.items()
-    }
+    log = Log(path, asked.__contains__, taker=taker)
+    topics = wanted_topics(path, wanted, partial(Gathering, expected=log.expected))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
         for messages in piece:
-            topic = topics[messages.stream.channel.topic]
+            topic = topics[messages.stream.topic]
             if messages.parts:
                 topic.confirm(messages.stream, messages.parts)
             else:
                 topic.add(messages.stream, messages.batch)
         if any(not messages.parts for messages in piece):
             taker.learn(_bound(log, topics))
-    findings = log.findings()
-    wanted = with_topics(path, wanted, [topic.name for topic in log.topics.values() if topic.count])
-    for name in dict.fromkeys(source.topic for source in wanted.sources):
-        findings += topics[name].decoders.told(f"{path}", name) + topics[name].orders.findings()
-    # A header's clock may be another one (simulated time): its own first stamp is its origin.
-    stamps = [topic.first_stamp for topic in topics.values() if topic.first_stamp is not None]
-    origin = log.origin if wanted.time.clock == "log" else min(stamps, default=log.origin)
-    asked = dict.fromkeys((source.topic, texts[source.topic].index(source.field)) for source in wanted.sources)
-    gathered = [(*topics[name].column(index, origin), topics[name].rounded(index)) for name, index in asked]
-    for column, field_findings, rounded in gathered:
-        findings += [*field_findings, *rounding_finding(column.name, rounded)]
-    return _source(path, log, {column.name: column for column, _, _ in gathered}, findings, origin)
+    return mapped_source_of(log, wanted, topics)[0]
 
 
 def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
@@ -169,6 +140,69 @@ def _origin(path: Path, log: Log) -> int:
     return first
 
 
-def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
+@dataclass
+class MappedFields:
+    """An MCAP file that is read piece by piece as often as is asked for; each field is a clock of its own.
+
+    The times count from the `origin` [ns] that the pass before has found; `settled`: the last pass counted from it.
+    """
+
+    path: Path
+    wanted: ChannelMap
+    origin: int | None = None
+    settled: bool = False
+
+    def __post_init__(self) -> None:
+        self._converted = exact_times(self.path)
+        self._asked = {source.described for source in self.wanted.sources}
+
+    def pieces(self) -> Pieces:
+        """Yield the fields that `wanted` names, some MiB of the file at a time; raises RecordingError."""
+        topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
+        log = Log(self.path, topics.__contains__)
+        start = self.origin
+        for piece in ahead(log.pieces()):
+            first = log.section.room.first_time
+            if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
+                start = first
+            for messages in piece:
+                topic = topics[messages.stream.topic]
+                taken = topic.take(messages.stream, messages.batch)
+                if taken is None or not len(taken[0]):
+                    continue
+                start = int(taken[0][0]) if start is None else start
+                for text in taken[1]:
+                    if (name := f"{topic.topic} {text}") in self._asked:
+                        of_field = self._piece(name, text, taken, start)
+                        if of_field.rows:
+                            yield of_field
+        source, self.origin = mapped_source_of(log, self.wanted, topics)
+        self.settled = self.origin == start
+        if self._converted is None:
+            return source
+        return replace(source, origin=float(self._converted.get("cdtool.origin_s", "0")))
+
+    def _piece(self, name: str, text: str, taken: Taken, origin: int) -> Piece:
+        """Return the messages of a batch that name the field's joints."""
+        stamps, (values, other) = taken[0], taken[1][text]
+        exact = None if self._converted is None else taken[1][EXACT_TIME][0]
+        if other is not None:
+            stamps = stamps[~other]
+            values, exact = (None if each is None else each[~other] for each in (values, exact))
+        time, order = in_order(stamps, origin)
+        time = time if exact is None else exact if order is None else exact[order]
+        rows = {} if values is None else {name: values if order is None else values[order]}
+        return Piece(name, time, rows, len(time))
+
+
+def mapped_source_of(log: Log, wanted: ChannelMap, topics: Mapping[str, Topic]) -> tuple[Source, int]:
+    """Return the columns of a map, once the log was run through, and what their times count from [ns]."""
+    held = with_topics(log.path, wanted, [topic.name for topic in log.topics.values() if topic.count])
+    columns, findings, origin = wanted_columns(log.path, held, topics, log.origin)
+    return source_of(log, columns, log.findings() + findings, origin), origin
+
+
+def source_of(log: Log, columns: Mapping[str, Column], findings: Sequence[Finding], origin: int) -> Source:
+    """Return these columns of a log that was run through; their times count from `origin` [ns]."""
     details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))
+    return Source(log.path, "mcap", columns, origin / 1e9, tuple(findings), details, tuple(columns))

@@ -32,7 +32,7 @@ class SequenceJumps:
         """The messages of a piece, with times from `origin` [ns] on."""
         numbers, stamps = [], []
         for messages in piece:
-            channel, batch = messages.stream.channel, messages.batch
+            channel, batch = messages.stream, messages.batch
             found = batch.sequence
             if found.any():
                 self._counts.setdefault(channel.id, _Count(channel.topic)).add(found, batch.log_time, origin)

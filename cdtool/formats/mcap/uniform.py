@@ -63,14 +63,11 @@ class UniformTaker:
         self._in_vain = max(0, self._in_vain + (1 if taken is None else -1))
         return taken
 
-    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:  # noqa: C901  one check for each reason to read the chunk otherwise
-        first, limits = np.zeros(len(tables.bound), np.uint64), np.zeros(len(tables.bound), np.uint64)
-        for slot, (channel, bound) in enumerate(tables.bound.items()):
-            if bound is not None and channel in rows:
-                free = bound[1].free
-                if rows[channel].start < free.start or rows[channel].stop > free.stop:
-                    return None
-                first[slot], limits[slot] = rows[channel].start, rows[channel].stop
+    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:
+        claimed = _claimed_rows(tables.bound, rows)
+        if claimed is None:
+            return None
+        first, limits = claimed
         reached, last = first.copy(), np.zeros(len(first), np.uint64)
         times = np.array([kernel.NO_DATE, 0, 0], np.uint64)
         at, why = 0, kernel.DEFINITION
@@ -113,6 +110,18 @@ class UniformTaker:
                 if bound is not None:
                     parts[channel] = Part(bound[1], slice(begin, end), stamp < kernel.NO_DATE)
         return Taken(counts, parts, (earliest, latest), first_time)
+
+
+def _claimed_rows(bound: Mapping[int, Bound], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
+    """Return the first row and the end of each channel's messages; None where its columns have not so many free."""
+    first, limits = np.zeros(len(bound), np.uint64), np.zeros(len(bound), np.uint64)
+    for slot, (channel, each) in enumerate(bound.items()):
+        if each is not None and channel in rows:
+            free = each[1].free
+            if rows[channel].start < free.start or rows[channel].stop > free.stop:
+                return None
+            first[slot], limits[slot] = rows[channel].start, rows[channel].stop
+    return first, limits
 
 
 def _tables(bound: Mapping[int, Bound]) -> _Tables:

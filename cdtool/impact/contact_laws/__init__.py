@@ -1,4 +1,4 @@
-"""Contact laws: penetration and its rate -> the force between two bodies. One file a law."""
+"""Contact laws: from penetration and its rate to the force between two bodies. One file per law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a contact law is, and what several share.
+"""The contract of a contact law, and what several share.
 
 Conventions: the penetration [m] grows while the bodies approach; its rate [m/s] is then positive (the thesis's
 v = V2 - V1 is minus that). The force [N] pushes the bodies apart; it is never negative: a contact cannot pull.
@@ -15,7 +15,7 @@ from cdtool.recording import FloatArray
 
 
 class ContactLaw(Protocol):
-    """Anything that gives the force of a contact; arrays of one shape in and out, scalars give a scalar."""
+    """A law that returns the force of a contact; arrays of one shape in and out, a scalar for scalars."""
 
     def force(self, penetration: npt.ArrayLike, rate: npt.ArrayLike) -> FloatArray:
         """Force [N] at a penetration [m] and its rate [m/s]; 0 without contact, never negative."""
@@ -24,7 +24,7 @@ class ContactLaw(Protocol):
 
 @runtime_checkable
 class StoresEnergy(Protocol):
-    """A law that knows how much of the work done on it would come back."""
+    """A law that defines how much of the work done on it is recoverable."""
 
     def stored_energy(self, penetration: npt.ArrayLike) -> FloatArray:
         """Elastic energy [J] at a penetration [m]."""
@@ -56,5 +56,5 @@ def spring_energy(stiffness: float, exponent: float, penetration: npt.ArrayLike)
 
 
 def pushing(force: npt.ArrayLike, penetration: npt.ArrayLike) -> FloatArray:
-    """A force as a contact can bear it: 0 without contact and in place of a pull."""
+    """Return a force that a contact can exert: 0 without contact and instead of tension."""
     return np.where(np.less(penetration, 0.0), 0.0, np.maximum(force, 0.0))[()]

@@ -19,12 +19,12 @@ from cdtool.recording import FloatArray
 class Hertz:
     """F = k delta^n (thesis 3.13); back from delta_c F_max [(delta - delta_p)/(delta_c - delta_p)]^n (3.16 corrected).
 
-    The printed 3.16 has the exponent 2; only with n is the dent delta_p the sole loss, e^2 = 1 - delta_p/delta_c.
-    `deepest` is delta_c so far, the law's memory: below it the force follows the way back, above it the first loading.
-    A way back from less than delta_p has no force at all: e = 0.
+    The printed 3.16 has the exponent 2; only with n is the dent delta_p the only loss, e^2 = 1 - delta_p/delta_c.
+    `deepest` is delta_c so far, the law's memory: below it the force follows the unloading, above it the first loading.
+    Unloading from less than delta_p has no force at all: e = 0.
 
     Fails where the material yields over more than a small dent, where bodies fit one another (a shaft in a bearing),
-    and where the impact is so short that waves carry energy away (`cdtool.impact.waves`). Without delta_p nothing is
+    and if the impact is so short that waves carry energy away (`cdtool.impact.waves`). Without delta_p no energy is
     lost.
     """
 
@@ -51,7 +51,7 @@ class Hertz:
         return np.where(np.less(penetration, self.deepest), self._way_back(penetration, 0.0), first)[()]
 
     def stored_energy(self, penetration: npt.ArrayLike) -> FloatArray:
-        """What the way back from a penetration [m] would give back [J]."""
+        """Return the energy recovered by unloading from a penetration [m] [J]."""
         if not self.permanent_indentation:
             return spring_energy(self.stiffness, self.exponent, penetration)
         depth = np.asarray(penetration)
@@ -82,7 +82,7 @@ class Hertz:
     def contact_duration(self, mass: float, approach_speed: float) -> float:
         """T = 2 delta_c/v times the integral of (1 - u^(n+1))^(-1/2) over 0..1 [s]: 2.943 delta_c/v for n = 1.5.
 
-        Of a first impact without permanent indentation, whose way back is as long as the way in.
+        Of a first impact without permanent indentation, whose unloading takes as long as the loading.
         """
         n = self.exponent + 1.0
         shape = 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + 1.0 / n) / math.gamma(0.5 + 1.0 / n)

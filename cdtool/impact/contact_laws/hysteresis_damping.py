@@ -16,7 +16,7 @@ from cdtool.recording import FloatArray
 class HysteresisDamping:
     """F = k delta + mu delta d(delta)/dt (thesis 3.18), never a pull: Hunt-Crossley's law with n = 1.
 
-    It begins and ends without a step and without tension (the thesis's text says the tension of 3.17 of it). Fails for
+    It begins and ends without a step and without tension (the thesis attributes the tension of 3.17 to it). Fails for
     curved bodies, whose stiffness grows with the penetration, and where Hunt-Crossley's law fails.
     """
 

@@ -1,4 +1,4 @@
-"""Kelvin and Voigt's contact: a linear spring beside a damper."""
+"""Kelvin and Voigt's contact: a linear spring in parallel with a damper."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from cdtool.recording import FloatArray
 class KelvinVoigt:
     """F = k delta + d d(delta)/dt (thesis 3.17), but never a pull: as printed it ends in tension.
 
-    Fails at the first moment, where the force steps to d v; near the end, where the bodies part although the surface
-    has not come back; and in the restitution, which does not depend on the speed. It was made for polymers.
+    Fails at first touch, where the force steps to d v; near the end, where the bodies part although the surface
+    has not recovered; and in the restitution, which does not depend on the speed. It was devised for polymers.
     """
 
     name: ClassVar[str] = "kelvin_voigt"

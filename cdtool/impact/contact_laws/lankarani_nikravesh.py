@@ -17,8 +17,8 @@ from cdtool.recording import FloatArray
 class LankaraniNikravesh:
     """F = k delta^n (1 + 3 (1 - e^2)/(4 v) d(delta)/dt): Hunt-Crossley's law with mu of 3.22, never a pull.
 
-    `restitution` is the e that is wanted at `approach_speed`; what comes out is larger, 0.85 for 0.8 and 0.73 for 0.5.
-    Use `HuntCrossley` with `damping_for_restitution` where e is below 0.9. Fails where that law fails, and at other
+    `restitution` is the e wanted at `approach_speed`; the result is larger, 0.85 for 0.8 and 0.73 for 0.5.
+    Use `HuntCrossley` with `damping_for_restitution` for e below 0.9. Fails where that law fails, and at other
     speeds than the one it is made for.
     """
 

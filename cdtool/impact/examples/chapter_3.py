@@ -1,4 +1,4 @@
-"""Impacts for the figures of the thesis's chapter 3. The thesis gives no numbers for them: these are examples."""
+"""Impacts for the figures of the thesis's chapter 3. The thesis has no numbers for them: these are examples."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _RESTITUTION = 0.7
 
 @dataclass(frozen=True)
 class RestitutionCurve:
-    """e over a variable (n,): exact; by 3.21 and 3.22 where they give one (else NaN)."""
+    """e over a variable (n,): exact; by 3.21 and 3.22 if they define one (else NaN)."""
 
     name: str
     variable: FloatArray
@@ -77,7 +77,7 @@ def restitution_over_speed() -> list[RestitutionCurve]:
 
 
 def restitution_over_damping() -> RestitutionCurve:
-    """e over the damping number x = (mu/k) v, and what 3.21 and 3.22 take it for."""
+    """Return e over the damping number x = (mu/k) v, exact and by 3.21 and 3.22."""
     return _curve("exact", np.linspace(0.0, 2.5, 501), 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Table 4.1 of the thesis with its units put right, an elastic drive of the same size, and sensors on it."""
+"""Table 4.1 of the thesis with corrected units, an elastic drive of the same size, and sensors on it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TRANSMISSION = RigidTransmission(inertia=2.35e-4, friction=0.03, ratio=0.015)
 TORQUE = ConstantTorque(0.5)
 CONTACT = HuntCrossley(stiffness=9.8261e8, damping=2.9478e8, exponent=1.5)
 GAP = 0.1
-"""Not given in the thesis [m]: the one that puts the touch at its 408 ms."""
+"""Not stated in the thesis [m]: the gap with which the touch is at its 408 ms."""
 
 ELASTIC = ElasticTransmission(motor_inertia=1e-4, load_mass=0.6, ratio=0.015, stiffness=100.0)
-"""J_m + M_l r^2 = J_t of Table 4.1; the thesis gives no numbers for its figure 4.7."""
+"""J_m + M_l r^2 = J_t of Table 4.1; the thesis has no numbers for its figure 4.7."""
 
 SPEED_LOOP = SpeedController(reference=0.25 / 0.015, proportional=0.05, integral=1.0, actuator_time=0.002)
-"""Gains for the example of 4.39; the thesis gives none."""
+"""Gains for the example of 4.39; the thesis has none."""
 
 RANKED = ImpactCase(
     ElasticTransmission(1e-4, 0.6, 0.015, stiffness=100.0, damping=0.005, motor_friction=0.03),

@@ -28,7 +28,7 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
 
             return cdr_decoder(parse_ros2msg(schema_name, schema_data))
         case "ros1", "ros1msg":
-            from cdtool.messages.columns.ros1 import ros1_decoder
+            from cdtool.messages.columns.cdr import ros1_decoder
             from cdtool.messages.layouts.ros1msg import parse_ros1msg
 
             return ros1_decoder(parse_ros1msg(schema_name, schema_data))

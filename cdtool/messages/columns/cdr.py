@@ -1,6 +1,6 @@
-"""ROS 2 CDR: plain CDR of either byte order (MCAP, "Well-known message encodings"; OMG DDS-XTypes 1.3, 7.4.1).
+"""ROS 2's plain CDR and ROS 1 (MCAP, "Well-known message encodings"; OMG DDS-XTypes 1.3, 7.4.1).
 
-A message begins with four bytes of encapsulation, whose second one tells the byte order: 0 big, 1 little. Other kinds
+A CDR message begins with four bytes of encapsulation; the second one is the byte order: 0 big, 1 little. Other kinds
 (parameter lists, encoding version 2) align differently and are refused. An int64 or uint64 beyond 2^53 is rounded to
 the nearest float64.
 """
@@ -77,3 +77,8 @@ class WalkFinder:
         if places not in self._programs:
             self._programs[places] = compile_program(self.schema, places, self.header > 0)
         return self._programs[places]
+
+
+def ros1_decoder(schema: Schema) -> TypedDecoder:
+    """Return the decoder of ROS 1 messages: little-endian, without alignment (http://wiki.ros.org/roscpp)."""
+    return TypedDecoder(schema, WalkFinder(schema, header=0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -18,16 +18,96 @@ import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import json_kernel as kernel
-from cdtool.messages.columns.gathered import DAMAGED, DECODED, Gathered, IntArray
-from cdtool.messages.columns.json_column import JsonColumn
-from cdtool.messages.columns.json_pattern import JsonPattern, pattern_of
-from cdtool.messages.fields import Field, header_stamp, numeric_fields
+from cdtool.messages.columns.gathered import (
+    ABSENT,
+    DAMAGED,
+    DECODED,
+    OTHER_JOINTS,
+    THERE,
+    ByteArray,
+    Gathered,
+    IntArray,
+    Picked,
+)
+from cdtool.messages.columns.json_pattern import JsonPattern, Resolved, pattern_of
+from cdtool.messages.fields import Field, FieldMissingError, header_stamp, numeric_fields
 from cdtool.recording import FloatArray
 
 _MOST_PATTERNS = 64
 _NEW_PATTERNS = 8  # of one batch: more shapes than that are read one by one
 _ENDS = np.isin(np.arange(256), list(b"}\0 \t\n\r"))
 _LATEST = 9_223_372_035  # s: an int64 of ns holds no more
+
+
+@dataclass
+class JsonColumn:
+    """The field `wanted` of n messages, filled part by part."""
+
+    wanted: Field
+    joints: Sequence[str]
+    n: int
+    _parts: list[tuple[IntArray, FloatArray]] = field(default_factory=list)  # rows, (rows, width)
+    _states: list[tuple[IntArray, int]] = field(default_factory=list)
+    _first_absent: int | None = None
+
+    def add(self, rows: IntArray, resolved: Resolved, values: Callable[[tuple[int, ...]], FloatArray]) -> None:
+        """Messages of one shape: `values(places)` are their numbers."""
+        if resolved.fault is not None:
+            self._absent(rows)
+        elif resolved.places:
+            self._parts.append((rows, values(resolved.places)))
+        elif resolved.other_joints:
+            self._states.append((rows, OTHER_JOINTS))
+        else:
+            self._parts.append((rows, np.full((len(rows), 0 if self.wanted.whole else 1), math.nan)))
+
+    def add_message(self, row: int, message: dict[str, Any]) -> None:
+        """One message that Python has read."""
+        rows = np.array([row])
+        try:
+            value = self.wanted.of(message, self.joints)
+        except FieldMissingError:
+            self._absent(rows)
+            return
+        if value is None:
+            self._states.append((rows, OTHER_JOINTS))
+        elif isinstance(value, list):
+            self._parts.append((rows, np.array([value], dtype=np.float64)))
+        else:
+            self._parts.append((rows, np.full((1, 0 if self.wanted.whole else 1), value)))
+
+    def _absent(self, rows: IntArray) -> None:
+        self._states.append((rows, ABSENT))
+        first = int(rows[0])
+        self._first_absent = first if self._first_absent is None else min(first, self._first_absent)
+
+    def picked(self, message: Callable[[int], dict[str, Any] | str]) -> Picked:
+        """All of it; `message(i)` is what Python reads, for the words of the fault."""
+        state = np.full(self.n, THERE, dtype=np.uint8)
+        for rows, value in self._states:
+            state[rows] = value
+        fault = None
+        if self._first_absent is not None:
+            try:
+                self.wanted.of(message(self._first_absent), self.joints)
+            except FieldMissingError as absent:
+                fault = absent
+        if not self.wanted.whole:
+            return Picked(self._table(1)[:, 0], None, state, fault)
+        count = np.full(self.n, -1)
+        for rows, values in self._parts:
+            count[rows] = values.shape[1]
+        wide = np.flatnonzero(count > 0)
+        return Picked(self._table(int(count[wide[0]]) if len(wide) else 1), count, state, fault)
+
+    def _table(self, width: int) -> FloatArray:
+        if len(self._parts) == 1 and self._parts[0][1].shape == (self.n, width):
+            return self._parts[0][1]
+        table = np.full((self.n, width), math.nan)
+        for rows, values in self._parts:
+            if values.shape[1] == width:
+                table[rows] = values
+        return table
 
 
 def json_decoder() -> JsonDecoder:
@@ -51,7 +131,7 @@ class JsonDecoder:
             self._fields.update(dict.fromkeys(names))
         return list(self._fields)
 
-    def gather(  # noqa: C901  one pass over the groups, one over the messages outside them
+    def gather(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> Gathered:
         """The wanted fields of all messages."""
@@ -60,19 +140,11 @@ class JsonDecoder:
         for group in groups:
             for each, column in zip(wanted, columns, strict=True):
                 column.add(group.rows, group.pattern.resolve(each, joints), group.of)
-        status, reason = np.full(len(batch), DECODED, dtype=np.uint8), ""
-        faults = {row: message for row, message in alone.items() if isinstance(message, str)}
-        if len(broken):
-            status[broken] = DAMAGED
-            faults[int(broken[0])] = str(_loaded(batch, int(broken[0])))
-        if faults:
-            status[list(faults)] = DAMAGED
-            reason = faults[min(faults)]
-        for row, message in alone.items():
-            if isinstance(message, str):
-                continue
-            for column in columns:
-                column.add_message(row, message)
+        status, reason = _damage(batch, alone, broken)
+        for column in columns:
+            for row, message in alone.items():
+                if not isinstance(message, str):
+                    column.add_message(row, message)
         picked = tuple(column.picked(partial(_loaded, batch)) for column in columns)
         if not stamps:
             return Gathered(picked, status, reason)
@@ -198,6 +270,17 @@ def _may_end(batch: Batch, rows: IntArray) -> npt.NDArray[np.bool_]:
 def _content(batch: Batch, row: int) -> bytes:
     begin = int(batch.start[row])
     return batch.data[begin : begin + int(batch.length[row])].tobytes()
+
+
+def _damage(batch: Batch, alone: Mapping[int, Any], broken: IntArray) -> tuple[ByteArray, str]:
+    """Return which messages are damaged, and why the first of them is: `alone` are its texts by row."""
+    status = np.full(len(batch), DECODED, dtype=np.uint8)
+    faults = {row: message for row, message in alone.items() if isinstance(message, str)}
+    if len(broken):
+        status[broken] = DAMAGED
+        faults[int(broken[0])] = str(_loaded(batch, int(broken[0])))
+    status[list(faults)] = DAMAGED
+    return status, faults[min(faults)] if faults else ""
 
 
 def _loaded(batch: Batch, row: int) -> dict[str, Any] | str:

@@ -7,6 +7,7 @@ copied on the way. Where one message differs, all are walked.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,15 +18,17 @@ from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
 from cdtool.messages.columns.alike_kernel import WORD, compared_words, take_alike, words_of
 from cdtool.messages.columns.gathered import IntArray
+from cdtool.messages.columns.picking import Plan, elements_of
 from cdtool.messages.columns.slots import FixedNames, Found, Place, Slot
 from cdtool.messages.columns.walk_program import Program
 from cdtool.messages.columns.walked import Walked, WalkedSlot
 from cdtool.messages.layouts.layout import Number
-from cdtool.messages.taken import Alike, Words
+from cdtool.messages.taken import Alike, Numbers, Recipe, Stamp, Words
 from cdtool.recording import FloatArray
 
 _MOST_LENGTHS = 256  # of a message that others are compared with
 _MOST_TAKEN = 64  # numbers of a place that are copied while messages are compared: of more, few may be wanted
+_MOST_NUMBERS = 1024  # of one place
 
 
 @dataclass(frozen=True)
@@ -148,3 +151,39 @@ def pattern_of(program: Program, batch: Batch, header: int) -> Pattern | None:
     shift = (np.array(numbers, dtype=np.uint64) - copied) * np.uint64(8)
     layout = (np.array(before, dtype=np.int64), np.array(step, dtype=np.int64))
     return Pattern(places, names, taken, alike, copied, shift, *layout)
+
+
+def recipe_of(
+    pattern: Pattern, plans: Sequence[Plan], joints: Sequence[str], stamp: tuple[Place, ...]
+) -> Recipe | None:
+    """Return the recipe of the plans' fields and of a stamp's places: how more such messages become rows (uniform.py).
+
+    None where the pattern alone does not tell all.
+    """
+    fields = [_numbers(pattern, plan, joints) for plan in plans]
+    there = [each for each in fields if each is not None]
+    seconds = _stamp(pattern, stamp) if stamp else None
+    if len(there) < len(fields) or (stamp and seconds is None):
+        return None
+    return Recipe(pattern.alike, tuple(there), seconds)
+
+
+def _numbers(pattern: Pattern, plan: Plan, joints: Sequence[str]) -> Numbers | None:
+    offset, count, kind = pattern.places[plan.place]
+    if kind is None or not 0 < count <= _MOST_NUMBERS or plan.arrays:
+        return None
+    names = () if plan.names is None else pattern.names[plan.names].names
+    elements = elements_of(plan, count, names, joints)
+    if elements is None:
+        return None
+    chosen = np.arange(count)[elements]
+    at = tuple((offset + kind.size * chosen).ravel().tolist())
+    return Numbers(at, dtype_of(kind), single=chosen.ndim == 0)
+
+
+def _stamp(pattern: Pattern, stamp: tuple[Place, ...]) -> Stamp | None:
+    """Seconds of 4 bytes with nanoseconds right behind them, as in both ROS; None where it is otherwise."""
+    (at, count, seconds), (behind, other, rest) = (pattern.places[place] for place in stamp)
+    if seconds is None or rest is None or (count, other, behind) != (1, 1, at + 4):
+        return None
+    return Stamp(at, seconds.dtype == "i4") if seconds.dtype in ("i4", "u4") and rest.dtype == "u4" else None

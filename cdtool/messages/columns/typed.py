@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -10,19 +11,107 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.by_name import NamedPlan, gather_by_name
-from cdtool.messages.columns.gathered import ByteArray, Gathered, IntArray
-from cdtool.messages.columns.pattern import Pattern
-from cdtool.messages.columns.picking import Plan, nowhere, pick
-from cdtool.messages.columns.recipes import recipe_of
-from cdtool.messages.columns.resolution import names_place, resolve
+from cdtool.messages.columns.gathered import ABSENT, THERE, ByteArray, Gathered, IntArray, Picked
+from cdtool.messages.columns.pattern import Pattern, recipe_of
+from cdtool.messages.columns.picking import WHOLE, Plan, elements_called, nowhere, pick
 from cdtool.messages.columns.slots import Found, Place
-from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError
-from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema
+from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
+from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 from cdtool.messages.taken import Recipe
+from cdtool.recording import FloatArray
 
+# One field of some of the messages, by their rows.
+Gather = Callable[[IntArray, Field], Gathered]
 _MOST_FIELDS = 4096
 _LATEST = 9_223_372_035  # s: an int64 of ns holds no more
+_NO_MEMBERS = Layout("", ())  # of a number or text
+
+
+@dataclass(frozen=True)
+class NamedPlan:
+    """A field whose step number `step` takes an element by its name; `array` is the plan of that step alone.
+
+    An example is `pose[robot].position.x` in Gazebo's ModelStates. The element may differ from message to message;
+    messages in which it is the same are read together, as if the field gave its number.
+    """
+
+    array: Plan
+    step: int
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """All that it needs to know before the element's number is known."""
+        return self.array.places
+
+    @property
+    def names(self) -> Place | None:
+        """The place of the texts that name the elements."""
+        return self.array.names
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The messages `rows`, in all of which the name is that of the same element, and their `field` by its number."""
+
+    rows: IntArray
+    field: Field
+    gathered: Gathered
+
+    @property
+    def picked(self) -> Picked:
+        return self.gathered.picked[0]
+
+
+def numbered(field: Field, step: int, element: int) -> Field:
+    """A field with an element's number in one of its steps."""
+    name, _ = field.steps[step]
+    return Field(field.text, (*field.steps[:step], (name, str(element)), *field.steps[step + 1 :]))
+
+
+def gather_by_name(plan: NamedPlan, found: Found, gather: Gather) -> Gathered:
+    """The field of all messages; `found` are the plan's places, `gather` reads what the element's number leads to.
+
+    As for an array of numbers: NaN where the array is shorter than its names, OTHER_JOINTS where no name is that one.
+    """
+    called = elements_called(plan.array, found)
+    parts = []
+    for element in np.unique(called.element[called.element >= 0]).tolist():
+        rows, field = np.flatnonzero(called.element == element), numbered(plan.array.field, plan.step, element)
+        parts.append(_Part(rows, field, gather(rows, field)))
+    if len(parts) == 1 and len(parts[0].rows) == len(found.status):
+        return parts[0].gathered
+    state, status, fault = called.state, found.status.copy(), called.fault
+    reasons = {int(np.flatnonzero(status)[0]): found.reason} if status.any() else {}
+    for part in parts:
+        state[part.rows], status[part.rows] = part.picked.state, part.gathered.status
+        absent = part.rows[part.picked.state == ABSENT]
+        if part.picked.fault is not None and len(absent) and (fault is None or int(absent[0]) < fault[0]):
+            fault = int(absent[0]), part.picked.fault
+        if part.gathered.status.any():
+            reasons[int(part.rows[np.flatnonzero(part.gathered.status)[0]])] = part.gathered.reason
+    if plan.array.field.whole:
+        count = np.where((state == THERE) & (status == 0), np.int64(0), np.int64(-1))
+        values = _table(parts, count, gather)
+    else:
+        count, values = None, np.full(len(state), math.nan)
+        for part in parts:
+            values[part.rows] = part.picked.values
+    picked = Picked(values, count, state, fault[1] if fault else None)
+    return Gathered((picked,), status, reasons[min(reasons)] if reasons else "")
+
+
+def _table(parts: list[_Part], count: IntArray, gather: Gather) -> FloatArray:
+    """A whole array's rows, as wide as the first that is not empty; the widths of all go into `count`."""
+    for part in parts:
+        if part.picked.count is not None:
+            count[part.rows] = part.picked.count
+    wide = np.flatnonzero(count > 0)
+    table = np.full((len(count), int(count[wide[0]]) if len(wide) else 1), math.nan)
+    for part in parts:
+        rows = part.rows[count[part.rows] == table.shape[1]]
+        if len(rows):  # the part's first one may be of another width
+            table[rows] = gather(rows, part.field).picked[0].values
+    return table
 
 
 class Finder(Protocol):
@@ -194,3 +283,74 @@ def stamp_times(found: Found, places: tuple[Place, ...]) -> tuple[IntArray, npt.
     there[rows] = True
     times[rows] = whole[usable].astype(np.int64) * 10**9 + rest[usable].astype(np.int64)
     return times, there
+
+
+def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
+    """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
+    layout = schema.root
+    place: Place = ()
+    arrays: list[tuple[Place, int]] = []
+    last = len(field.steps) - 1
+    for i, (name, index) in enumerate(field.steps):
+        member = layout.member(name)
+        if member is None:
+            raise FieldMissingError(f"there is no '{name}'", layout.names)
+        parent, place = place, (*place, name)
+        if index is not None and member.array is None:
+            raise FieldMissingError(f"'{name}' is not an array", [name])
+        if index == WHOLE or (i == last and index is not None):
+            names = _names_of(index or "", layout, parent)
+            _require_number(field, member)
+            return Plan(field, place, index, tuple(arrays), names)
+        if member.array is not None and index is None:
+            raise FieldMissingError(
+                f"'{field.text}' is an array" if i == last else f"there is no '{field.steps[i + 1][0]}'",
+                [f"{field.text}[0]", f"{field.text}[:]"] if i == last else (),
+            )
+        if index is not None:
+            if isinstance(member.kind, Message) and schema.nested(member.kind).entry:
+                raise FieldMissingError(
+                    f"'{name}' is a map, whose entries have no order", advice="log the value in a field of its own"
+                )
+            if not is_element_number(index):
+                plan = NamedPlan(Plan(field, place, index, tuple(arrays), _named_place(layout, parent)), i)
+                resolve(numbered(field, i, 0), schema)  # whichever element it is, what follows it must be there
+                return plan
+            arrays.append((place, int(index)))
+            place = (*place, int(index))
+        if i == last:
+            _require_number(field, member)
+            return Plan(field, place, None, tuple(arrays))
+        layout = schema.nested(member.kind) if isinstance(member.kind, Message) else _NO_MEMBERS
+    raise FieldMissingError(f"'{field.text}' names nothing")
+
+
+def _require_number(field: Field, member: Member) -> None:
+    if isinstance(member.kind, Text):
+        raise FieldMissingError(f"'{field.text}' holds a text, not a number")
+    if isinstance(member.kind, Message):
+        raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
+
+
+def _names_of(index: str, layout: Layout, parent: Place) -> Place | None:
+    """Return the place of the texts that name an array's elements; None where its index needs none."""
+    if index == WHOLE:
+        return names_place(layout, parent)
+    return None if is_element_number(index) else _named_place(layout, parent)
+
+
+def _named_place(layout: Layout, parent: Place) -> Place:
+    """The place of the texts that must be there; raises FieldMissingError."""
+    place = names_place(layout, parent)
+    if place is None:
+        problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
+        raise FieldMissingError(problem, layout.names)
+    return place
+
+
+def names_place(layout: Layout, parent: Place) -> Place | None:
+    """The place of the texts `name` beside an array; None where it is missing."""
+    member = layout.member("name")
+    if member is None or member.array is None or not isinstance(member.kind, Text):
+        return None
+    return (*parent, "name")

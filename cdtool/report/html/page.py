@@ -1,7 +1,7 @@
-"""The report as one HTML file that loads nothing: tables, plots drawn by its own script, traces of single recordings.
+"""The report as one HTML file that loads no other: tables, plots drawn by its own script, traces of single recordings.
 
 Conventions: text from logs is escaped by the template or put into the page as text by the script, never as markup. A
-content security policy allows this script and this style alone, by their hashes.
+content security policy allows only this script and this style, by their hashes.
 """
 
 from __future__ import annotations
@@ -9,32 +9,16 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdtool.evaluation.alike import alike
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
-from cdtool.report.few_contacts import explained
-from cdtool.report.figure_text import NOTHING, number
-from cdtool.report.html.plots import plot_data
-from cdtool.report.html.recordings import not_judged_table, reasons_table, recordings_table, traces_of
-from cdtool.report.html.table import Table, seen
-from cdtool.report.html.tables import (
-    calibration_table,
-    comparisons_table,
-    force_counts,
-    force_table,
-    limits_table,
-    points_table,
-    provenance_tables,
-    summary_table,
-)
+from cdtool.report.html.page_tables import PageTable, classes, visible
+from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.traces import plot_height, trace_data
-from cdtool.report.verdict_words import NO_CERTIFICATE, counts_words, tone, verdict_words
+from cdtool.report.model import NO_CERTIFICATE, TITLES
+from cdtool.report.writers.base import Report
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -43,6 +27,11 @@ if TYPE_CHECKING:
 _FOLDER = Path(__file__).with_name("page_files")
 # Lines under the headline.
 _REASONS = 10
+# The model's tables that the page shows; single contacts are in its recordings and their traces.
+_TABLES = (
+    *("not_met", "met", "results", "comparisons", "force", "points", "forces", "recordings", "not_assessable"),
+    *("skipped", "findings", "calibration"),
+)
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.
 _SCRIPTS = ("scales.js", "chart.js", "legend.js", "plots.js", "forces.js", "trace.js", "tables.js", "report.js")
@@ -50,75 +39,33 @@ _SCRIPTS = ("scales.js", "chart.js", "legend.js", "plots.js", "forces.js", "trac
 _ESCAPES = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"})
 
 
-def to_html(evaluated: Evaluated, traces: Sequence[Trace]) -> str:
-    """The whole report; the same text for the same input."""
+def to_html(report: Report) -> str:
+    """Return the whole report; the same text for the same input."""
     from markupsafe import Markup
 
-    results = evaluated.results
+    model, results, traces = report.model, report.evaluated.results, report.traces
     style, script = _read(_STYLE), "\n".join(_read(name) for name in _SCRIPTS)
-    opens = traces_of(results, traces)
-    detectors = {name: i for i, name in enumerate(results.detectors)}
-    tables = _tables(evaluated, opens)
-    plots = plot_data(evaluated, traces)
+    of_logs, numbers = traces_of(results, traces), {name: i for i, name in enumerate(results.detectors)}
+    tables = {name: PageTable(model.tables[name], of_logs) if name in model.tables else None for name in _TABLES}
+    plots = plot_data(report)
     paged = [table.values() for table in tables.values() if table and table.paged]
     return _template().render(
         policy=_policy(script, style),
         style=Markup(style),
         script=Markup(script),
         data=_json({**plots, "tables": paged}),
-        traces=[_json(trace_data(trace, detectors)) for trace in traces],
+        traces=[_json(trace_data(trace, numbers)) for trace in traces],
         trace_height=plot_height(traces[0]) if traces else 0,
-        tables=tables,
-        provenance=provenance_tables(results),
-        plots=plots,
-        verdict=verdict_words(evaluated),
-        counts=counts_words(evaluated),
-        tone=tone(evaluated),
-        reasons=results.conclusion.reasons[:_REASONS],
-        more_reasons=max(len(results.conclusion.reasons) - _REASONS, 0),
+        kept=f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
+        model=model,
+        titles=TITLES,
         certificate=NO_CERTIFICATE,
-        lines=_lines(evaluated, traces),
-        version=results.provenance.get("tool_version", ""),
-        machine=results.provenance.get("machine", ""),
-        NOTHING=NOTHING,
+        tables=tables,
+        provenance=[PageTable(table, {}) for table in model.provenance],
+        plots=plots,
+        reasons=model.first_reasons(_REASONS),
+        classes=classes,
     )
-
-
-def _tables(evaluated: Evaluated, opens: dict[tuple[str, str], list[int]]) -> dict[str, Table | None]:
-    """The tables by what the template calls them; None where there are no rows."""
-    results = evaluated.results
-    made = {
-        "limits": limits_table(results, met=False),
-        "met": limits_table(results, met=True),
-        "figures": summary_table(evaluated),
-        "comparisons": comparisons_table(evaluated),
-        "force_counts": force_counts(results),
-        "forces": force_table(results, opens),
-        "points": points_table(results),
-        "recordings": recordings_table(results, opens),
-        "not_judged": not_judged_table(results),
-        "skipped": reasons_table("skipped-table", "Left out or lost", alike(results.skipped)),
-        "findings": reasons_table("findings-table", "Odd, but used", alike(results.findings)),
-        "calibration": calibration_table(results),
-    }
-    return {name: table if table.rows else None for name, table in made.items()}
-
-
-def _lines(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, str]:
-    """Sentences that the template needs."""
-    results = evaluated.results
-    provenance = results.provenance
-    resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
-    return {
-        "onset": str(provenance.get("onset") or "rule not stated"),
-        "few": explained(evaluated.summaries),
-        "label_file": str(provenance.get("label_file") or ""),
-        "resolution": f"{number(max(resolutions))} ms" if resolutions else "",
-        "recordings": counted(len(results.recordings), "recording"),
-        "detectors": counted(len(results.detectors), "detector"),
-        "kept": f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
-        "skipped": counted(len(results.skipped), "entry") if results.skipped else "",
-    }
 
 
 def _policy(script: str, style: str) -> str:
@@ -133,7 +80,7 @@ def _hash(text: str) -> str:
 
 
 def _json(values: Any) -> Markup:
-    """Strict JSON that may stand in a script element; its texts are plain already."""
+    """Return strict JSON that may be part of a script element; its texts are plain already."""
     from markupsafe import Markup
 
     text = json.dumps(values, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
@@ -151,7 +98,7 @@ def _template() -> Template:
     from markupsafe import Markup
 
     def harmless(value: object) -> object:
-        return seen(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, finalize=harmless, trim_blocks=True, lstrip_blocks=True

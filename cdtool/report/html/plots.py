@@ -1,13 +1,14 @@
-"""What the HTML report's plots show, as compact JSON: columns of numbers, names as places in a list."""
+"""The data of the HTML report's plots as compact JSON: columns of numbers, names as positions in a list."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from cdtool.evaluation.evaluated import Evaluated
+from cdtool.detection import REASONS
 from cdtool.evaluation.results import ContactResult, Results, SweepResult
 from cdtool.evaluation.statistics.kaplan_meier import survival
 from cdtool.evaluation.statistics.rates import poisson_at_most
@@ -16,12 +17,16 @@ from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.report.few_contacts import draws_no_interval
-from cdtool.report.figure_text import number, spoken, with_interval
-from cdtool.report.html.recordings import Log, log_of, logs_of
-from cdtool.report.html.table import short, shown
-from cdtool.report.html.tables import part_of
+from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS
+from cdtool.report.model import AXES
+from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
+from cdtool.report.table import Log
+from cdtool.report.table import shown as named
+from cdtool.report.tables.recordings import log_of, logs_of
+from cdtool.report.tables.results import part_of
+from cdtool.report.writers.base import Report
 
 # Heights [px] of a detector's lane in the latency plot and of the other plots.
 LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
@@ -29,9 +34,9 @@ LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
 Contacts = Mapping[tuple[str, str], Sequence[ContactResult]]
 
 
-def plot_data(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, Any]:
-    """Everything that the plots need but the traces themselves."""
-    results = evaluated.results
+def plot_data(report: Report) -> dict[str, Any]:
+    """Return everything that the plots need except the traces themselves."""
+    results = report.evaluated.results
     contacts: dict[tuple[str, str], list[ContactResult]] = {}
     for item in results.scored_contacts:
         contacts.setdefault((item.group, item.detector), []).append(item)
@@ -40,10 +45,12 @@ def plot_data(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, Any]:
         "groups": [shown(group) for group in results.groups],
         "recordings": [shown(item.recording) for item in results.recordings],
         "heights": HEIGHTS,
-        "latency": _latency(evaluated, contacts),
+        "axes": AXES,
+        "reasons": REASONS,
+        "latency": _latency(results, report.evaluated.summaries, contacts),
         "survival": _survival(results, contacts),
         "amoc": _amoc(results),
-        "force": _force(results, traces),
+        "force": _force(report),
     }
 
 
@@ -54,18 +61,31 @@ def _detector(results: Results, name: str) -> dict[str, str]:
 
 
 def css_colour(colour: str) -> str:
-    """A colour of the figures as a page writes it; they also name greys by their lightness, as "0.35"."""
+    """Return a colour of the figures in CSS; the figures also name greys by their lightness, as "0.35"."""
     if colour.startswith("#"):
         return colour
     return f"#{round(255.0 * float(colour)):02x}" + 2 * f"{round(255.0 * float(colour)):02x}"
 
 
-def _latency(evaluated: Evaluated, contacts: Contacts) -> list[dict[str, Any]]:
-    results = evaluated.results
+def traces_of(results: Results, traces: Sequence[Trace]) -> dict[Log, list[int]]:
+    """Return the numbers of the traces of each log: one per operation that was kept."""
+    logs = logs_of(results)
+    numbers: dict[Log, list[int]] = {}
+    for number_of, trace in enumerate(traces):
+        numbers.setdefault(log_of(trace.group, trace.recording, logs), []).append(number_of)
+    return numbers
+
+
+def shown(name: object) -> str:
+    """Return a name from a file as a visible text."""
+    return visible(named(name))
+
+
+def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts) -> list[dict[str, Any]]:
     recordings = {(item.group, item.recording): i for i, item in enumerate(results.recordings)}
     detectors = {name: i for i, name in enumerate(results.detectors)}
     found: dict[str, dict[str, Any]] = {}
-    for item in evaluated.summaries:
+    for item in summaries:
         if not item.contacts:
             continue
         rows = contacts[item.group, item.detector]
@@ -90,7 +110,7 @@ def _latency(evaluated: Evaluated, contacts: Contacts) -> list[dict[str, Any]]:
 
 
 def _median(item: Summary) -> tuple[float, ...]:
-    """The median with its interval; alone where a plot draws none."""
+    """Return the median with its interval; only the median if a plot draws none."""
     median = item.median
     return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
 
@@ -104,7 +124,7 @@ def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
             if not len(latency):
                 continue
             curve = survival(latency, censored)
-            # A step begins where the share changes; of the others only the band's end is worth keeping.
+            # A step begins where the share changes; the other points show nothing new.
             kept = np.flatnonzero(np.diff(curve.share, prepend=2.0))
             keys = ("times", "share", *(("low", "high") if len(latency) >= FEWEST else ()))
             columns = {key: _numbers(getattr(curve, key)[kept]) for key in keys}
@@ -131,7 +151,7 @@ def _amoc(results: Results) -> list[dict[str, Any]]:
 
 
 def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
-    """A detector's points by factor; `chosen` is the place of the factor in use."""
+    """Return a detector's points by factor; `chosen` is the position of the factor in use."""
     first = points[0]
     factors = np.array([item.safety_factor for item in points])
     return {
@@ -151,14 +171,15 @@ def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
     }
 
 
-def _force(results: Results, traces: Sequence[Trace]) -> list[dict[str, Any]]:
-    """For each group with a force profile its staircase, and which contacts of which traces have a verdict."""
+def _force(report: Report) -> list[dict[str, Any]]:
+    """Return for each group with a force profile its limits, and which contacts of which traces have a verdict."""
+    results = report.evaluated.results
     numbers = {(item.group, item.recording, item.onset_s): item.contact for item in results.contacts}
     verdicts = {(item.group, item.recording, item.contact): item for item in results.forces}
     logs = logs_of(results)
     curves: dict[str, list[dict[str, Any]]] = {}
-    for i, trace in enumerate(traces):
-        log: Log = log_of(trace.group, trace.recording, logs)
+    for i, trace in enumerate(report.traces):
+        log = log_of(trace.group, trace.recording, logs)
         for place, contact in enumerate(trace.contacts):
             verdict = verdicts.get((*log, numbers.get((*log, contact.start), 0)))
             if verdict is None or not len(trace.force):
@@ -172,26 +193,24 @@ def _force(results: Results, traces: Sequence[Trace]) -> list[dict[str, Any]]:
                     "budget": short(verdict.time_budget_ms),
                 }
             )
-    found = []
+    panels = []
     for group, profile in part_of(results.provenance, "force_profiles").items():
         if group in curves:
             steps = [
                 [short(step["from_s"]), short(step["at_most_n"]), plain(step["name"])] for step in profile["steps"]
             ]
             count = sum(item.group == group for item in results.forces)
-            words = {key: plain(profile.get(key) or "") for key in ("title", "source", "note")}
-            found.append(
+            panels.append(
                 {
                     "group": shown(group),
-                    **words,
-                    "checked": bool(profile.get("checked")),
+                    "profile": {key: plain(text) for key, text in asdict(report.model.profiles[group]).items()},
                     "steps": steps,
                     "curves": curves[group],
                     "contacts": count,
                     "height": PLOT_HEIGHT,
                 }
             )
-    return found
+    return panels
 
 
 def _numbers(values: np.ndarray) -> list[float | int | None]:

@@ -1,4 +1,4 @@
-"""Markdown that is made of text from files: cells, tables, and sections that can be cut to a length."""
+"""Markdown of tables and text from files: cells, tables, and sections that can be cut to a length."""
 
 from __future__ import annotations
 
@@ -8,49 +8,41 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 from cdtool.plain_text import counted, plain, shorten
+from cdtool.report.table import Cell, Column, Table
 
-_ACTIVE = re.compile(r"([\\`*\[\]<>|&$#~:!]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9]))")
+# A colon followed by a space is part of a sentence; others begin an emoji or are part of an address.
+_ACTIVE = re.compile(r"([\\`*\[\]<>|&$#~!]|:(?! )|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9]))")
 # GitHub and GitLab look for @name and #12 in the rendered text, where no escape is left: only another character helps.
 _REFERENCE = re.compile(r"([@#])(?=\w)")
 _NO_WIDTH = "\u200b"
 _ADDRESS = re.compile(r"(www)\.", re.IGNORECASE)
-# A name of a sensible log is shorter; results.json has it whole.
+# A usual name of a log is shorter; results.json has all of it.
 _LONGEST_CELL = 200
 _BLANK = "\n\n"
+# Lines of a table before its rows.
+_HEAD = 2
 
 
-def escape(text: object, longest: int = _LONGEST_CELL) -> str:
-    """Text from a file so that Markdown shows it as it is: no markup, no link, no mention, no end of a table's row."""
-    shown = shorten(plain(text), longest)
+def escape(text: object, longest: int | None = _LONGEST_CELL) -> str:
+    """Return text for Markdown to show as it is, cut to `longest`: no markup, link, mention or end of a table's row."""
+    shown = plain(text) if longest is None else shorten(plain(text), longest)
     escaped = _REFERENCE.sub(rf"\1{_NO_WIDTH}", _ACTIVE.sub(r"\\\1", shown))
     return _ADDRESS.sub(r"\1&#46;", escaped)
 
 
-@dataclass(frozen=True)
-class Table:
-    """Headings and rows of cells that are escaped already; `numeric`: all but the first column aligned to the right."""
-
-    headings: Sequence[str]
-    rows: Sequence[Sequence[object]]
-    numeric: bool = False
-
-    @property
-    def head(self) -> str:
-        """The line of headings and the rule."""
-        rule = ["---"] + ["---:" if self.numeric else "---"] * (len(self.headings) - 1)
-        return f"{_line(self.headings)}\n{_line(rule)}"
-
-    @property
-    def lines(self) -> list[str]:
-        """The rows."""
-        return [_line(row) for row in self.rows]
+def table_lines(table: Table) -> list[str]:
+    """Return the table as Markdown, line by line: headings, rule, rows."""
+    rule = ("---:" if column.numeric else "---" for column in table.columns)
+    headings = (column.heading for column in table.columns)
+    rows = (map(_cell, row, table.columns) for row in table.rows)
+    return [_line(cells) for cells in (headings, rule, *rows)]
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading (folded: a line to click on) with text, a table and more text; `source`: its rows in results.json.
+    """A heading (folded: a line to click on) with text, a table and more text.
 
-    The title is in this program's words or escaped; that of a folded one holds no text from files at all.
+    The title is escaped; the title of a folded section contains no text from files at all.
     """
 
     title: str
@@ -58,41 +50,41 @@ class Section:
     table: Table | None = None
     tail: str = ""
     folded: bool = False
-    source: str = ""
     whole: str = field(init=False)
+    lines: Sequence[str] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "whole", self._made(self.table.lines if self.table else []))
+        object.__setattr__(self, "lines", table_lines(self.table) if self.table else [])
+        object.__setattr__(self, "whole", self._with(self.lines))
 
     def within(self, room: int) -> str:
-        """As many of its rows as `room` characters hold, with a line that counts them; empty where not one does."""
+        """Return as many of its rows as `room` characters hold, with a line that counts them; empty without any row."""
         if len(self.whole) <= room:
             return self.whole
-        lines = self.table.lines if self.table else []
-        frame = len(self._made([], self._cut_words(len(lines))))
-        ends = accumulate(len(line) + 1 for line in lines)
+        head, rows = self.lines[:_HEAD], self.lines[_HEAD:]
+        frame = len(self._with(head, self._cut_note(len(rows))))
+        ends = accumulate(len(line) + 1 for line in rows)
         kept = sum(frame + end <= room for end in ends)
-        return self._made(lines[:kept], self._cut_words(kept)) if kept else ""
+        return self._with([*head, *rows[:kept]], self._cut_note(kept)) if kept else ""
 
-    def _made(self, lines: Sequence[str], cut: str = "") -> str:
-        table = "\n".join([self.table.head, *lines]) if self.table else ""
-        parts = [part for part in (self.lead, table, cut, self.tail) if part]
+    def _with(self, lines: Sequence[str], cut: str = "") -> str:
+        parts = [part for part in (self.lead, "\n".join(lines), cut, self.tail) if part]
         if self.folded:
             parts = [f"<details>\n<summary>{self.title}</summary>", *parts, "</details>"]
         elif self.title:
             parts = [f"## {self.title}", *parts]
         return _BLANK.join(parts)
 
-    def _cut_words(self, kept: int) -> str:
-        count = len(self.table.rows) if self.table else 0
-        return f"*Cut here: {kept} of {counted(count, 'row')}; all of them are in results.json (`{self.source}`).*"
+    def _cut_note(self, kept: int) -> str:
+        count, source = (len(self.table.rows), self.table.source) if self.table else (0, "")
+        return f"*Cut here: {kept} of {counted(count, 'row')}; all of them are in results.json (`{source}`).*"
 
 
 def fitted(head: str, tiers: Sequence[Sequence[Section]], most: int) -> str:
-    """The head and every section in order, in at most `most` characters.
+    """Return the head and every section in order, in at most `most` characters.
 
-    Where they are longer, a tier takes what it needs before the next one does, and within a tier a short section is
-    whole before a long one has more than its share.
+    If they are longer, each tier takes what it needs before the next, and within a tier short sections are complete
+    before a long one takes more than its share.
     """
     sections = [section for tier in tiers for section in tier]
     text = _joined([head, *(section.whole for section in sections)])
@@ -124,5 +116,11 @@ def _joined(parts: Iterable[str]) -> str:
     return _BLANK.join(part for part in parts if part) + "\n"
 
 
-def _line(cells: Sequence[object]) -> str:
-    return f"| {' | '.join(map(str, cells))} |"
+def _cell(cell: Cell, column: Column) -> str:
+    """Return the cell in one line; bold if it is an outcome that is not good."""
+    text = escape(cell.line)
+    return f"**{text}**" if column.choice and cell.tone in ("bad", "unknown") else text
+
+
+def _line(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"

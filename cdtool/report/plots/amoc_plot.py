@@ -1,6 +1,6 @@
-"""Median latency against false alarms, with the limits of every detector moved (AMOC): a panel a group.
+"""Median latency against false alarms, with the limits of every detector moved (AMOC): a panel per group.
 
-The horizontal axis has rates, and left of them a zone without a false alarm.
+The horizontal axis shows rates; to their left is a zone for points without a false alarm.
 """
 
 from __future__ import annotations
@@ -17,8 +17,19 @@ from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
-from cdtool.report.figure_text import NOTHING, number
-from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.model import AXES
+from cdtool.report.number_text import NOTHING, number
+from cdtool.report.plots.figures import (
+    Margins,
+    between,
+    drawing,
+    label,
+    new_figure,
+    save,
+    stacked_panels,
+    text_width,
+    write,
+)
 from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
 from cdtool.report.plots.side_table import Column, SideTable, key_height
@@ -44,9 +55,9 @@ _ZONE = 0.27
 
 
 def plot_amoc(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel a group and a curve a detector; raises UsageError, CdtoolError (see `save`).
+    """Draw a panel per group and a curve per detector; raises UsageError, CdtoolError (see `save`).
 
-    A lower curve is better. Left of the first rate that can be seen nothing is known but a bound, which is written.
+    A lower curve is better. Left of the lowest observable rate only an upper bound is known, which is written.
     """
     with drawing():
         save(_figure(evaluated), path)
@@ -57,7 +68,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     groups = list(dict.fromkeys(item.group for item in curves))
     if not groups:
         figure = new_figure(9.0, 1.2)
-        text = "no impact-free hold-out, or none that could be judged: no false alarms to hold against latencies"
+        text = "no impact-free hold-out, or none that is assessable: no false alarms to compare with latencies"
         figure.text(0.5, 0.5, text, ha="center", va="center")
         return figure
     rows = {group: [item for item in evaluated.summaries if item.group == group] for group in groups}
@@ -86,7 +97,7 @@ def _figure(evaluated: Evaluated) -> Figure:
 
 
 def _heights(axes: Axes, item: AmocCurve) -> FloatArray:
-    """Where the medians of a curve are drawn [ms]: on a logarithmic axis, those below its floor at the floor."""
+    """Return the medians of a curve as drawn [ms]: on a logarithmic axis at least its lower end."""
     medians = np.array([point.median for point in item.points])
     return np.maximum(medians, FLOOR_MS) if axes.get_yscale() == "log" else medians
 
@@ -119,7 +130,7 @@ def _draw_curve(axes: Axes, item: AmocCurve, frame: _RateFrame) -> None:
 
 
 def _segments(x: FloatArray, y: FloatArray, kept: np.ndarray) -> tuple[FloatArray, FloatArray]:
-    """The pieces between neighbouring points that are `kept`, with gaps between them."""
+    """Return the segments between neighbouring points that are `kept`, separated by NaN."""
     gap = np.full(int(kept.sum()), np.nan)
     across = np.column_stack((x[:-1][kept], x[1:][kept], gap))
     return across.ravel(), np.column_stack((y[:-1][kept], y[1:][kept], gap)).ravel()
@@ -146,7 +157,7 @@ def _mark_in_use(axes: Axes, item: AmocCurve, x: float) -> None:
 
 
 def _arrow_up(axes: Axes, place: tuple[float, float], colour: str) -> None:
-    """From a point upward: with the next safety factor the median is not reached."""
+    """Draw an arrow upward from a point: with the next safety factor the median is not reached."""
     axes.annotate("", place, xytext=(0.0, _ARROW), textcoords="offset points", arrowprops=_arrow(colour))
 
 
@@ -155,7 +166,7 @@ def _arrow(colour: str) -> dict[str, object]:
 
 
 def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: _RateFrame) -> None:
-    """Names where there are rates, from low ones on; in the zone without a false alarm there is no room."""
+    """Write the names of curves next to their rates, low ones first; the zone without a false alarm has no room."""
     named = []
     for item in curves:
         y = _heights(axes, item)
@@ -168,7 +179,7 @@ def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: _RateFrame) -> 
 
 
 def _by_median(rows: Sequence[Summary], curves: dict[str, AmocCurve]) -> list[Summary]:
-    """The fastest at its factor in use first; those without a median last."""
+    """Return the rows ordered by median latency with the factor in use; rows without a median are last."""
 
     def median(row: Summary) -> float:
         found = curves[row.detector].set_point.median if row.detector in curves else math.nan
@@ -200,7 +211,7 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: Am
 class _RateFrame:
     """The horizontal axis: a zone without a false alarm from `left` to `least`, then rates up to `most`.
 
-    In the zone each detector has a column of its own: a point's place there is no rate.
+    In the zone each detector has its own column: the position of a point in it does not mean a rate.
     """
 
     left: float
@@ -209,18 +220,18 @@ class _RateFrame:
     columns: tuple[str, ...]
 
     def x(self, detector: str, points: Sequence[AmocPoint]) -> FloatArray:
-        """Where the points of a detector are drawn."""
+        """Return the horizontal positions of a detector's points."""
         share = (self.columns.index(detector) + 0.5) / len(self.columns)
         column = self.left * (self.least / self.left) ** share
         return np.array([point.rate if point.false_alarms else column for point in points])
 
     def shade(self, axes: Axes) -> None:
-        """Mark the zone."""
+        """Colour the zone."""
         axes.axvspan(self.left, self.least, color=BAND, linewidth=0, zorder=0)
 
 
 def _rate_frame(curves: Sequence[AmocCurve]) -> _RateFrame:
-    """Rates begin a little below that of one single false alarm."""
+    """Return the axis; its rates begin slightly below that of a single false alarm."""
     exposures = [item.hours if item.per == "hour" else float(item.operations) for item in curves]
     least = 1.0 / max(exposures) / 1.6
     most = max([10.0 * least, *(1.6 * point.rate for item in curves for point in item.points)])
@@ -229,7 +240,7 @@ def _rate_frame(curves: Sequence[AmocCurve]) -> _RateFrame:
 
 
 def _set_rates(axes: Axes, frame: _RateFrame) -> None:
-    """Make the horizontal axis one of rates."""
+    """Set the horizontal axis to rates."""
     from matplotlib.ticker import FixedLocator, NullFormatter
 
     axes.set_xscale("log")
@@ -243,20 +254,20 @@ def _set_rates(axes: Axes, frame: _RateFrame) -> None:
 
 
 def _set_latencies(axes: Axes, low: float, high: float, logarithmic: bool) -> None:
-    """Make the vertical axis one of latencies [ms]."""
+    """Set the vertical axis to latencies [ms]."""
     if logarithmic:
         axes.set_yscale("log")
         set_ticks(axes.yaxis, low, high)
     # Room above the highest point for an arrow.
     axes.set_ylim(low, high * (high / low) ** 0.08 if logarithmic else 1.08 * high)
-    axes.set_ylabel("median latency [ms]")
+    axes.set_ylabel(AXES["median"])
     axes.grid(color="0.9", linewidth=0.6)
 
 
 def _explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
-    """Below the zone what no false alarm means, below the rates what they are and what the marks mean.
+    """Write below the zone what no false alarm means, below the rates their unit and the meaning of the marks.
 
-    `floored`: the axis of latencies is logarithmic, so that medians below its floor are drawn there.
+    `floored`: the axis of latencies is logarithmic, and medians below its lower end are drawn there.
     """
     hours, bounds = [item.hours for item in curves], [item.at_most for item in curves]
     per, counts = curves[0].per, sorted({item.operations for item in curves})
@@ -274,34 +285,23 @@ def _explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
         (rates, _ZONE + 0.5 * (1.0 - _ZONE), -22.0, 9.0, "center"),
         (_marks(curves, floored), 0.0, -46.0, 8.0, "left"),
     ):
-        axes.annotate(
-            text,
-            (share, 0.0),
-            xycoords="axes fraction",
-            xytext=(0.0, lift),
-            textcoords="offset points",
-            ha=side,
-            va="top",
-            fontsize=size,
-            linespacing=1.35,
-            annotation_clip=False,
-        )
+        write(axes, text, (share, 0.0), (0.0, lift), ha=side, va="top", fontsize=size, linespacing=1.35)
 
 
 def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:
     points = [point for item in curves for point in item.points]
-    words = ["mark: one safety factor, the large one is in use"]
+    words = ["each mark: a safety factor, the large one is in use"]
     if any(point.missed for point in points):
         words.append("open: contacts were missed")
     if any(math.isinf(point.median) for point in points):
-        words.append("arrow: the median is not reached, half of them or more were missed")
+        words.append("arrow: the median is not reached, at least half of the contacts were missed")
     if floored and any(point.median < FLOOR_MS for point in points):
         words.append(f"medians below {FLOOR_MS:.0f} ms are drawn there")
     return "; ".join(words)
 
 
 def write_amoc(report: Report, folder: Path) -> list[Image]:
-    """Draw amoc.png for a report folder, where limits were moved; raises CdtoolError (see `save`)."""
+    """Draw amoc.png for a report folder if limits were moved; raises CdtoolError (see `save`)."""
     if not report.evaluated.results.sweep:
         return []
     image = Image("amoc.png", "median latency against false alarms, with the limits of each detector moved")

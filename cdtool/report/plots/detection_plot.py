@@ -1,6 +1,6 @@
 """One log and one detector: signal and band, trigger and load cell over time (thesis figures 5.6 to 5.8).
 
-Above it stands one line that says in words what it shows.
+A line above it states the outcome in words.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cdtool.evaluation.truth.matching import Match
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import Contact
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
+from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -37,14 +37,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_PANELS = 6
-# A zoom is drawn where it shows less than this share of the log.
+# A zoom is drawn if it shows less than this share of the log.
 _ZOOM_SHARE = 0.4
 _BEFORE, _AFTER = 0.2, 0.6
 
 
 @dataclass(frozen=True)
 class _Event:
-    """What the zoom shows: a contact with the alarm that it was detected by, or an alarm alone."""
+    """What the zoom shows: a contact with the alarm that detected it, or only an alarm."""
 
     contact: Contact | None
     alarm: Alarm | None
@@ -57,7 +57,7 @@ class _Event:
 
 
 def plot_detected(found: Detected, path: Path) -> None:
-    """Draw one log: a panel a joint that alarms (else the leading joint), trigger, load cell, and a zoom on the event.
+    """Draw one log: a panel per joint that alarms (else the leading joint), trigger, load cell, zoom of the event.
 
     Raises UsageError, CdtoolError (see `save`).
     """
@@ -126,8 +126,8 @@ def _column(
         force = found.recording["force"]
         draw_force(rows[-1], force.time, force.values[:, 0], span, contact=bool(matches))
     for axes in rows:
-        for made in matches:
-            draw_onset(axes, made.contact.start, legend)
+        for event in matches:
+            draw_onset(axes, event.contact.start, legend)
         axes.set_xlim(span)
 
 
@@ -162,18 +162,9 @@ def _name_event(rows: list[Axes], joints: list[int], event: _Event) -> None:
 
 
 def _write_above(axes: Axes, time: float, text: str, side: str, *, bold: bool = False) -> None:
-    axes.annotate(
-        text,
-        (time, 1.0),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(0, 3),
-        textcoords="offset points",
-        ha=side,
-        va="bottom",
-        fontsize=9,
-        fontweight="bold" if bold else "normal",
-        annotation_clip=False,
-    )
+    weight = "bold" if bold else "normal"
+    frame = axes.get_xaxis_transform()
+    write(axes, text, (time, 1.0), (0, 3), frame, ha=side, va="bottom", fontsize=9, fontweight=weight)
 
 
 def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
@@ -196,7 +187,7 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
 
 
 def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:
-    """The joints that alarm, and those that are drawn."""
+    """Return the joints that alarm, and those that are drawn."""
     alarming = sorted({alarm.joint for item in found.detections for alarm in item.verdict.alarms})
     leading = sorted({item.leading for item in found.detections})
     return alarming, (alarming or leading)[:_MOST_PANELS]
@@ -225,23 +216,23 @@ def _overlap(detection: Detection, span: Span) -> bool:
 
 
 def _outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> str:
-    """Return what became of the contacts and alarms, what could not be judged, and which joints are drawn.
+    """Return the outcomes of contacts and alarms, what is not assessable, and which joints are drawn.
 
     Parameters
     ----------
     found : Detected
-        The log with what the detector says of each of its operations.
+        The log with the detector's results for each of its operations.
     alarming, joints : list of int
         The columns of the joints that alarm, and of those that are drawn.
 
     """
     matches = [item for matching in found.matchings for item in matching.matches]
     words = _words_of_contacts(matches) + _words_of_alarms(found, bool(matches))
-    blind = _words_of_unjudged(found)
-    if blind:
+    not_assessable = _words_of_not_assessable(found)
+    if not_assessable:
         words = [word for word in words if word not in ("no alarm", "not assessable")]
     operations = [counted(len(found.detections), "operation")] if len(found.detections) > 1 else []
-    return "  ·  ".join([*words, *blind, *operations, *_words_of_joints(found, alarming, joints)])
+    return "  ·  ".join([*words, *not_assessable, *operations, *_words_of_joints(found, alarming, joints)])
 
 
 def _words_of_contacts(matches: list[Match]) -> list[str]:
@@ -255,7 +246,7 @@ def _words_of_contacts(matches: list[Match]) -> list[str]:
 
 
 def _words_of_alarms(found: Detected, has_contacts: bool) -> list[str]:
-    """Beside contacts only the alarms that belong to none are worth a word."""
+    """Return the number of alarms; with contacts, of those that do not belong to any."""
     if has_contacts:
         extra = sum(len(matching.false_alarms) for matching in found.matchings)
         return [counted(extra, "false alarm")] if extra else []
@@ -263,19 +254,19 @@ def _words_of_alarms(found: Detected, has_contacts: bool) -> list[str]:
     return [counted(alarms, "alarm") if alarms else "no alarm"]
 
 
-def _words_of_unjudged(found: Detected) -> list[str]:
-    unjudged = [item for item in found.detections if item.verdict.outcome == "not_assessable"]
-    if not unjudged:
+def _words_of_not_assessable(found: Detected) -> list[str]:
+    not_assessable = [item for item in found.detections if item.verdict.outcome == "not_assessable"]
+    if not not_assessable:
         return []
     operations = len(found.detections)
-    share = f" in {len(unjudged)} of {operations} operations" if operations > 1 else ""
-    return [f"not assessable{share}: {label(unjudged[0].verdict.reason, 70)}"]
+    share = f" in {len(not_assessable)} of {operations} operations" if operations > 1 else ""
+    return [f"not assessable{share}: {label(not_assessable[0].verdict.reason, 70)}"]
 
 
 def _words_of_joints(found: Detected, alarming: list[int], joints: list[int]) -> list[str]:
     if len(alarming) > len(joints):
         return [f"{len(joints)} of {len(alarming)} alarming joints shown"]
     if len(found.joints) > len(joints):
-        which = "those that alarm" if alarming else "the leading one"
+        which = "those that alarm" if alarming else "the leading joint"
         return [f"{len(joints)} of {len(found.joints)} joints shown: {which}"]
     return []

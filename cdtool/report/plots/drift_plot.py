@@ -13,7 +13,7 @@ from cdtool.evaluation.upkeep.words import verdicts
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
-from cdtool.report.plots.style import DEVIATION_COLOURS, LIMIT, UNJUDGED
+from cdtool.report.plots.style import DEVIATION_COLOURS, LIMIT, NOT_ASSESSED
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _RUN, _ALARM, _PLACE = "#0072B2", "#D55E00", "#B0569B"
 _MOST_JOINTS = 3
 _WIDTH, _HEIGHTS = 8.5, (1.5, 1.5, 2.4)
-# The map's colours reach at least so many spreads, so that noise stays pale.
+# The colour scale of the map spans at least this many spreads, so that noise is pale.
 _LEAST_RANGE = 2.0
 _VERDICTS, _LINE = 4, 105
 
@@ -31,7 +31,7 @@ _VERDICTS, _LINE = 4, 105
 def plot_drift(audit: DriftAudit, path: Path) -> None:
     """Draw up to three joints, those with a change first; raises UsageError, CdtoolError (see `save`).
 
-    A growing obstruction is a stripe along the runs in the map, a drift of the whole stroke a change of its colour.
+    In the map a growing obstruction is a stripe along the runs, and a drift of the whole stroke a change of its colour.
     """
     with drawing():
         save(_figure(audit), path)
@@ -39,10 +39,10 @@ def plot_drift(audit: DriftAudit, path: Path) -> None:
 
 def _figure(audit: DriftAudit) -> Figure:
     joints = sorted(audit.joints, key=lambda item: (not item.shown, -_largest_margin(item)))[:_MOST_JOINTS]
-    told = [line for joint in joints for line in _told(joint, named=len(audit.joints) > 1)]
+    lines = [line for joint in joints for line in _verdict_lines(joint, named=len(audit.joints) > 1)]
     heading = [
         f"{audit.motion.described}, {counted(len(audit.names), 'run')}, safety factor {audit.safety_factor:.4g}",
-        *told,
+        *lines,
     ]
     if len(joints) < len(audit.joints):
         heading.append(f"{counted(len(audit.joints) - len(joints), 'more joint', 'are')} not drawn")
@@ -67,7 +67,7 @@ def _figure(audit: DriftAudit) -> Figure:
     return figure
 
 
-def _told(joint: JointDrift, *, named: bool) -> list[str]:
+def _verdict_lines(joint: JointDrift, *, named: bool) -> list[str]:
     name = f"{label(joint.joint, 24)}: " if named else ""
     return [f"{name}{label(line, 220)}" for line in verdicts(joint)[:_VERDICTS]]
 
@@ -81,7 +81,7 @@ def _numbers(joint: JointDrift) -> FloatArray:
 
 
 def _draw_margin(axes: Axes, joint: JointDrift) -> None:
-    """The share of the limit that each run came to, debounced; alarmed runs apart."""
+    """Draw the largest debounced share of the limit in each run; runs with an alarm have their own mark."""
     used = np.array([100.0 * run.margin_used for run in joint.runs])
     alarm = np.array([run.alarm for run in joint.runs])
     numbers = _numbers(joint)
@@ -95,19 +95,19 @@ def _draw_margin(axes: Axes, joint: JointDrift) -> None:
 
 
 def _draw_deviation(axes: Axes, joint: JointDrift) -> None:
-    """The whole stroke's deviation run by run, with what is shown of it; the place that changes beside it."""
+    """Draw the deviation of the whole stroke by run with its drift or step, and that of the location that changes."""
     numbers = _numbers(joint)
     axes.axhline(0.0, color="0.8", linewidth=0.8)
     axes.plot(numbers, [run.overall for run in joint.runs], "o", color=_RUN, markersize=3.5)
     if joint.overall is not None:
-        _draw_course(axes, joint, _RUN)
+        _draw_change(axes, joint, _RUN)
     if joint.local is not None and joint.local.place is not None:
         axes.plot(numbers, joint.at_place(joint.local.place), "D", color=_PLACE, markersize=3)
     axes.set_ylabel("deviation\n[spreads]")
     axes.grid(axis="y", color="0.92", linewidth=0.6)
 
 
-def _draw_course(axes: Axes, joint: JointDrift, colour: str) -> None:
+def _draw_change(axes: Axes, joint: JointDrift, colour: str) -> None:
     trend, step = joint.course.trend, joint.course.step
     runs = np.arange(len(joint.runs), dtype=np.float64)
     if joint.course.kind == "drift" and trend is not None:
@@ -123,7 +123,7 @@ def _draw_course(axes: Axes, joint: JointDrift, colour: str) -> None:
 
 
 def _draw_map(axes: Axes, audit: DriftAudit, joint: JointDrift, reach: float) -> Any:
-    """Place over run, the deviation as colour; hatched where nothing was valid."""
+    """Draw the deviation as colour by location and run; hatched where no sample was valid."""
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.ticker import MaxNLocator
 
@@ -132,7 +132,7 @@ def _draw_map(axes: Axes, audit: DriftAudit, joint: JointDrift, reach: float) ->
     low, high = (float(places[0]) - half, float(places[-1]) + half) if len(places) else (0.0, 1.0)
     axes.set_facecolor("white")
     axes.patch.set_hatch("////")
-    axes.patch.set_edgecolor(UNJUDGED)
+    axes.patch.set_edgecolor(NOT_ASSESSED)
     image = axes.imshow(
         joint.deviation.T if joint.deviation.size else np.full((1, len(joint.runs)), np.nan),
         cmap=LinearSegmentedColormap.from_list("deviation", DEVIATION_COLOURS),
@@ -153,7 +153,7 @@ def _draw_map(axes: Axes, audit: DriftAudit, joint: JointDrift, reach: float) ->
 
 
 def _range(deviation: FloatArray) -> float:
-    """What nearly all of the map is within; single cells may be deeper in colour than the scale goes."""
+    """Return the range that nearly all of the map is within; single cells may exceed the colour scale."""
     known = np.abs(deviation[np.isfinite(deviation)])
     return float(np.quantile(known, 0.995)) if len(known) else 0.0
 
@@ -172,8 +172,8 @@ def _handles(joints: list[JointDrift]) -> list[Artist]:
         handles.append(Line2D([], [], color=_RUN, linewidth=1.4, label="drift or step shown"))
     if any(joint.local for joint in joints):
         handles.append(
-            Line2D([], [], color=_PLACE, marker="D", markersize=3, linestyle="none", label="the place that changes")
+            Line2D([], [], color=_PLACE, marker="D", markersize=3, linestyle="none", label="location that changes")
         )
     if any(np.isnan(joint.deviation).any() for joint in joints):
-        handles.append(Patch(facecolor="white", edgecolor=UNJUDGED, hatch="////", label="not judged"))
+        handles.append(Patch(facecolor="white", edgecolor=NOT_ASSESSED, hatch="////", label="not assessable"))
     return handles

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from cdtool.errors import UsageError
 from cdtool.files import write_bytes
 from cdtool.plain_text import plain, shorten
-from cdtool.report.figure_text import number
+from cdtool.report.number_text import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ _BACKENDS = {
     ".svg": "matplotlib.backends.backend_svg",
     ".pdf": "matplotlib.backends.backend_pdf",
 }
-# A date, or the version of a library, would make other bytes of the same figure.
+# A date or the version of a library would change the bytes of a figure with the same content.
 _METADATA: dict[str, dict[str, Any]] = {
     ".png": {"Software": "cdtool"},
     ".svg": {"Date": None, "Creator": "cdtool"},
@@ -59,34 +59,34 @@ _STYLE: dict[str, object] = {
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.05,
 }
-# Settings that are no appearance: a backend is never chosen here, and asking for some warns.
+# Settings other than appearance: a backend is never chosen here, and reading some of them warns.
 _NOT_STYLE = ("backend", "interactive", "toolbar", "timezone", "tk.", "webagg.", "keymap.", "docstring.", "savefig.dir")
 _LONGEST_NAME = 40
 
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """matplotlib's defaults and this project's style for a while, whatever the user's matplotlibrc says."""
+    """Apply matplotlib's defaults and this project's style within a `with`, whatever the user's matplotlibrc."""
     import matplotlib
 
     defaults: Any = matplotlib.rcParamsDefault
     settings: Any = {key: defaults[key] for key in defaults if not key.startswith(_NOT_STYLE)} | _STYLE
     with matplotlib.rc_context(settings), warnings.catch_warnings():
-        # A glyph that the font lacks is drawn as a box: nothing that a user could act on.
+        # A glyph that is missing from the font is drawn as a box: there is nothing that a user could do about it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         warnings.filterwarnings("ignore", message="Matplotlib currently does not support", category=UserWarning)
         yield
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of that size [inch] that arranges itself; to be used within `drawing()`."""
+    """Return an empty figure of a size [inch] that arranges itself; for use within `drawing()`."""
     from matplotlib.figure import Figure as NewFigure
 
     return NewFigure(figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
 class Margins(NamedTuple):
-    """Room around the panels of a figure [inch]."""
+    """Margins around the panels of a figure [inch]."""
 
     left: float
     right: float
@@ -97,9 +97,9 @@ class Margins(NamedTuple):
 def stacked_panels(
     width: float, heights: Sequence[float], margins: Margins, gap: float = 0.16
 ) -> tuple[Figure, list[Axes]]:
-    """A column of panels of those heights [inch] on one time axis, `gap` between them; only the last names its ticks.
+    """Return a column of panels of given heights [inch], `gap` apart, on one time axis that is labelled at the bottom.
 
-    Its places are given, not found by trial: it draws in half the time of a figure that arranges itself. To be used
+    Positions are given, not found by trial: it draws in half the time of a figure that arranges itself. For use
     within `drawing()`.
     """
     from matplotlib.figure import Figure as NewFigure
@@ -121,7 +121,7 @@ def stacked_panels(
 
 
 def text_width(texts: Iterable[str], size: float) -> float:
-    """Width of the widest line [inch] of texts at a font size [points]; within `drawing()`."""
+    """Return the width [inch] of the widest line of texts at a font size [points]; for use within `drawing()`."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
@@ -132,12 +132,12 @@ def text_width(texts: Iterable[str], size: float) -> float:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as its suffix says; raises UsageError for an unknown suffix, CdtoolError where it cannot."""
+    """Write a figure in the format of its suffix; raises UsageError for an unknown one, CdtoolError if it cannot."""
     from importlib import import_module
 
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise UsageError(f"{plain(path)} is no name for a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+        raise UsageError(f"{plain(path)} does not name a figure", f"a name that ends in {', '.join(SUFFIXES)}")
     canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)
     kind = suffix[1:]
     with drawing():
@@ -147,24 +147,36 @@ def save(figure: Figure, path: Path) -> None:
         write_bytes(path, drawn.getvalue())
 
 
+def write(
+    axes: Axes,
+    text: str,
+    at: tuple[float, float],
+    offset: tuple[float, float],
+    frame: Any = "axes fraction",
+    **look: Any,
+) -> None:
+    """Write a text at a position in `frame`, moved by `offset` [points]; never clipped. `look`: size, weight, side."""
+    axes.annotate(text, at, xycoords=frame, xytext=offset, textcoords="offset points", annotation_clip=False, **look)
+
+
 def label(text: object, length: int = 40) -> str:
-    """Text from a file as a figure shows it: plain and at most `length` characters."""
+    """Return a text from a file as a figure shows it: plain and at most `length` characters."""
     return shorten(plain(text), length)
 
 
 def between(low: float, high: float, digits: int = 3) -> str:
-    """One figure, or the two that several lie between: 38.0 to 41.0."""
+    """Return a number, or the smallest and largest of several: 38.0 to 41.0."""
     first, last = number(low, digits), number(high, digits)
     return first if first == last else f"{first} to {last}"
 
 
 def unit_label(unit: str) -> str:
-    """A unit as it is written in print."""
+    """Return a unit in its printed form."""
     return label({"m/s2": "m/s²", "rad/s2": "rad/s²", "1": "–"}.get(unit, unit), 16)
 
 
 def _settle(figure: Figure) -> None:
-    """Arrange once and round: the solver's last bits differ from run to run, and with them the bytes of an SVG."""
+    """Arrange once and round: the solver's last bits differ between runs, and so would the bytes of an SVG."""
     from matplotlib.transforms import Bbox
 
     engine = figure.get_layout_engine()
@@ -181,7 +193,7 @@ def _settle(figure: Figure) -> None:
 
 
 def slug(name: str, taken: set[str]) -> str:
-    """A file name's part for a group or detector: letters, digits, hyphens; unlike any in `taken`, and added to it."""
+    """Return a group or detector as part of a file name: letters, digits, hyphens; new among `taken`, and added."""
     letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     base = re.sub(r"[^a-z0-9]+", "-", letters.lower())[:_LONGEST_NAME].strip("-") or "unnamed"
     found, number = base, 1

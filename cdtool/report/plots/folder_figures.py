@@ -14,11 +14,11 @@ FOLDER_FIGURES = (
     "cdtool.report.plots.force_plot:write_forces",
     "cdtool.report.plots.trigger_plot:write_triggers",
 )
-"""In the order of a report: functions that write a figure into a folder, where there is something to show."""
+"""Functions that write a figure into a folder if there is something to show, in the order of a report."""
 
 
 def write_figures(report: Report, folder: Path) -> list[Image]:
-    """Draw every figure for which there is something to show; raises CdtoolError (see `save`)."""
+    """Draw all figures that have something to show; raises CdtoolError (see `save`)."""
     images: list[Image] = []
     for place in FOLDER_FIGURES:
         module, _, name = place.partition(":")

@@ -1,4 +1,4 @@
-"""Force over the time since the contact began, under the staircase of its limits: a panel a group of contacts."""
+"""Force over the time since the contact began, with its stepped limits: a panel per group of contacts."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
-from cdtool.report.plots.figures import drawing, label, new_figure, save, slug
+from cdtool.report.model import AXES
+from cdtool.report.plots.figures import drawing, label, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
-from cdtool.report.plots.style import BAND, HATCHES, LIMIT, UNJUDGED, look_of
+from cdtool.report.plots.style import BAND, HATCHES, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.writers.base import Image, Report
 
 if TYPE_CHECKING:
@@ -33,13 +34,13 @@ if TYPE_CHECKING:
 _WORST = "#A3123F"
 _EMPHASISED = 6
 _MOST_CURVES = 100
-_ALARMS_TOLD = 4
-# A record that reaches this share of the time axis is drawn as one that fills it.
+_ALARMS_LISTED = 4
+# A record that covers this share of the time axis is drawn as if it covered all of it.
 _WHOLE = 0.99
 _PIXELS = 700
 _UNSEEN = HATCHES[Status.GAP]
 _ORDER = ("fail", "not_assessable", "pass")
-# The first part of the time axis [s] is the shortest of these that shows what happens; what follows is compressed.
+# The first part of the time axis [s] is the shortest of these with alarms and first peak; the rest is compressed.
 _VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
 _VIEW_SHARE = 0.72
 _TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -66,10 +67,10 @@ class ForcePanel:
 
 
 def plot_forces(panels: Sequence[ForcePanel], profile: ForceProfile, path: Path) -> None:
-    """Draw a panel a group: its worst contact coloured, the others grey; raises UsageError, CdtoolError (see `save`).
+    """Draw a panel per group: its worst contact coloured, the others grey; raises UsageError, CdtoolError (see `save`).
 
-    The worst is the one that fails with the largest share of a limit. Right of the first grey line time is
-    compressed: each of the later limits has an equal width.
+    The worst contact fails with the largest share of a limit. Right of the first grey line time is compressed: each
+    of the later limits has an equal width.
     """
     with drawing():
         save(_figure(panels, profile), path)
@@ -79,7 +80,7 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
     shown = [panel for panel in panels if panel.curves]
     if not shown:
         figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact with a load-cell force: nothing to show", ha="center", va="center")
+        figure.text(0.5, 0.5, "no contact with a load-cell force", ha="center", va="center")
         return figure
     ranked = [sorted(panel.curves, key=_badness) for panel in shown]
     nodes = _time_nodes(ranked, profile)
@@ -90,12 +91,10 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
         _draw_limits(axes, profile, nodes)
         axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
         _draw_curves(axes, curves)
-        axes.set_ylabel("force [N]")
+        axes.set_ylabel(AXES["force"])
         axes.set_title(label(panel.group, 60), loc="left", fontweight="bold")
-        _tell(axes, curves)
-    rows[-1].set_xlabel(
-        "time from contact onset [ms]" + ("; compressed right of the first grey line" if len(nodes) > 2 else "")
-    )
+        _write_outcomes(axes, curves)
+    rows[-1].set_xlabel(AXES["time"] + ("; compressed right of the first grey line" if len(nodes) > 2 else ""))
     figure.suptitle(f"{label(profile.title, 70)}", fontsize=10, x=0.01, ha="left")
     footer = "evidence, not a certificate" + (f"; {profile.warning}" if profile.warning else "")
     figure.legend(
@@ -121,7 +120,7 @@ def _highest(curves: Sequence[ForceCurve]) -> float:
 
 
 def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> None:
-    """The staircase: what is allowed below it."""
+    """Draw the stepped limit and the allowed forces below it."""
     begins = [step.from_s for step in profile.steps]
     forces = [step.at_most_n for step in profile.steps]
     times, heights = [*begins, nodes[-1]], [*forces, forces[-1]]
@@ -130,7 +129,7 @@ def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> N
 
 
 def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile, nodes: Sequence[float]) -> None:
-    """Each step's limit; its name too where there is room for it, in the first part of the time axis."""
+    """Write the limit of each step, in the first part of the time axis with the name of the step."""
     ends = [*(step.from_s for step in profile.steps[1:]), nodes[-1]]
     names = [label(step.name, 22) if step.from_s < nodes[1] else "" for step in profile.steps]
     labels = [
@@ -141,15 +140,15 @@ def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile
 
 
 def _draw_curves(axes: Axes, curves: Sequence[ForceCurve]) -> None:
-    """The worst on top, the next ones grey, the rest paler."""
+    """Draw the worst contact on top, the next ones grey, the rest paler."""
     for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
-        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (UNJUDGED, 0.5)
+        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (NOT_ASSESSED, 0.5)
         kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, _PIXELS)
         axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
     worst = curves[0]
     end = axes.get_xlim()[1]
     if worst.verdict.end < _WHOLE * end:
-        axes.axvspan(worst.verdict.end, end, fill=False, edgecolor=UNJUDGED, linewidth=0, hatch=_UNSEEN, zorder=0.6)
+        axes.axvspan(worst.verdict.end, end, fill=False, edgecolor=NOT_ASSESSED, linewidth=0, hatch=_UNSEEN, zorder=0.6)
     seen = [step for step in worst.verdict.steps if math.isfinite(step.peak)]
     if seen:
         peak = max(seen, key=lambda step: step.peak)
@@ -184,8 +183,8 @@ def _point(axes: Axes, place: tuple[float, float], text: str, lift: float) -> No
     )
 
 
-def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
-    """Right of a panel: how many contacts keep the limits, and what became of the worst, step by step."""
+def _write_outcomes(axes: Axes, curves: Sequence[ForceCurve]) -> None:
+    """Write right of a panel how many contacts meet the limits, and each step of the worst contact."""
     worst = curves[0]
     outcomes = [curve.verdict.outcome for curve in curves]
     counts = ", ".join(
@@ -193,29 +192,19 @@ def _tell(axes: Axes, curves: Sequence[ForceCurve]) -> None:
     )
     lines = [f"{counted(len(curves), 'contact')}:", *fill(counts, 30).splitlines()]
     lines.append(f"worst: {label(worst.label, 26)}")
-    lines += [_told(step) for step in worst.verdict.steps]
+    lines += [_step_text(step) for step in worst.verdict.steps]
     if math.isfinite(worst.verdict.time_budget):
         lines.append(f"first exceeded after {1e3 * worst.verdict.time_budget:.1f} ms")
     alarms = sorted(worst.alarms.items(), key=lambda item: item[1])
-    lines += [f"alarm {label(detector, 18)} {1e3 * time:.0f} ms" for detector, time in alarms[:_ALARMS_TOLD]]
-    if len(alarms) > _ALARMS_TOLD:
-        lines.append(f"and {len(alarms) - _ALARMS_TOLD} later")
+    lines += [f"alarm {label(detector, 18)} {1e3 * time:.0f} ms" for detector, time in alarms[:_ALARMS_LISTED]]
+    if len(alarms) > _ALARMS_LISTED:
+        lines.append(f"and {len(alarms) - _ALARMS_LISTED} later")
     verdict = worst.verdict.outcome.replace("_", " ")
     for text, lift, size, weight in ((verdict, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
-        axes.annotate(
-            text,
-            (1.0, 1.0),
-            xycoords="axes fraction",
-            xytext=(10, lift),
-            textcoords="offset points",
-            va="top",
-            fontsize=size,
-            fontweight=weight,
-            annotation_clip=False,
-        )
+        write(axes, text, (1.0, 1.0), (10, lift), va="top", fontsize=size, fontweight=weight)
 
 
-def _told(step: StepVerdict) -> str:
+def _step_text(step: StepVerdict) -> str:
     name = label(step.step.name, 22)
     if step.outcome == "not_assessable":
         return f"{name}: not assessable"
@@ -234,7 +223,7 @@ def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]
         handles.insert(1, Line2D([], [], color="0.45", linewidth=0.8, label="other contacts"))
     if any(curves[0].verdict.end < _WHOLE * end for curves in ranked):
         text = "worst contact's record has ended"
-        handles.append(Patch(facecolor="white", edgecolor=UNJUDGED, hatch=_UNSEEN, label=text))
+        handles.append(Patch(facecolor="white", edgecolor=NOT_ASSESSED, hatch=_UNSEEN, label=text))
     detectors = dict.fromkeys(name for curves in ranked for name in curves[0].alarms)
     for name in detectors:
         look = look_of(name)
@@ -244,7 +233,7 @@ def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]
 
 
 def _time_nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -> list[float]:
-    """Where the time axis bends [s]: 0, the end of its first part, the later limits' beginnings, the end."""
+    """Return where the scale of the time axis changes [s]: 0, the end of its first part, later limits, the end."""
     moments = [0.0]
     for curves in ranked:
         worst = curves[0]
@@ -258,7 +247,7 @@ def _time_nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -
 
 
 def _set_time(axes: Axes, nodes: Sequence[float]) -> None:
-    """A time axis that is linear between its bends; nothing beyond its end is drawn."""
+    """Set a time axis that is linear between its nodes; nothing beyond its end is drawn."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     shares = np.linspace(_VIEW_SHARE, 1.0, len(nodes) - 1) if len(nodes) > 2 else np.array([1.0])
@@ -276,7 +265,7 @@ def _set_time(axes: Axes, nodes: Sequence[float]) -> None:
 
 
 def _rounded_up(time: float) -> float:
-    """To two digits, for the axis's last label."""
+    """Return a time rounded up to two digits, for the last label of the axis."""
     digit = 10.0 ** (math.floor(math.log10(time)) - 1)
     return round(math.ceil(time / digit - 1e-9) * digit, 9)
 
@@ -284,7 +273,7 @@ def _rounded_up(time: float) -> float:
 def write_forces(report: Report, folder: Path) -> list[Image]:
     """Draw forces.png for a report folder, forces_<profile>.png with several profiles; raises CdtoolError (see `save`).
 
-    Only where there are force limits and curves.
+    Only if there are force limits and curves.
     """
     results = report.evaluated.results
     curves = traced_forces(results, report.traces)
@@ -302,9 +291,9 @@ def write_forces(report: Report, folder: Path) -> list[Image]:
 def _force_caption(results: Results, profile: str, drawn: int, judged: int) -> str:
     caption = f"contact force over time against {profile}"
     if drawn < judged:
-        caption += f": the {drawn} of {judged} contacts whose curves were kept"
+        caption += f": the {drawn} of {judged} contacts with stored curves"
     if results.provenance.get("mass_before_cell_kg"):
-        caption += "; curves as the load cell saw them, verdicts corrected for the mass before it"
+        caption += "; curves as the load cell measured them, verdicts corrected for the mass before it"
     return caption
 
 

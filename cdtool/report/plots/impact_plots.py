@@ -1,4 +1,4 @@
-"""Figures of an impact's mechanics: its course (thesis 3.2), restitution (3.4), force loops (3.5).
+"""Figures of an impact's mechanics: force and speed over time (thesis 3.2), restitution (3.4), force loops (3.5).
 
 `draw_impact_figures` redraws all figures of the two chapters on impacts into a folder.
 """
@@ -39,13 +39,13 @@ _HALO = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.0}
 DEPTHS = (0.1e-6, 1e-6, 10e-6, 50e-6, 91e-6)
 """Penetrations about which figure 4.4 is drawn [m]."""
 SPEED = 0.25
-"""Speed of the load at them [m/s]; the thesis does not say at which it was drawn."""
+"""Speed of the load at them [m/s]; the thesis does not state the speed of its figure."""
 SHARES = (0.01, 0.1, 1.0, 10.0)
 """Stiffnesses of the contact in figure 4.7 as shares of the limit 4.36."""
 
 
-def plot_course(impact: Impact) -> Figure:
-    """Figure 3.2 of one impact of two bodies: force and impulses, speeds, force over penetration with its works."""
+def plot_force_and_speed(impact: Impact) -> Figure:
+    """Draw figure 3.2 for an impact of two bodies: force and impulses, speeds, force over penetration with its work."""
     with drawing():
         figure = new_figure(11.0, 3.5)
         force, speeds, work = figure.subplots(1, 3)
@@ -56,7 +56,7 @@ def plot_course(impact: Impact) -> Figure:
 
 
 def plot_restitution(curves: Sequence[RestitutionCurve]) -> Figure:
-    """Figure 3.4: restitution over the approach speed, exact and as 3.21 has it, one colour a contact."""
+    """Draw figure 3.4: restitution over the approach speed, exact and by 3.21, one colour per contact."""
     with drawing():
         figure = new_figure(6.4, 3.9)
         axes = figure.subplots()
@@ -73,7 +73,7 @@ def plot_restitution(curves: Sequence[RestitutionCurve]) -> Figure:
 
 
 def plot_damping(curve: RestitutionCurve, at: FloatArray, simulated: FloatArray) -> Figure:
-    """Restitution over the damping number: exact, simulated (n,) at `at` (n,), and as 3.21 and 3.22 have it."""
+    """Draw restitution over the damping number: exact, simulated (n,) at `at` (n,), and by 3.21 and 3.22."""
     with drawing():
         figure = new_figure(6.4, 3.9)
         axes = figure.subplots()
@@ -96,7 +96,7 @@ def plot_damping(curve: RestitutionCurve, at: FloatArray, simulated: FloatArray)
 
 
 def plot_loops(panels: Mapping[str, Mapping[str, Impact]]) -> Figure:
-    """Figure 3.5: force over penetration, one panel a family of laws; the area within a loop is the energy lost."""
+    """Draw figure 3.5: force over penetration, a panel per family of laws; the area of a loop is the energy lost."""
     with drawing():
         figure = new_figure(11.0, 3.7)
         row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
@@ -119,7 +119,7 @@ def plot_loops(panels: Mapping[str, Mapping[str, Impact]]) -> Figure:
 
 
 def write_impact_plots(folder: Path) -> list[Path]:
-    """Write figures 3.2, 3.4, 3.5 and that of the damping, with cdtool's example impacts, to a folder that exists."""
+    """Write figures 3.2, 3.4, 3.5 and restitution over damping, of cdtool's example impacts, to an existing folder."""
     from cdtool.impact.examples.chapter_3 import (
         loops,
         restitution_over_damping,
@@ -130,7 +130,7 @@ def write_impact_plots(folder: Path) -> list[Path]:
 
     numbers = np.array([0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0])
     figures = {
-        "impact_course.png": plot_course(two_bodies()),
+        "impact_course.png": plot_force_and_speed(two_bodies()),
         "impact_restitution.png": plot_restitution(restitution_over_speed()),
         "impact_loops.png": plot_loops(loops()),
         "impact_damping.png": plot_damping(restitution_over_damping(), numbers, simulated_restitution(numbers)),
@@ -194,7 +194,7 @@ def _draw_work(axes: Axes, impact: Impact) -> None:
 
 
 def _moments(axes: Axes, time: FloatArray, turn: int) -> None:
-    """t_c and t_f, named above the panel's lower edge."""
+    """Draw t_c and t_f with their names."""
     for at, name in ((time[turn], "$t_c$"), (time[-1], "$t_f$")):
         axes.axvline(at, **_GUIDE)
         axes.annotate(
@@ -217,13 +217,13 @@ def _restitution_axis(axes: Axes, right: float) -> None:
 
 
 def _closed(impact: Impact) -> tuple[FloatArray, FloatArray]:
-    """Penetration [mm] and force [N] from the surface and back to it: a step of the force is drawn."""
+    """Return penetration [mm] and force [N] from the surface and back to it, so that a step of the force is drawn."""
     depth = 1e3 * np.concatenate(([0.0], impact.penetration))
     return depth, np.concatenate(([0.0], impact.force))
 
 
 def _arrow(axes: Axes, impact: Impact, colour: str) -> None:
-    """Which way the loop runs: an arrow on the way in and one on the way back."""
+    """Draw the direction of the loop: an arrow while the bodies approach, another while they separate."""
     depth = 1e3 * impact.penetration
     for at in (int(0.55 * impact.turn), impact.turn + int(0.45 * (len(depth) - impact.turn))):
         axes.annotate(
@@ -250,10 +250,10 @@ def _name(
 
 
 def draw_impact_figures(target: Path, *, force: bool = False) -> list[Path]:
-    """Draw figures 3.2, 3.4, 3.5 (see `write_impact_plots`), 4.3, 4.4, 4.7 and 4.10 into a folder; their files.
+    """Draw figures 3.2, 3.4, 3.5 (see `write_impact_plots`), 4.3, 4.4, 4.7 and 4.10 into a folder; return their files.
 
-    A folder that holds figures of cdtool only is replaced as a whole, another one with `force` only: then what has
-    other names stays. Raises CdtoolError where it cannot write.
+    A folder that contains only figures of cdtool is replaced as a whole, another one only with `force`: then files with
+    other names stay. Raises CdtoolError if it cannot write.
     """
     with replaced_folder(target, lambda old: _only_figures(old, force=force)) as folder:
         written = _draw(folder)
@@ -268,7 +268,7 @@ def _only_figures(folder: Path, *, force: bool) -> bool:
             return False
         raise UsageError(
             f"{plain(path)}: is not a cdtool figure, and the folder would be replaced as a whole",
-            "choose another folder, or keep what else is in it with --force",
+            "choose another folder, or keep its other files with --force",
         )
     return True
 

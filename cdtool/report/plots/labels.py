@@ -1,6 +1,6 @@
-"""Names of curves and of limits in a plot, written where they hide nothing.
+"""Labels of curves and limits in a plot, written where they do not hide anything.
 
-A curve without room for its name has none; a limit always has one, on white where it would hide something.
+A curve without room for its label has none; a limit always has one, on white where it would hide something.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 _SIZE, _LIMIT_SIZE = 7.5, 7
-# Distances in points: from a point to its name, to all else, which has to be further away; between samples of a line.
+# Distances in points: from a point to its label, from a label to anything else, between samples of a line.
 _AWAY, _CLEAR, _SAMPLED = 3.5, 5.0, 3.0
 # From a line to the label's foot, tried in this order [points]; steps along the line.
 _LIFTS = (2.0, 9.0, 18.0, 27.0)
 _STEPS = 30
-_BESIDE = 4.0
+_INDENT = 4.0
 _HEIGHT = 9.0
 
 
 @dataclass(frozen=True)
 class Labelled:
-    """A curve (n,) in the panel's scale, its name, and the points (m,) where the name may stand, the best one first."""
+    """A curve (n,) in the panel's scale, its name, and the indices (m,) of points for its label, the best one first."""
 
     text: str
     colour: str
@@ -42,9 +42,9 @@ class Labelled:
 
 
 def write_labels(axes: Axes, curves: Sequence[Labelled]) -> list[str]:
-    """Write each name above or below its curve, clear of all others; returns those that are written.
+    """Write each label above or below its curve, clear of all others; return those that are written.
 
-    The panel's place, limits and scales have to be final.
+    The position, limits and scales of the panel must be final.
     """
     points = 72.0 / axes.figure.dpi
     lines = [points * axes.transData.transform(np.column_stack((curve.x, curve.y))) for curve in curves]
@@ -78,7 +78,7 @@ def write_labels(axes: Axes, curves: Sequence[Labelled]) -> list[str]:
 def _free_corner(
     places: FloatArray, size: FloatArray, own: FloatArray, others: FloatArray, frame: FloatArray
 ) -> FloatArray | None:
-    """Lower left corner of the first place where a text of that size covers nothing and stays in the frame."""
+    """Return the lower left corner of the first position where a text of a size covers nothing and is in the frame."""
     sides = np.array([(-0.5 * size[0], _AWAY), (-0.5 * size[0], -_AWAY - size[1])])
     for corner in (place + side for place in places for side in sides):
         inside = np.all(corner >= frame[0] + 1.0) and np.all(corner + size <= frame[1] - 1.0)
@@ -92,7 +92,7 @@ def _covers(corner: FloatArray, size: FloatArray, points: FloatArray, clear: flo
 
 
 def _sampled(line: FloatArray) -> FloatArray:
-    """Points along a line, a few points apart: what a name may not cover."""
+    """Return points along a line at short distances, which a label must not cover."""
     found = [line]
     for start, end in pairwise(line):
         count = int(np.hypot(*(end - start)) / _SAMPLED)
@@ -101,14 +101,14 @@ def _sampled(line: FloatArray) -> FloatArray:
 
 
 def _filled(corner: FloatArray, size: FloatArray) -> FloatArray:
-    """Points all over a name: other names keep clear of it."""
+    """Return points all over a label, which other labels must not cover."""
     x, y = np.meshgrid(np.arange(0.0, size[0] + _SAMPLED, _SAMPLED), np.arange(0.0, size[1] + _SAMPLED, _SAMPLED))
     return np.asarray(corner + np.column_stack((x.ravel(), y.ravel())))
 
 
 @dataclass(frozen=True)
 class LineLabel:
-    """What stands at a horizontal line from `begin` to `end` at `height`, in the units of the axes."""
+    """The label of a horizontal line from `begin` to `end` at `height`, in the units of the axes."""
 
     text: str
     begin: float
@@ -117,9 +117,9 @@ class LineLabel:
 
 
 def place_labels(axes: Axes, labels: Sequence[LineLabel], curves: Sequence[tuple[FloatArray, FloatArray]]) -> None:
-    """Write each label above its line, as far left as nothing crosses it; else at the left end, on white.
+    """Write each label above its line, as far left as it does not hide anything; else at the left end, on white.
 
-    To be called when the figure is arranged and everything else is in it.
+    Call it after the figure is arranged and everything else is drawn.
     """
     from matplotlib.transforms import Bbox
 
@@ -130,7 +130,7 @@ def place_labels(axes: Axes, labels: Sequence[LineLabel], curves: Sequence[tuple
     for label in labels:
         (left, line), (right, _) = to_pixels([(label.begin, label.height), (label.end, label.height)])
         width = text_width([label.text], _LIMIT_SIZE) * 72.0 * points
-        starts = np.linspace(left + _BESIDE * points, max(right - width - points, left + _BESIDE * points), _STEPS)
+        starts = np.linspace(left + _INDENT * points, max(right - width - points, left + _INDENT * points), _STEPS)
         boxes = [
             Bbox.from_bounds(start, line + lift * points, width, _HEIGHT * points)
             for lift, start in product(_LIFTS, starts.tolist())
@@ -141,7 +141,7 @@ def place_labels(axes: Axes, labels: Sequence[LineLabel], curves: Sequence[tuple
         axes.annotate(
             label.text,
             (label.begin, label.height),
-            # In whole tenths: the last bits of a place differ from run to run.
+            # In whole tenths: the last bits of a position differ between runs.
             xytext=(round((box.x0 - left) / points, 1), round((box.y0 - line) / points, 1)),
             textcoords="offset points",
             fontsize=_LIMIT_SIZE,
@@ -156,7 +156,7 @@ def _free(box: Bbox, curves: Sequence[FloatArray], taken: Sequence[Bbox]) -> boo
 
 
 def _crosses(curve: FloatArray, box: Bbox) -> bool:
-    """Whether a curve (n, 2) with rising x runs through the box, between its samples too."""
+    """Return whether a curve (n, 2) with rising x crosses the box, at or between its samples."""
     x, y = curve.T
     if box.x1 < x[0] or box.x0 > x[-1]:
         return False

@@ -1,4 +1,4 @@
-"""The axis of latencies, alike in every figure: linear from 0, logarithmic where they differ more than tenfold."""
+"""The axis of latencies, the same in all figures: linear from 0, logarithmic if they differ more than tenfold."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-# Below this a logarithmic axis shows nothing [ms].
+# The lower end of a logarithmic axis [ms].
 FLOOR_MS = 1.0
-# Round numbers of a decade; the coarse ones where more decades than this would make them touch.
+# Round numbers of a decade; the coarse ones if the ends differ by more than this factor.
 _FINE, _COARSE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0)
 _DECADES = 100.0
 
 
 def latency_range(values: FloatArray) -> tuple[float, float, bool]:
-    """Beginning and end of the axis [ms] for latencies (n,) [ms], and whether it is logarithmic."""
+    """Return beginning and end of the axis [ms] for latencies (n,) [ms], and whether it is logarithmic."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return 0.0, 1000.0, False
@@ -31,7 +31,7 @@ def latency_range(values: FloatArray) -> tuple[float, float, bool]:
 
 
 def set_ticks(axis: Axis, low: float, high: float) -> None:
-    """Ticks of a logarithmic axis of latencies at round numbers from `low` to `high` [ms]."""
+    """Set the ticks of a logarithmic axis of latencies at round numbers from `low` to `high` [ms]."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     steps = _FINE if high < _DECADES * low else _COARSE
@@ -42,7 +42,7 @@ def set_ticks(axis: Axis, low: float, high: float) -> None:
 
 
 def set_latency_scale(axes: Axes, low: float, high: float, logarithmic: bool) -> None:
-    """Make the horizontal axis one of latencies from `low` to `high` [ms]."""
+    """Set the horizontal axis to latencies from `low` to `high` [ms]."""
     if logarithmic:
         axes.set_xscale("log")
         set_ticks(axes.xaxis, low, high)

@@ -1,4 +1,4 @@
-"""Latency of every detector in every group: each contact a mark, the median with its interval, and all the counts."""
+"""Latency of every detector in every group: a mark per contact, the median with its interval, and all counts."""
 
 from __future__ import annotations
 
@@ -15,10 +15,21 @@ from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped
-from cdtool.report.figure_text import NOTHING, with_interval
-from cdtool.report.plots.figures import Margins, between, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.model import AXES
+from cdtool.report.number_text import NOTHING, with_interval
+from cdtool.report.plots.figures import (
+    Margins,
+    between,
+    drawing,
+    label,
+    new_figure,
+    save,
+    stacked_panels,
+    text_width,
+    write,
+)
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable
+from cdtool.report.plots.side_table import Column, SideTable, count_cells
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 
@@ -36,15 +47,15 @@ _COLUMNS = (
 _IMPACT_FREE = 70.0
 _ROW, _PANEL = 0.36, 0.2
 _MOST_MARKS = 400
-# Low-discrepancy sequences spread the marks evenly, without chance.
+# Low-discrepancy sequences spread the marks evenly, without random numbers.
 _GOLDEN, _ACROSS = 0.6180339887, 0.7548776662
-# Right of the axis's end lies a strip for the missed contacts that were watched for longer: its share of the width.
+# Share of the width of the strip right of the axis, for missed contacts that were monitored for longer.
 _BEYOND = 0.09
 
 
 @dataclass(frozen=True)
 class _Marks:
-    """Latencies of the detected contacts, and how long the missed ones were watched, both ascending [ms]."""
+    """Latencies of the detected contacts, and how long the missed ones were monitored, both ascending [ms]."""
 
     detected: FloatArray
     missed: FloatArray
@@ -60,13 +71,13 @@ class _Axis:
     logarithmic: bool
 
     def shown(self, times: FloatArray) -> FloatArray:
-        """Where times are drawn: below a logarithmic axis at its floor, beyond its end evenly over the strip."""
+        """Return where times are drawn: at least the lower end of a logarithmic axis, beyond its end in the strip."""
         inside = np.maximum(times, FLOOR_MS) if self.logarithmic else times
         share = 0.2 + 0.6 * (_ACROSS * np.arange(len(times), dtype=np.float64) % 1.0)
         return np.asarray(np.where(times > self.end, self._strip(share), inside))
 
     def placed(self, time: float) -> float:
-        """Where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
+        """Return where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
         if time > self.end:
             return float(self._strip(np.array(0.5, dtype=np.float64)))
         return max(time, FLOOR_MS) if self.logarithmic else time
@@ -78,9 +89,9 @@ class _Axis:
 
 
 def plot_latencies(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel a group and a row a detector; raises UsageError, CdtoolError (see `save`).
+    """Draw a panel per group and a row per detector; raises UsageError, CdtoolError (see `save`).
 
-    The median counts missed contacts as later than all others. It is to be read beside the counts at the right.
+    The median counts missed contacts as later than all others. Read it together with the counts at the right.
     """
     with drawing():
         save(_figure(evaluated), path)
@@ -91,7 +102,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     groups = list(dict.fromkeys(item.group for item in summaries))
     if not groups:
         figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact in any group: there is no latency to show", ha="center", va="center")
+        figure.text(0.5, 0.5, "no contact in any group: no latency to show", ha="center", va="center")
         return figure
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
@@ -156,20 +167,12 @@ def _name_strip(axes: Axes, missed: FloatArray, axis: _Axis) -> None:
     beyond = missed[missed > axis.end]
     if not len(beyond):
         return
-    axes.annotate(
-        f"> {between(float(beyond.min()), float(beyond.max()))} ms",
-        (1.0, 1.0),
-        xycoords="axes fraction",
-        xytext=(2, 3),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=7.5,
-    )
+    words = f"> {between(float(beyond.min()), float(beyond.max()))} ms"
+    write(axes, words, (1.0, 1.0), (2, 3), ha="right", va="bottom", fontsize=7.5)
 
 
 def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis) -> None:
-    """Detected contacts filled, missed ones open."""
+    """Draw detected contacts as filled marks, missed ones as open marks."""
     look = look_of(detector)
     for times, filled in ((marks.detected, True), (marks.missed, False)):
         shown = axis.shown(_thinned(times))
@@ -194,9 +197,9 @@ def _thinned(ordered: FloatArray) -> FloatArray:
 
 
 def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
-    """Below the marks: the interval of the median as a bar, open to the right where it has no end.
+    """Draw the median below the marks with its interval as a bar, open to the right if it has no upper end.
 
-    Below ten contacts the median stands alone: the marks show the range.
+    With fewer than ten contacts only the median: the marks show the range.
     """
     height, median = row + 0.28, summary.median
     if not draws_no_interval(summary) and median.low <= axis.end:
@@ -214,35 +217,28 @@ def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
-    cells = (
-        with_interval(row.median),
-        f"{row.detected} of {row.contacts}",
-        str(row.missed),
-        str(row.not_assessable),
-        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
-        *impact_free,
-    )
-    loud = [False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0]
-    table.write_row(axes, place, cells, [*loud, *(not cell.startswith(("0 ", NOTHING)) for cell in impact_free)])
+    cells, loud = count_cells(row)
+    alarmed = (not cell.startswith(("0 ", NOTHING)) for cell in impact_free)
+    table.write_row(axes, place, (with_interval(row.median), *cells, *impact_free), (False, *loud, *alarmed))
 
 
 def _count(item: Summary) -> str:
-    """False alarms; a dash where the detector could judge nothing."""
+    """Return the false alarms; a dash if the detector could not assess anything."""
     return f"{item.false_alarms} in {item.operations} op." if item.hours > 0.0 else NOTHING
 
 
 def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axis) -> str:
     below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
     missed = any(len(item.missed) for item in marks)
-    lines = [f"latency from contact onset to alarm [ms]{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
-    lines.append(f"mark: one contact{', open where it was missed: watched up to there' if missed else ''}")
+    lines = [f"{AXES['latency']}{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
+    lines.append(f"each mark: a contact{', open if missed, at the end of its monitoring' if missed else ''}")
     if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
-        lines[-1] += f" ({_MOST_MARKS} at most are drawn)"
+        lines[-1] += f" (at most {_MOST_MARKS} are drawn)"
     few, later = [draws_no_interval(item) for item in summaries], ", missed contacts counted as later" if missed else ""
     interval = "" if all(few) else " and its 95 % interval"
     lines.append(f"black: median{interval}{later}")
     if any(few):
-        lines[-1] += f"; no bar below {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
+        lines[-1] += f"; no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""Why one alarm came or one contact was missed: the channels in the order in which they moved, signal and margin."""
+"""Why an alarm was raised or a contact missed: channels in the order in which they moved, signal and margin."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdtool.evaluation.traces.trace import Course, Span
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray, Recording
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
+from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.plots.style import BAND, look_of
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 _PIXELS = 1000
 _MOST_CHANNELS = 5
-# What is shown before and after the events [s], and for how long after a contact at most.
+# Time shown before and after the events, and at most after a contact [s].
 _BEFORE, _AFTER, _LONGEST = 0.15, 0.06, 0.6
 _STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
 _OTHER = "0.45"
 
 
 def plot_explanation(detection: Detection, explanation: Explanation, path: Path) -> None:
-    """Draw an alarm or a missed contact: its channels as they moved, the signal with its band, the margin over time.
+    """Draw an alarm or a missed contact: its channels in the order of moving, signal with band, margin over time.
 
     Raises UsageError, CdtoolError (see `save`).
     """
@@ -75,7 +75,7 @@ def _figure(detection: Detection, item: Explanation) -> Figure:
 
 
 def _channels(item: Explanation) -> list[Movement]:
-    """Those that moved, in order, then those that the detector reads though they did not."""
+    """Return the channels that moved, in order, then those that the detector reads and that did not."""
     moved = [found for found in item.moved if not math.isnan(found.time)]
     still = [found for found in item.moved if math.isnan(found.time) and found.channel in item.inputs]
     return [*moved, *still][:_MOST_CHANNELS]
@@ -133,18 +133,18 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     axes.axhspan(0.0, high, color=BAND, linewidth=0, zorder=0)
     if isinstance(item, AlarmExplanation):
         axes.axvspan(item.left, item.alarm.time, color=colour, alpha=0.25, linewidth=0)
-        waited = f"outside for {counted(item.debounce, 'sample')}"
-        _write(axes, waited, (item.left, 0.0), (-4, 4), "right")
+        debounce = f"outside for {counted(item.debounce, 'sample')}"
+        _write(axes, debounce, (item.left, 0.0), (-4, 4), "right")
         return
     for nearest in [found.nearest for found in item.approaches[:1]]:
         depth = float(np.clip(nearest.margin, low, high))
         axes.plot([nearest.time], [depth], marker="o", color=colour, clip_on=False)
-        told = f"nearest, {1e3 * (nearest.time - item.zero):.0f} ms"
-        axes.annotate(told, (nearest.time, depth), (8, 0), textcoords="offset points", va="center", fontsize=8)
+        words = f"nearest, {1e3 * (nearest.time - item.zero):.0f} ms"
+        axes.annotate(words, (nearest.time, depth), (8, 0), textcoords="offset points", va="center", fontsize=8)
 
 
 def _range(value: FloatArray) -> Span:
-    """From a little above the largest margin to a deep excursion's beginning: what counts is the way to 0."""
+    """Return the range from slightly above the largest margin to the beginning of a deep excursion below 0."""
     known = value[np.isfinite(value)]
     high, low = max(float(known.max()), 0.0), min(float(known.min()), 0.0)
     low = max(low, -1.2 * high) if high > 0.0 else low
@@ -178,18 +178,8 @@ def _colour(movement: Movement, item: Explanation) -> str:
 
 
 def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], side: str) -> None:
-    """Text beside a place: time [s], and height as a share of the panel; `offset` in points."""
-    axes.annotate(
-        text,
-        place,
-        xycoords=axes.get_xaxis_transform(),
-        xytext=offset,
-        textcoords="offset points",
-        ha=side,
-        va="bottom",
-        fontsize=8,
-        annotation_clip=False,
-    )
+    """Write a text next to a time [s] and a height as a share of the panel; `offset` in points."""
+    write(axes, text, place, offset, axes.get_xaxis_transform(), ha=side, va="bottom", fontsize=8)
 
 
 def _name(axes: Axes, text: str) -> None:

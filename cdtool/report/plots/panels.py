@@ -1,4 +1,4 @@
-"""The marks that figures over time share: signal with its band, what is not judged, force, trigger, onset and alarm."""
+"""Marks of figures over time: signal with its band, not assessable samples, force, trigger, onset and alarm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.evaluation.traces.decimation import decimate, kept_samples
 from cdtool.evaluation.traces.trace import Course, Span
 from cdtool.pipeline import Detection
 from cdtool.recording import BoolArray, FloatArray
-from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, ONSET_DASHES, UNJUDGED, look_of
+from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, NOT_ASSESSED, ONSET_DASHES, look_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -22,7 +22,7 @@ _PIXELS = 1000
 
 
 class Legend:
-    """The kinds of marks that a figure holds, each once and in a fixed order."""
+    """The kinds of marks in a figure, each once and in a fixed order."""
 
     def __init__(self, detector: str | None) -> None:
         self._detector = detector
@@ -33,7 +33,7 @@ class Legend:
         self._seen.add(kind)
 
     def handles(self) -> list[Artist]:
-        """One handle a kind."""
+        """Return a handle per kind."""
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
@@ -47,40 +47,43 @@ class Legend:
             "trigger": Patch(facecolor=colour, alpha=0.25, edgecolor="none", label="trigger on"),
             "raised": Line2D([], [], color=colour, marker="^", markersize=5, linestyle="none", label="trigger raised"),
             "rearmed": Line2D(
-                [], [], color=colour, marker="v", markerfacecolor="white", linestyle="none", label="armed again"
+                [], [], color=colour, marker="v", markerfacecolor="white", linestyle="none", label="re-armed"
             ),
         }
         for code, reason in REASONS.items():
             known[reason] = Patch(
-                facecolor="white", edgecolor=UNJUDGED, hatch=HATCHES[Status(code)], label=f"not assessable: {reason}"
+                facecolor="white",
+                edgecolor=NOT_ASSESSED,
+                hatch=HATCHES[Status(code)],
+                label=f"not assessable: {reason}",
             )
         return [handle for kind, handle in known.items() if kind in self._seen]
 
 
 def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: Legend) -> None:
-    """Signal, limits and normal band of one joint within `span` [s], and where it is not judged."""
+    """Draw signal, limits and normal band of one joint within `span` [s], and where it is not assessable."""
     part = course.within(span)
     if not len(part.time):
         return
-    judged = part.status == Status.VALID
-    axes.plot(*decimate(part.time, part.value, _PIXELS), color=UNJUDGED, linewidth=0.8, zorder=2)
-    value = np.where(judged, part.value, np.nan)
+    valid = part.status == Status.VALID
+    axes.plot(*decimate(part.time, part.value, _PIXELS), color=NOT_ASSESSED, linewidth=0.8, zorder=2)
+    value = np.where(valid, part.value, np.nan)
     axes.plot(*decimate(part.time, value, _PIXELS), color=look_of(detector).colour, zorder=3)
     legend.add("signal")
-    _draw_band(axes, part.time, part.lower, part.upper, judged, legend)
-    _draw_unjudged(axes, part.time, part.status, span, legend)
+    _draw_band(axes, part.time, part.lower, part.upper, valid, legend)
+    _draw_not_assessable(axes, part.time, part.status, span, legend)
 
 
 def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: float) -> None:
-    """Set the vertical range: all limits and judged values within `span`, excursions up to `headroom` bands beyond."""
+    """Set the vertical range: all limits and valid values within `span`, excursions up to `headroom` bands beyond."""
     inside: list[float] = []
     bounds: list[float] = []
     for course in courses:
         part = course.within(span)
         valid = part.status == Status.VALID
-        judged = part.value[valid]
-        inside += _ends(judged if len(judged) else part.value)
-        if not len(judged):
+        assessed = part.value[valid]
+        inside += _ends(assessed if len(assessed) else part.value)
+        if not len(assessed):
             bounds += _ends(part.value)
         bounds += _ends(part.value[(part.value >= part.lower) & (part.value <= part.upper) & valid])
         bounds += _ends(part.lower) + _ends(part.upper)
@@ -96,7 +99,7 @@ def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: fl
 
 
 def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, contact: bool) -> None:
-    """The load cell (n,) over time (n,) [s]; without a contact its noise is kept small."""
+    """Draw the load cell (n,) over time (n,) [s]; without a contact its noise is drawn small."""
     axes.margins(y=0.06 if contact else 1.2)
     part = (time >= span[0]) & (time <= span[1])
     if part.any():
@@ -104,9 +107,9 @@ def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, c
 
 
 def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legend: Legend) -> None:
-    """1 while the alarm of any joint stands: from its raising until it is armed again; 0 otherwise.
+    """Draw 1 while an alarm of any joint is raised, until it is re-armed; 0 otherwise.
 
-    A filled mark at each raising, an open one at each re-arming. Nothing where a detector could judge nothing.
+    A filled mark where it is raised, an open one where it is re-armed. Nothing if a detector could not assess anything.
     """
     for detection in detections:
         time = detection.statistic.time
@@ -131,13 +134,13 @@ def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legen
 
 
 def trigger_spans(alarms: Sequence[float], rearmed: Sequence[float], end: float) -> list[Span]:
-    """From when to when each alarm stands [s]: until it is armed again, `end` where it never is or that is unknown."""
+    """Return from when to when each alarm is raised [s]: until it is re-armed, `end` if never or unknown."""
     releases = rearmed if len(rearmed) == len(alarms) else [end] * len(alarms)
     return [(start, min(release, end)) for start, release in zip(alarms, releases, strict=True)]
 
 
 def joined_spans(spans: Sequence[Span]) -> list[Span]:
-    """The times that lie in any of the spans: alarms of several joints overlap."""
+    """Return the union of the spans: alarms of several joints overlap."""
     found: list[Span] = []
     for start, end in sorted(spans):
         if found and start <= found[-1][1]:
@@ -148,27 +151,27 @@ def joined_spans(spans: Sequence[Span]) -> list[Span]:
 
 
 def draw_onset(axes: Axes, time: float, legend: Legend) -> None:
-    """The line of a contact's onset."""
+    """Draw the line of a contact's onset."""
     axes.axvline(time, color=FORCE, linestyle=ONSET_DASHES, linewidth=1.0, zorder=4)
     legend.add("onset")
 
 
 def draw_alarm(axes: Axes, alarm: Alarm, colour: str, legend: Legend) -> None:
-    """The line of an alarm."""
+    """Draw the line of an alarm."""
     axes.axvline(alarm.time, color=colour, linewidth=2.2, zorder=4, alpha=0.9)
     legend.add("alarm")
 
 
 def count_from(axes: Axes, zero: float, step: float) -> None:
-    """Write the time axis as milliseconds from `zero` [s], with a tick every `step` [s]."""
+    """Label the time axis in milliseconds from `zero` [s], with a tick every `step` [s]."""
     from matplotlib.ticker import MultipleLocator
 
     axes.xaxis.set_major_locator(MultipleLocator(step, offset=zero))
     axes.xaxis.set_major_formatter(lambda value, _: f"{1e3 * (value - zero):.0f}".replace("-", "−"))
 
 
-def stretches(mask: BoolArray, time: FloatArray, closer: float) -> list[Span]:
-    """Where `mask` holds, each sample up to the next; stretches that lie `closer` than that [s] are drawn as one."""
+def intervals(mask: BoolArray, time: FloatArray, closer: float) -> list[Span]:
+    """Return the intervals of a mask, each sample up to the next; intervals `closer` than this [s] are joined."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     found: list[Span] = []
     for first, after in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -183,7 +186,7 @@ def stretches(mask: BoolArray, time: FloatArray, closer: float) -> list[Span]:
 
 
 def _draw_band(
-    axes: Axes, time: FloatArray, lower: FloatArray, upper: FloatArray, judged: BoolArray, legend: Legend
+    axes: Axes, time: FloatArray, lower: FloatArray, upper: FloatArray, valid: BoolArray, legend: Legend
 ) -> None:
     edge_low, edge_high = axes.get_ylim()
     for limit in (lower, upper):
@@ -191,20 +194,20 @@ def _draw_band(
         if np.isfinite(finite).any():
             axes.plot(*decimate(time, finite, _PIXELS), color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=3)
             legend.add("limit")
-    if not ((np.isfinite(lower) | np.isfinite(upper)) & judged).any():
+    if not ((np.isfinite(lower) | np.isfinite(upper)) & valid).any():
         return
     low = np.where(np.isneginf(lower), edge_low, lower)
-    low[~judged] = np.nan
+    low[~valid] = np.nan
     high = np.where(np.isposinf(upper), edge_high, upper)
     kept = np.union1d(kept_samples(time, low, _PIXELS), kept_samples(time, high, _PIXELS))
     axes.fill_between(time[kept], low[kept], high[kept], color=BAND, linewidth=0, zorder=1)
     legend.add("band")
 
 
-def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span, legend: Legend) -> None:
+def _draw_not_assessable(axes: Axes, time: FloatArray, status: np.ndarray, span: Span, legend: Legend) -> None:
     for code, reason in REASONS.items():
         column = (span[1] - span[0]) / _PIXELS
-        found = [item for item in stretches(status == code, time, column) if item[1] - item[0] > 2.0 * column]
+        found = [item for item in intervals(status == code, time, column) if item[1] - item[0] > 2.0 * column]
         if not found:
             continue
         axes.broken_barh(
@@ -212,7 +215,7 @@ def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span,
             (0.0, 1.0),
             transform=axes.get_xaxis_transform(),
             facecolor="none",
-            edgecolor=UNJUDGED,
+            edgecolor=NOT_ASSESSED,
             linewidth=0.0,
             hatch=HATCHES[Status(code)],
             zorder=0.5,
@@ -221,6 +224,6 @@ def _draw_unjudged(axes: Axes, time: FloatArray, status: np.ndarray, span: Span,
 
 
 def _ends(values: FloatArray) -> list[float]:
-    """The least and the greatest finite value; empty where there is none."""
+    """Return the smallest and largest finite value; empty without a finite value."""
     finite = values[np.isfinite(values)]
     return [float(finite.min()), float(finite.max())] if len(finite) else []

@@ -1,4 +1,4 @@
-"""Which sensor sees an impact first: figure 4.10 of the thesis with times, over the force that grows meanwhile."""
+"""Which sensor detects an impact first: figure 4.10 of the thesis with times, and the contact force until then."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.impact.sensor_ranking import Ranking, Sight
-from cdtool.report.figure_text import number
+from cdtool.impact.sensor_ranking import Ranking, SensorResponse
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 from cdtool.report.plots.style import FORCE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Kinds of sensor by where they are, from the contact to the controller.
+# Kinds of sensor by location, from the contact to the controller.
 _COLOURS = {
     "contact_force": "#D55E00",
     "drive_force": "#E69F00",
@@ -26,19 +26,19 @@ _COLOURS = {
 
 
 def plot_ranking(ranking: Ranking, path: Path) -> None:
-    """The contact force, and below it a row a sensor up to the moment when it sees the impact; the first on top.
+    """Draw the contact force, and below it a row per sensor up to its detection of the impact; the fastest on top.
 
     Raises UsageError, CdtoolError (see `save`).
     """
     with drawing():
-        figure = new_figure(9.0, 2.9 + 0.36 * len(ranking.sights))
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 0.34 * len(ranking.sights)))
+        figure = new_figure(9.0, 2.9 + 0.36 * len(ranking.responses))
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.8, 0.34 * len(ranking.responses)))
         end = _end(ranking)
         _draw_force(upper, ranking, end)
-        for row, sight in enumerate(ranking.sights):
-            _draw_row(lower, row, sight, end)
-        lower.set_ylim(len(ranking.sights) - 0.4, -0.6)
-        names = [f"{label(sight.sensor.name)}\n{label(sight.sensor.place)}" for sight in ranking.sights]
+        for row, response in enumerate(ranking.responses):
+            _draw_row(lower, row, response, end)
+        lower.set_ylim(len(ranking.responses) - 0.4, -0.6)
+        names = [f"{label(response.sensor.name)}\n{label(response.sensor.place)}" for response in ranking.responses]
         lower.set_yticks(range(len(names)), names, fontsize=7.5)
         lower.tick_params(axis="y", length=0)
         lower.spines["left"].set_visible(False)
@@ -54,40 +54,40 @@ def plot_ranking(ranking: Ranking, path: Path) -> None:
 
 
 def _end(ranking: Ranking) -> float:
-    seen = [1e3 * sight.time for sight in ranking.sights if sight.time is not None]
+    seen = [1e3 * response.time for response in ranking.responses if response.time is not None]
     window = 1e3 * ranking.case.window
-    return window if len(seen) < len(ranking.sights) else min(1.7 * max(seen), window)
+    return window if len(seen) < len(ranking.responses) else min(1.7 * max(seen), window)
 
 
 def _draw_force(axes: Axes, ranking: Ranking, end: float) -> None:
     time = 1e3 * ranking.time
     shown = time <= end
     axes.plot(time[shown], ranking.contact_force[shown], color=FORCE)
-    for sight in ranking.sights:
-        if sight.time is not None and sight.force is not None:
-            colour = _COLOURS[sight.sensor.quantity]
-            axes.plot(1e3 * sight.time, sight.force, "o", color=colour, markersize=5, clip_on=False, zorder=3)
+    for response in ranking.responses:
+        if response.time is not None and response.force is not None:
+            colour = _COLOURS[response.sensor.quantity]
+            axes.plot(1e3 * response.time, response.force, "o", color=colour, markersize=5, clip_on=False, zorder=3)
     axes.set_ylabel("contact force [N]")
     axes.set_ylim(0.0, 1.12 * max(float(np.max(ranking.contact_force[shown])), 1e-9))
     axes.grid(color="0.92", linewidth=0.6)
 
 
-def _draw_row(axes: Axes, row: int, sight: Sight, end: float) -> None:
-    colour = _COLOURS[sight.sensor.quantity]
-    if sight.time is None:
+def _draw_row(axes: Axes, row: int, response: SensorResponse, end: float) -> None:
+    colour = _COLOURS[response.sensor.quantity]
+    if response.time is None:
         axes.plot([0.0, end], [row, row], color=colour, linewidth=1.2, linestyle=(0, (1, 2)))
-        axes.text(0.5 * end, row - 0.08, "sees nothing", ha="center", va="bottom", fontsize=7.5)
+        axes.text(0.5 * end, row - 0.08, "does not detect it", ha="center", va="bottom", fontsize=7.5)
         return
-    at = 1e3 * sight.time
+    at = 1e3 * response.time
     axes.barh(row, at, height=0.42, color=colour)
-    words = f"{at:.1f} ms, {sight.force:.0f} N"
-    if (sight.peak_so_far or 0.0) > 1.05 * (sight.force or 0.0):
-        words += f" (up to {sight.peak_so_far:.0f} N before)"
+    words = f"{at:.1f} ms, {response.force:.0f} N"
+    if (response.peak_so_far or 0.0) > 1.05 * (response.force or 0.0):
+        words += f" (up to {response.peak_so_far:.0f} N before)"
     right = at < 0.6 * end
     axes.text(
         at + (0.008 if right else -0.008) * end,
         row,
-        f"{words}; limited by {sight.limited_by}" if right else words,
+        f"{words}; limited by {response.limited_by}" if right else words,
         ha="left" if right else "right",
         va="center",
         fontsize=7.5,

@@ -1,4 +1,4 @@
-"""Figures in columns right of a panel: what its marks have to be read beside."""
+"""Columns of numbers right of a panel, which its marks must be read with."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cdtool.evaluation.summary import Summary
+from cdtool.report.number_text import NOTHING
+from cdtool.report.plots.figures import write
 from cdtool.report.plots.style import look_of
 
 if TYPE_CHECKING:
@@ -18,7 +21,7 @@ _INDENT = 12.0
 
 @dataclass(frozen=True)
 class Column:
-    """A heading of one or two lines, and how wide the column is [points]; `left`: its texts begin at its left edge."""
+    """A heading of one or two lines, and the width of the column [points]; `left`: its texts are left-aligned."""
 
     heading: str
     width: float
@@ -27,7 +30,7 @@ class Column:
 
 @dataclass(frozen=True)
 class _Line:
-    """Where the cells of a line stand: at `y` in `coordinates`, lifted by `lift` [points]; `size` of their letters."""
+    """The position of a line of cells: `y` in `coordinates`, lifted by `lift` [points]; `size` of its letters."""
 
     coordinates: object
     y: float
@@ -45,21 +48,21 @@ class SideTable:
 
     @property
     def width(self) -> float:
-        """Room for all of it [inch]."""
+        """The width of all columns with the gap [inch]."""
         return (self.gap + sum(column.width for column in self.columns)) / 72.0
 
     def write_headings(self, axes: Axes) -> None:
-        """The headings above the panel's upper edge."""
+        """Write the headings above the panel's upper edge."""
         for i, column in enumerate(self.columns):
             self._write(axes, i, column.heading, _Line("axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE))
 
     def write_row(self, axes: Axes, y: float, cells: Sequence[str], loud: Sequence[bool]) -> None:
-        """A row at height `y` of the panel's own scale; `loud` cells are bold."""
+        """Write a row at height `y` in the panel's scale; `loud` cells are bold."""
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
             self._write(axes, i, cell, _Line(axes.get_yaxis_transform(), y), bold)
 
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
-        """A row counted from the panel's upper edge, the detector's mark before it."""
+        """Write a row counted from the panel's upper edge, after the detector's mark."""
         from matplotlib.lines import Line2D
         from matplotlib.transforms import ScaledTranslation
 
@@ -84,20 +87,18 @@ class SideTable:
         column = self.columns[number]
         before = self.gap + sum(item.width for item in self.columns[:number])
         offset = before + (indent if column.left else 0.5 * column.width)
-        axes.annotate(
-            text,
-            (1.0, line.y),
-            xycoords=line.coordinates,  # type: ignore[arg-type]
-            xytext=(offset, line.lift),
-            textcoords="offset points",
-            ha="left" if column.left else "center",
-            va=line.side,
-            fontsize=line.size,
-            fontweight="bold" if bold else "normal",
-            annotation_clip=False,
-        )
+        side, weight = "left" if column.left else "center", "bold" if bold else "normal"
+        look = {"ha": side, "va": line.side, "fontsize": line.size, "fontweight": weight}
+        write(axes, text, (1.0, line.y), (offset, line.lift), line.coordinates, **look)
+
+
+def count_cells(row: Summary) -> tuple[tuple[str, ...], tuple[bool, ...]]:
+    """Return the cells of detected, missed and not assessable contacts and false alarms, and which are bold."""
+    false_alarms = str(row.false_alarms) if row.watched else NOTHING
+    cells = (f"{row.detected} of {row.contacts}", str(row.missed), str(row.not_assessable), false_alarms)
+    return cells, (False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
 
 
 def key_height(rows: int) -> float:
-    """Room for so many rows of a key [inch]."""
+    """Return the height of a number of rows of a key [inch]."""
     return _ROW * rows / 72.0

@@ -1,4 +1,4 @@
-"""What a signature holds: mean and limits along the stroke, as first learned and now, and how many runs were there."""
+"""A signature: mean and limits along the stroke, as first learned and now, and the number of runs at each location."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from cdtool.evaluation.traces.decimation import decimate
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
-from cdtool.report.plots.style import BAND, LIMIT, UNJUDGED, look_of
+from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve
 
@@ -32,9 +32,9 @@ Pair = tuple[FittedSignature, FittedSignature]
 def plot_signature(
     current: Sequence[FittedSignature], first: Sequence[FittedSignature], unit: str, detector: str, path: Path
 ) -> None:
-    """Draw a row a class of motion and joint, up to six; raises UsageError, CdtoolError (see `save`).
+    """Draw a row per class of motion and joint, up to six; raises UsageError, CdtoolError (see `save`).
 
-    Left is the time while accelerating, right the travel from there on; where only one of them counts, that one.
+    Left is the time while accelerating, right the travel after it; if the signature uses only one of them, that one.
     """
     with drawing():
         save(_figure(list(zip(current, first, strict=True)), unit, detector), path)
@@ -43,7 +43,7 @@ def plot_signature(
 def _figure(pairs: Sequence[Pair], unit: str, detector: str) -> Figure:
     rows = [(pair, joint) for pair in pairs for joint in range(len(pair[0].joints))]
     shown = rows[:_MOST_ROWS]
-    # The signatures of one file have one rule, so that all rows have the same axes.
+    # All signatures of a file have the same rule, so that all rows have the same axes.
     axes = _axes_of(pairs[0][0])
     heights = (_BAND_HEIGHT, _COUNT_HEIGHT) * len(shown)
     widths = [1.0 if name == "time" else 2.6 for name in axes]
@@ -79,7 +79,7 @@ def _title(signature: FittedSignature, joint: int) -> str:
 
 
 def _updated(pair: Pair) -> bool:
-    """Whether runs were added since the first signature."""
+    """Return whether runs were added since the first signature."""
     return any(
         not np.array_equal(_curve(pair[0], name).squares, _curve(pair[1], name).squares) for name in _axes_of(pair[0])
     )
@@ -94,7 +94,7 @@ def _curve(signature: FittedSignature, name: str) -> Curve:
 
 
 def _draw_lines(axes: Axes, pair: Pair, name: str, joint: int, detector: str) -> None:
-    """Mean and limits now, the limits as first learned where they were others."""
+    """Draw mean and limits now, and the limits as first learned if they were different."""
     current, first = pair
     curve = _curve(current, name)
     mean, _ = curve.band(current.pooled)
@@ -111,7 +111,7 @@ def _draw_lines(axes: Axes, pair: Pair, name: str, joint: int, detector: str) ->
 
 
 def _fill_band(axes: Axes, signature: FittedSignature, name: str, joint: int) -> None:
-    """What is normal, to the panel's edge on a side without a limit; hatched where no limit is known."""
+    """Fill the normal band, to the panel's edge on a side without a limit; hatched where no limit is known."""
     curve = _curve(signature, name)
     lower, upper = (limit[:, joint] for limit in signature.limits(curve))
     low, high = axes.get_ylim()
@@ -129,7 +129,7 @@ def _hatch(axes: Axes, grid: FloatArray, where: BoolArray) -> None:
         where=where.tolist(),
         transform=axes.get_xaxis_transform(),
         facecolor="none",
-        edgecolor=UNJUDGED,
+        edgecolor=NOT_ASSESSED,
         hatch="////",
         linewidth=0.0,
     )
@@ -144,7 +144,7 @@ def _draw_limit(
 
 
 def _draw_count(axes: Axes, pair: Pair, name: str, joint: int) -> None:
-    """How many runs were valid at each place; hatched where too few were."""
+    """Draw the number of valid runs at each location; hatched where there were too few."""
     curve = _curve(pair[0], name)
     count = curve.count[:, joint]
     axes.fill_between(curve.grid, count, step="mid", color="0.75", linewidth=0)
@@ -154,7 +154,7 @@ def _draw_count(axes: Axes, pair: Pair, name: str, joint: int) -> None:
 
 
 def _align(panels: Sequence[Axes]) -> None:
-    """The same range of the signal left and right."""
+    """Set the same range of the signal left and right."""
     ranges = np.array([axes.get_ylim() for axes in panels])
     for axes in panels:
         axes.set_ylim(float(ranges[:, 0].min()), float(ranges[:, 1].max()))
@@ -171,5 +171,5 @@ def _handles(rows: Sequence[tuple[Pair, int]], detector: str) -> list[Artist]:
     ]
     if any(_updated(pair) for pair, _ in rows):
         handles.append(Line2D([], [], color="black", linestyle=_FIRST, linewidth=1.0, label="limit as first learned"))
-    handles.append(Patch(facecolor="white", edgecolor=UNJUDGED, hatch="////", label="no limit: too few runs"))
+    handles.append(Patch(facecolor="white", edgecolor=NOT_ASSESSED, hatch="////", label="no limit: too few runs"))
     return handles

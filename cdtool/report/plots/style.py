@@ -1,4 +1,4 @@
-"""How detectors and marks look, the same in every figure: colours safe for the colour-blind, shapes for grey print."""
+"""Colours and marks of detectors, the same in all figures: safe for colour-blind readers, shapes for grey print."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from cdtool.errors import CdtoolError
 FORCE = "black"
 LIMIT = "0.25"
 BAND = "#DCE6EE"
-UNJUDGED = "0.72"
-# From far below the mean to far above it, pale in the middle; told apart by the colour-blind and, by hue, in print.
+NOT_ASSESSED = "0.72"
+# From far below the mean to far above it, pale in the middle; distinct for colour-blind readers.
 DEVIATION_COLOURS = ("#003F6B", BLUE, "#9CCBE6", "#F7F7F7", "#F2B48A", RED, "#7A2E00")
 ONSET_DASHES = (0, (6, 2, 1.5, 2))
-# The reason not to judge, told apart without colour.
+# Why a sample is not assessable; distinct without colour.
 HATCHES = {
     Status.START_UP: "////",
     Status.NOT_APPLICABLE: "xxxx",
@@ -32,9 +32,9 @@ _OTHERS = (Look(SKY, "P"), Look(BROWN, "X"), Look(GREY, "p"), Look(SKY, "<"), Lo
 
 
 def look_of(detector: str) -> Look:
-    """Return the look that the detector's class gives; that of any other name depends on nothing but the name.
+    """Return the look of the detector's class; for any other name it depends only on the name.
 
-    Others are plug-ins without a look, and names in results of detectors that are not installed here.
+    Other names are plug-ins without a look, and detectors in results that are not installed here.
     """
     look = None
     if detector in DETECTORS.table or detector in DETECTORS.names(plugins=True):

@@ -1,4 +1,4 @@
-"""Share of the contacts that are still undetected over time: a panel a group, a step curve a detector."""
+"""Share of the contacts that are still undetected over time: a panel per group, a step curve per detector."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
-from cdtool.report.figure_text import NOTHING, number
+from cdtool.report.model import AXES
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable, key_height
+from cdtool.report.plots.side_table import Column, SideTable, count_cells, key_height
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 
@@ -32,16 +33,16 @@ _FIGURES = (
 )
 _NAME = 24
 _PANEL = 1.75
-# With more curves their bands would hide each other.
+# With more curves than this, bands would hide each other.
 _MOST_BANDS = 3
 _MARKS = 6
 _MOST_CENSORED = 200
 
 
 def plot_survival(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel a group; raises UsageError, CdtoolError (see `save`).
+    """Draw a panel per group; raises UsageError, CdtoolError (see `save`).
 
-    A missed contact leaves its curve where it was last watched: a curve that ends above 0 never detects that share.
+    A missed contact leaves its curve at the end of its monitoring: a curve that ends above 0 never detects that share.
     """
     with drawing():
         save(_figure(evaluated), path)
@@ -52,7 +53,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     groups = list(dict.fromkeys(item.group for item in curves))
     if not groups:
         figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact in any group: no share of them to show", ha="center", va="center")
+        figure.text(0.5, 0.5, "no contact in any group: no share to show", ha="center", va="center")
         return figure
     summaries = {(item.detector, item.group): item for item in evaluated.summaries}
     name = 72.0 * text_width([label(item.detector, _NAME) for item in curves], 8) + 20.0
@@ -75,7 +76,7 @@ def _figure(evaluated: Evaluated) -> Figure:
 
 
 def _times(curves: Sequence[SurvivalCurve]) -> np.ndarray:
-    """When contacts were detected; where none was, when the watching ended."""
+    """Return when contacts were detected; without any detection, when monitoring ended."""
     steps = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
     times = np.concatenate(steps)
     return times if len(times) else np.array([item.end for item in curves if item.end > 0.0])
@@ -95,7 +96,7 @@ def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], low: float, high: f
 
 
 def _enough(item: SurvivalCurve) -> bool:
-    """Whether there are enough contacts for a band."""
+    """Return whether there are enough contacts for a band."""
     return item.contacts - item.not_assessable >= FEWEST
 
 
@@ -135,38 +136,31 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
 
 
 def _by_median(curves: Sequence[SurvivalCurve], summaries: dict[tuple[str, str], Summary]) -> list[Summary]:
-    """The fastest first; those without a median last."""
+    """Return the rows ordered by median latency; rows without a median are last."""
     rows = [summaries[item.detector, item.group] for item in curves]
     return sorted(rows, key=lambda row: np.nan_to_num(row.median.value, nan=np.inf, posinf=1e12))
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary) -> None:
-    cells = (
-        label(row.detector, _NAME),
-        number(row.median.value),
-        f"{row.detected} of {row.contacts}",
-        str(row.missed),
-        str(row.not_assessable),
-        str(row.false_alarms) if row.hours > 0.0 else NOTHING,
-    )
-    loud = (False, False, False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
-    table.write_key(axes, place, row.detector, cells, loud)
+    cells, loud = count_cells(row)
+    first = (label(row.detector, _NAME), number(row.median.value))
+    table.write_key(axes, place, row.detector, (*first, *cells), (False, False, *loud))
 
 
 def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
     words = []
     if any(len(item.missed) for items in panels for item in items):
-        words.append("open mark: missed, watched up to there")
+        words.append("open mark: missed, at the end of its monitoring")
     few = [items for items in panels if sum(item.contacts > item.not_assessable for item in items) <= _MOST_BANDS]
     if any(_enough(item) for items in few for item in items):
         words.append("band: 95 % at each time")
     if any(not _enough(item) for items in few for item in items):
-        words.append(f"no band below {FEWEST} contacts")
-    return "\n".join(["time from contact onset [ms]", "; ".join(words)]).rstrip()
+        words.append(f"no band with fewer than {FEWEST} contacts")
+    return "\n".join([AXES["time"], "; ".join(words)]).rstrip()
 
 
 def write_survival(report: Report, folder: Path) -> list[Image]:
-    """Draw survival.png for a report folder, where there are contacts; raises CdtoolError (see `save`)."""
+    """Draw survival.png for a report folder if there are contacts; raises CdtoolError (see `save`)."""
     if not report.evaluated.results.contacts:
         return []
     image = Image("survival.png", "share of the contacts that are still undetected over time")

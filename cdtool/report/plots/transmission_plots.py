@@ -1,4 +1,4 @@
-"""The thesis's figures 4.3, 4.4 and 4.7: a simulated impact, what makes it quick and what the motor feels."""
+"""The thesis's figures 4.3, 4.4 and 4.7: a simulated impact, its frequencies, and how the motor responds."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ _BEFORE_MS = 4.0
 
 
 def plot_impact(motion: Motion, path: Path) -> None:
-    """Figure 4.3: force, penetration and speed, at the left the whole event, at the right its first contact.
+    """Draw figure 4.3: force, penetration and speed, the whole event at the left, its first contact at the right.
 
     Raises UsageError, CdtoolError (see `save`).
     """
     first, last = motion.contacts[0], motion.contacts[-1]
     whole = 1e3 * (last.start - first.start) * 1.55 + 1.0
     time = 1e3 * (motion.time - first.start)
-    courses = (
+    curves = (
         (motion.force, "force F [N]", _FORCE),
         (1e3 * motion.penetration, "penetration δ [mm]", _DEPTH),
         (motion.load_speed, "speed of the load [m/s]", _SPEED),
@@ -50,7 +50,7 @@ def plot_impact(motion: Motion, path: Path) -> None:
         figure = new_figure(9.0, 5.6)
         panels = figure.subplots(3, 2, sharex="col", width_ratios=(1.7, 1.0))
         spans = ((-_BEFORE_MS, whole), (-0.15 * 1e3 * first.duration, 1.25e3 * first.duration))
-        for row, (values, name, colour) in zip(panels, courses, strict=True):
+        for row, (values, name, colour) in zip(panels, curves, strict=True):
             for axes, span in zip(row, spans, strict=True):
                 shown = (time >= span[0]) & (time <= span[1])
                 axes.plot(time[shown], values[shown], color=colour)
@@ -91,7 +91,7 @@ def plot_impact(motion: Motion, path: Path) -> None:
 def plot_rigid_bode(
     transmission: RigidTransmission, law: ContactLaw, states: Sequence[tuple[float, float]], path: Path
 ) -> None:
-    """Figure 4.4: motor angle by torque, before the impact and about `states` (penetration [m], rate [m/s]) of it.
+    """Draw figure 4.4: motor angle by torque, before the impact and about `states` (penetration [m], rate [m/s]) of it.
 
     Raises UsageError, CdtoolError (see `save`).
     """
@@ -114,7 +114,7 @@ def plot_rigid_bode(
 
 
 def plot_elastic_bode(transmission: ElasticTransmission, shares: Sequence[float], path: Path) -> None:
-    """Figure 4.7: penetration by momentum for contacts of these shares of the limit 4.36, and motor by penetration.
+    """Draw figure 4.7: penetration by momentum for contacts of these shares of the limit 4.36, motor by penetration.
 
     Without damping, as in the thesis. Raises UsageError, CdtoolError (see `save`).
     """
@@ -155,8 +155,8 @@ def plot_elastic_bode(transmission: ElasticTransmission, shares: Sequence[float]
 def _with(frequency: FloatArray, *peaks: float) -> FloatArray:
     # Close to a peak, but never on it: without damping it is infinite.
     near = np.geomspace(1e-9, 0.02, 200)
-    beside = [peak * (1.0 + sign * near) for peak in peaks for sign in (-1.0, 1.0)]
-    return np.unique(np.concatenate([frequency, *beside]))
+    points = [peak * (1.0 + sign * near) for peak in peaks for sign in (-1.0, 1.0)]
+    return np.unique(np.concatenate([frequency, *points]))
 
 
 def _bode(
@@ -186,5 +186,5 @@ def _log_axes(axes: Axes) -> None:
 
 
 def _power(value: float, _: int | None) -> str:
-    """10⁻³; the style leaves formulas unread."""
+    """Return a power of ten as "10⁻³", because the style turns formulas off."""
     return "10" + f"{round(np.log10(value))}".translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

@@ -1,4 +1,4 @@
-"""All detectors under one load-cell curve: who raises an alarm when (thesis figures 5.7 and 5.8)."""
+"""All detectors below one load-cell curve: when each raises an alarm (thesis figures 5.7 and 5.8)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING
 
 from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
 from cdtool.plain_text import counted
-from cdtool.report.plots.figures import Margins, drawing, label, save, slug, stacked_panels, text_width, unit_label
+from cdtool.report.model import AXES
+from cdtool.report.plots.figures import (
+    Margins,
+    drawing,
+    label,
+    save,
+    slug,
+    stacked_panels,
+    text_width,
+    unit_label,
+    write,
+)
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -31,13 +42,13 @@ _STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
 _WIDTH = 9.0
 _FORCE, _ROW = 0.98, 0.66
 _NAME_SIZE, _VERDICT_SIZE, _DETAIL_SIZE = 9, 10, 8
-# From the axis to a row's name, with the numbers of its ticks between them; from the axis to a verdict [points].
+# From the axis to the name of a row, past the numbers of its ticks; from the axis to a verdict [points].
 _TICKS, _AWAY = 44.0, 8.0
 _LEGEND_COLUMNS, _LEGEND_ROW = 4, 0.18
 
 
 def plot_triggers(trace: Trace, path: Path) -> None:
-    """Draw the load cell with the contact's onset, below it a row a detector, the fastest first.
+    """Draw the load cell with the contact's onset, below it a row per detector, the fastest first.
 
     Raises UsageError, CdtoolError (see `save`).
     """
@@ -62,7 +73,7 @@ def _figure(trace: Trace) -> Figure:
         if contact:
             draw_onset(axes, contact.start, legend)
     panels[-1].set_xlim(trace.view)
-    panels[-1].set_xlabel("time from contact onset [ms]" if contact else "time [s]")
+    panels[-1].set_xlabel(AXES["time"] if contact else "time [s]")
     if contact:
         step = next((step for step in _STEPS if (trace.view[1] - trace.view[0]) / step <= 12), _STEPS[-1])
         count_from(panels[-1], contact.start, step)
@@ -73,11 +84,11 @@ def _figure(trace: Trace) -> Figure:
 
 
 def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
-    """Room for the names at the left, the verdicts at the right, and a legend of as many rows as there may be."""
+    """Return margins for the names at the left, the verdicts at the right, and the longest possible legend."""
     names = [_row_name(trace, row) for row in rows]
     verdicts = [_verdict(trace, row) for row in rows]
     verdict = text_width([words for words, _ in verdicts], _VERDICT_SIZE)
-    # Bold letters are wider than those that are measured.
+    # Bold letters are wider than measured.
     right = max(1.2 * verdict, text_width([detail for _, detail in verdicts], _DETAIL_SIZE))
     left = text_width([*names, "load cell"], _NAME_SIZE) + _TICKS / 72.0
     kinds = 5 + len({code for row in rows for code in row.course.within(trace.view).status.tolist() if code})
@@ -98,25 +109,9 @@ def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) 
         legend.add("trigger")
     _name(axes, _row_name(trace, row))
     verdict, detail = _verdict(trace, row)
-    axes.annotate(
-        verdict,
-        (1.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(_AWAY, 0),
-        textcoords="offset points",
-        va="bottom" if detail else "center",
-        fontsize=_VERDICT_SIZE,
-        fontweight="bold",
-    )
-    axes.annotate(
-        detail,
-        (1.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(_AWAY, -3),
-        textcoords="offset points",
-        va="top",
-        fontsize=_DETAIL_SIZE,
-    )
+    side = "bottom" if detail else "center"
+    write(axes, verdict, (1.0, 0.5), (_AWAY, 0), va=side, fontsize=_VERDICT_SIZE, fontweight="bold")
+    write(axes, detail, (1.0, 0.5), (_AWAY, -3), va="top", fontsize=_DETAIL_SIZE)
 
 
 def _seen(trace: Trace, row: Panel) -> Seen | None:
@@ -129,16 +124,16 @@ def _late(trace: Trace, row: Panel) -> float:
 
 
 def _triggers(trace: Trace, row: Panel, span: Span) -> list[Span]:
-    """From when to when the trigger stands within `span` [s]: each alarm until it is armed again.
+    """Return from when to when the trigger is on within `span` [s]: each alarm until it is re-armed.
 
-    Where the contact's own detection is a crossing of an alarm that still stands, it begins a piece of its own.
+    If the contact's detection is a crossing during an earlier alarm, it begins an interval of its own.
     """
     held = trigger_spans(row.alarms, row.rearmed, trace.end)
     seen = _seen(trace, row)
     if seen and seen.outcome == "detected" and seen.alarm not in row.alarms:
-        stands = next(((start, end) for start, end in held if start <= seen.alarm <= end), (seen.alarm, trace.end))
-        cut = [(start, seen.alarm) if (start, end) == stands else (start, end) for start, end in held]
-        held = [*cut, (seen.alarm, stands[1])]
+        current = next(((start, end) for start, end in held if start <= seen.alarm <= end), (seen.alarm, trace.end))
+        cut = [(start, seen.alarm) if (start, end) == current else (start, end) for start, end in held]
+        held = [*cut, (seen.alarm, current[1])]
     return [(start, min(end, span[1])) for start, end in held if start <= span[1] and end >= span[0]]
 
 
@@ -167,17 +162,8 @@ def _row_name(trace: Trace, row: Panel) -> str:
 
 
 def _name(axes: Axes, text: str) -> None:
-    """Names in one line below each other, whatever the numbers beside them."""
-    axes.annotate(
-        text,
-        (0.0, 0.5),
-        xycoords="axes fraction",
-        xytext=(-_TICKS, 0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize=_NAME_SIZE,
-    )
+    """Write the names of rows aligned with each other, whatever the numbers of the ticks."""
+    write(axes, text, (0.0, 0.5), (-_TICKS, 0), ha="right", va="center", fontsize=_NAME_SIZE)
 
 
 def _title(trace: Trace) -> str:
@@ -193,22 +179,22 @@ def _title(trace: Trace) -> str:
 
 
 def write_triggers(report: Report, folder: Path) -> list[Image]:
-    """Draw triggers_<group>.png of one operation of each group for a report folder; raises CdtoolError (see `save`)."""
+    """Draw triggers_<group>.png of an operation per group for a report folder; raises CdtoolError (see `save`)."""
     images, taken = [], set[str]()
     for group in report.evaluated.results.groups:
         of_group = [trace for trace in report.traces if trace.group == group]
         if of_group:
-            trace = most_telling(of_group)
+            trace = most_informative(of_group)
             name = f"triggers_{slug(group, taken)}.png"
             images.append(Image(name, f"{trace.recording}: all detectors", group))
             plot_triggers(trace, folder / name)
     return images
 
 
-def most_telling(traces: Sequence[Trace]) -> Trace:
-    """The trace with a contact, then that of most detectors, then where most of them could judge; the first of equals.
+def most_informative(traces: Sequence[Trace]) -> Trace:
+    """Return the trace with a contact, then of most detectors, then with most assessable ones; the first of equals.
 
-    There is at least one.
+    `traces` is not empty.
     """
     return max(
         traces,

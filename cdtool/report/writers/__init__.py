@@ -1,11 +1,12 @@
-"""Report writers: results and traces -> a file. One file a writer; `--output` chooses by the suffix of its name."""
+"""Report writers, one per file: results or comparisons -> a file. `--output` chooses by the suffix of its name."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from cdtool.registry import Registry
-from cdtool.report.writers.base import Writer
+from cdtool.report.writers.base import Subject, Writer
 
 WRITERS = Registry(
     kind="writer",
@@ -17,27 +18,34 @@ WRITERS = Registry(
         "contacts": "cdtool.report.writers.contacts:Contacts",
         "forces": "cdtool.report.writers.forces:Forces",
         "figure": "cdtool.report.writers.figure:Figure",
+        "comparison_markdown": "cdtool.report.writers.comparison_markdown:ComparisonMarkdown",
+        "comparison_json": "cdtool.report.writers.comparison_json:ComparisonJson",
     },
-    contract=("name", "suffixes", "in_folder", "kinds", "files", "has_content", "write"),
+    contract=("name", "suffixes", "in_folder", "subject", "kinds", "files", "has_content", "write"),
 )
 
 
-def own_writers() -> list[Writer]:
-    """Return cdtool's own writers, in the order of the table."""
-    return [WRITERS.load(name)() for name in WRITERS.names()]
+def own_writers(subject: Subject) -> list[Writer[Any]]:
+    """Return cdtool's own writers of a subject, in the order of the table."""
+    return _writers(WRITERS.names(), subject)
 
 
-def writer_of(target: Path) -> Writer | None:
-    """Return the writer of a name's suffix, those of plug-ins included; None where there is none."""
+def writer_of(target: Path, subject: Subject) -> Writer[Any] | None:
+    """Return the writer of a name's suffix, cdtool's own before those of plug-ins; None if there is no such writer."""
     suffix = target.suffix.lower()
-    own = (writer for writer in own_writers() if suffix in writer.suffixes)
-    return next(own, None) or next((writer for writer in _plugins() if suffix in writer.suffixes), None)
+    own = (writer for writer in own_writers(subject) if suffix in writer.suffixes)
+    return next(own, None) or next((writer for writer in _plugins(subject) if suffix in writer.suffixes), None)
 
 
-def known_suffixes() -> list[str]:
+def known_suffixes(subject: Subject) -> list[str]:
     """Return every suffix that can be written, cdtool's own first."""
-    return list(dict.fromkeys(suffix for writer in (*own_writers(), *_plugins()) for suffix in writer.suffixes))
+    writers = (*own_writers(subject), *_plugins(subject))
+    return list(dict.fromkeys(suffix for writer in writers for suffix in writer.suffixes))
 
 
-def _plugins() -> list[Writer]:
-    return [WRITERS.load(name)() for name in WRITERS.usable_names() if name not in WRITERS.table]
+def _plugins(subject: Subject) -> list[Writer[Any]]:
+    return _writers([name for name in WRITERS.usable_names() if name not in WRITERS.table], subject)
+
+
+def _writers(names: list[str], subject: Subject) -> list[Writer[Any]]:
+    return [made for made in (WRITERS.load(name)() for name in names) if made.subject == subject]

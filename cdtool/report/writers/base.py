@@ -1,21 +1,26 @@
-"""What every report writer is, and what it is given."""
+"""The contract of report writers, and what they write."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Generic, Literal, TypeVar
 
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.foreign_files import Kind
+from cdtool.report.model import Model, report_model
+
+Subject = Literal["benchmark", "comparison"]
+Content = TypeVar("Content")
 
 
 @dataclass(frozen=True)
 class Image:
-    """A figure beside the report: its file name, caption, and group (None: of all groups)."""
+    """A figure in the report's folder: its file name, caption, and group (None: of all groups)."""
 
     name: str
     caption: str
@@ -24,28 +29,35 @@ class Image:
 
 @dataclass(frozen=True)
 class Report:
-    """What a report shows: results with their statistics, the traces that were kept, and the figures in its folder."""
+    """What the reports of a benchmark show: results with their statistics, traces, and the figures in its folder."""
 
     evaluated: Evaluated
-    traces: tuple[Trace, ...]
+    traces: tuple[Trace, ...] = ()
     images: tuple[Image, ...] = ()
 
+    @cached_property
+    def model(self) -> Model:
+        """The tables, texts and test cases that all renderers show."""
+        return report_model(self.evaluated)
 
-class Writer:
-    """The contract; a writer is derived from it.
 
-    `name` is the one it is registered under. `suffixes`: those of the names that it writes for `--output`; none where
-    it only writes into a folder of everything, as `in_folder`. `kinds`: by suffix, what marks a file that it wrote; any
-    other file of that name is replaced with `--force` only.
+class Writer(Generic[Content]):
+    """The base class of writers, of a `Report` or of a `BuildComparison`.
+
+    `name` is the name it is registered under. `subject`: what it writes, the reports of a benchmark or the comparison
+    of two builds. `suffixes`: of the names that it writes for `--output`; none if it writes only into a report folder,
+    as `in_folder`. `kinds`: by suffix, what marks a file that it wrote; any other file of that name is replaced only
+    with `--force`.
     """
 
     name: ClassVar[str]
+    subject: ClassVar[Subject] = "benchmark"
     suffixes: ClassVar[tuple[str, ...]] = ()
     in_folder: ClassVar[str] = ""
     kinds: ClassVar[Mapping[str, Kind]] = {}
 
     def __init_subclass__(cls) -> None:
-        """Raise ConfigurationError for a suffix that no name can have, or that no kind belongs to."""
+        """Raise ConfigurationError for a suffix that a name cannot have, or without a kind."""
         for suffix in (*cls.suffixes, *([Path(cls.in_folder).suffix] if cls.in_folder else [])):
             if not suffix.startswith(".") or suffix != suffix.lower() or suffix not in cls.kinds:
                 raise ConfigurationError(
@@ -53,13 +65,13 @@ class Writer:
                 )
 
     def files(self, target: Path) -> tuple[Path, ...]:
-        """Return all files that are written for a target, itself first."""
+        """Return all files that are written for a target, the target first."""
         return (target,)
 
-    def has_content(self, report: Report) -> bool:  # noqa: ARG002 - most writers always have
+    def has_content(self, report: Content) -> bool:  # noqa: ARG002 - most writers always have
         """Return whether there is anything to write into a folder."""
         return True
 
-    def write(self, report: Report, target: Path) -> None:
-        """Write the report by `cdtool.files`; raises CdtoolError. The same report gives the same bytes."""
+    def write(self, report: Content, target: Path) -> None:
+        """Write the report by `cdtool.files`; raises CdtoolError. The same report produces the same bytes."""
         raise NotImplementedError

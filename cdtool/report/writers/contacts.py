@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import ClassVar
 
+from cdtool.evaluation.results import ContactResult, Results
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind
+from cdtool.report.csv_text import csv_text
 from cdtool.report.writers.base import Report, Writer
 
 
-class Contacts(Writer):
+class Contacts(Writer[Report]):
     """CSV: a row per contact and detector."""
 
     name: ClassVar[str] = "contacts"
@@ -20,6 +23,10 @@ class Contacts(Writer):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.contacts_csv import contacts_csv
-
         write_text(target, contacts_csv(report.evaluated.results))
+
+
+def contacts_csv(results: Results) -> str:
+    """Return a row per contact and detector, in the order and under the names of results.json; empty = no value."""
+    names = [item.name for item in fields(ContactResult)]
+    return csv_text(names, ([getattr(contact, name) for name in names] for contact in results.contacts))

@@ -10,7 +10,7 @@ from cdtool.report.plots.figures import SUFFIXES
 from cdtool.report.writers.base import Report, Writer
 
 
-class Figure(Writer):
+class Figure(Writer[Report]):
     """PNG, SVG or PDF: the latencies of every detector in every group."""
 
     name: ClassVar[str] = "figure"

@@ -5,12 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
+from cdtool.evaluation.results import Results
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind
+from cdtool.report.csv_text import csv_text
 from cdtool.report.writers.base import Report, Writer
 
+_OF_CONTACT = ("recording", "group", "contact", "point", "profile", "verdict", "peak_n")
+_OF_STEP = ("name", "from_s", "at_most_n", "peak_n", "time_budget_ms", "verdict", "reason")
+_NAMES = (*_OF_CONTACT, "step", *(f"step_{name}" for name in _OF_STEP[1:]))
 
-class Forces(Writer):
+
+class Forces(Writer[Report]):
     """CSV: a row per contact, detector and step of its force profile."""
 
     name: ClassVar[str] = "forces"
@@ -23,6 +29,14 @@ class Forces(Writer):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.forces_csv import forces_csv
-
         write_text(target, forces_csv(report.evaluated.results))
+
+
+def forces_csv(results: Results) -> str:
+    """Return a row per contact and step, in the order of results.json; empty = no value, or never exceeded."""
+    rows = (
+        [getattr(force, name) for name in _OF_CONTACT] + [getattr(step, name) for name in _OF_STEP]
+        for force in results.forces
+        for step in force.steps
+    )
+    return csv_text(_NAMES, rows)

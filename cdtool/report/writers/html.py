@@ -10,8 +10,8 @@ from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Report, Writer
 
 
-class Html(Writer):
-    """HTML: one page with tables, plots and the viewer of traces; it loads nothing."""
+class Html(Writer[Report]):
+    """HTML: one page with tables, plots and the viewer of traces; it loads no other file."""
 
     name: ClassVar[str] = "html"
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
@@ -22,4 +22,4 @@ class Html(Writer):
         """Write it; raises CdtoolError."""
         from cdtool.report.html.page import to_html
 
-        write_text(target, to_html(report.evaluated, report.traces))
+        write_text(target, to_html(report))

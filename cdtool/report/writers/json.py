@@ -1,4 +1,4 @@
-"""results.json: every row of a benchmark, and the traces beside it."""
+"""results.json: every row of a benchmark, and the traces in a second file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Report, Writer
 
 
-class Json(Writer):
-    """JSON results, which `cdtool report` and `cdtool compare` read; the traces are a file of their own beside them."""
+class Json(Writer[Report]):
+    """JSON results, which `cdtool report` and `cdtool compare` read; the traces are in a second file."""
 
     name: ClassVar[str] = "json"
     suffixes: ClassVar[tuple[str, ...]] = (".json",)
@@ -31,7 +31,7 @@ class Json(Writer):
         """Write results and traces: both or neither. Raises CdtoolError."""
         text = to_json(report.evaluated.results)
         if target.exists() and not target.is_file():
-            write_text(target, text)  # a device or pipe has nothing beside it
+            write_text(target, text)  # a device or pipe has no second file
             return
         with replaced(*self.files(target)) as (results, traces):
             results.write_bytes(text.encode("utf-8", "replace"))

@@ -10,8 +10,8 @@ from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Report, Writer
 
 
-class Markdown(Writer):
-    """Markdown: the tables as text; in a folder it links the figures."""
+class Markdown(Writer[Report]):
+    """Markdown: the tables as text; in a folder with links to the figures."""
 
     name: ClassVar[str] = "markdown"
     suffixes: ClassVar[tuple[str, ...]] = (".md",)
@@ -20,6 +20,6 @@ class Markdown(Writer):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.markdown.markdown import to_markdown
+        from cdtool.report.markdown.report import to_markdown
 
-        write_text(target, to_markdown(report.evaluated, report.images))
+        write_text(target, to_markdown(report))

@@ -12,9 +12,8 @@ from cdtool.errors import RecordingError, UsageError, nearest
 from cdtool.files import replaced
 from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
 from cdtool.ingest.channel_assembly import file_digest
-from cdtool.ingest.part_pieces import FoundParts
 from cdtool.ingest.parts import joined_digest
-from cdtool.ingest.reading import log_parts
+from cdtool.ingest.reading import FoundParts, log_parts
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import Finding
 from cdtool.version import __version__

@@ -9,8 +9,7 @@ from tempfile import TemporaryDirectory
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.files import write_text
-from cdtool.ingest.element_names import element_names
-from cdtool.ingest.reading import choose_format, has_topics, log_parts
+from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import CHANNELS, Finding
 from cdtool.workflows.information import info

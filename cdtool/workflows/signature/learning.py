@@ -77,7 +77,7 @@ class LearningOptions:
 
 
 def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
-    """Learn one detector's threshold from impact-free logs: a signature for each class of motion, or another rule.
+    """Learn the threshold of one detector from impact-free logs.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ def study_sensors(
     --------
     >>> import cdtool
     >>> study = cdtool.study_sensors("sample_logs/gate/machine.toml", "docs/examples/gate_study.toml")
-    >>> [sight.sensor.name for sight in study.ranking.sights]
+    >>> [response.sensor.name for response in study.ranking.responses]
     ['load_cell', 'accelerometer', 'torque_sensor', 'motor_position', 'motor_speed', 'motor_torque']
     """
     file = read_machine_file(machine)

@@ -15,7 +15,7 @@ from cdtool.evaluation.results_file import to_json as results_json
 from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p
 from cdtool.evaluation.statistics.rates import poisson_difference_p
 from cdtool.evaluation.statistics.sample_size import detectable_difference, impacts_for_unpaired
-from cdtool.report.build_report import to_json
+from cdtool.report.writers.comparison_json import to_json
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
 from tests.made_up.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
 from tests.report.hostile import HOSTILE
@@ -338,7 +338,7 @@ def test_other_rules_are_refused_by_their_key(key):
     value, words = OTHER_RULES[key]
     with pytest.raises(ConfigurationError, match=words) as fault:
         compare_builds(single(latencies()), single(latencies(), **{key: value}))
-    assert "run one of them again" in fault.value.hint
+    assert "run one again" in fault.value.hint
 
 
 def test_what_is_under_test_may_differ_and_is_listed():

@@ -40,7 +40,7 @@ def read(path: Path, **options) -> tuple[list[Message], list[Finding], Log]:
     found = []
     for piece in log.pieces():
         rows = [
-            (int(batch.start[i]), item.stream.channel.topic, int(batch.log_time[i]), _payload(batch, i))
+            (int(batch.start[i]), item.stream.topic, int(batch.log_time[i]), _payload(batch, i))
             for item in piece
             for batch in [item.batch]
             for i in range(len(batch))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.formats.mcap import Mcap
-from cdtool.messages.gathering import in_order
+from cdtool.messages.topic import in_order
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 
 _LATEST = 2**64 - 1

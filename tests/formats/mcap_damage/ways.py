@@ -107,7 +107,7 @@ def _of_log(log: Log, topics: tuple[str, ...] | None = None) -> Reading:
     given: list[tuple[Key, float]] = []
     for piece in log.pieces():
         for messages in piece:
-            batch, topic = messages.batch, messages.stream.channel.topic
+            batch, topic = messages.batch, messages.stream.topic
             rows = zip(batch.start.tolist(), batch.length.tolist(), batch.log_time.tolist(), strict=True)
             given += (((topic, bytes(batch.data[at : at + size])), time / 1e9) for at, size, time in rows)
     return Reading(tuple(given), tuple(log.findings()), topics=topics)

@@ -1,4 +1,4 @@
-"""A small benchmark that has something in every part of a report, made without running any detector."""
+"""A small benchmark with content in every part of a report, made without running a detector."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def trace_of(named: Naming, group: str, log: str) -> Trace:
 
 
 def free_trace(named: Naming, group: str) -> Trace:
-    """The second operation of the impact-free log, with a false alarm and a detector that could judge nothing."""
+    """The second operation of the impact-free log, with a false alarm and a detector that could not assess anything."""
     panels = (
         _panel(named, "quick", None, (1.0,)),
         _panel(named, "slow", None, (), verdict="not_assessable", reason=named("start-up 100 %")),

@@ -1,4 +1,4 @@
-"""The HTML report is one harmless file that holds every figure."""
+"""The HTML report is one harmless file that contains all results."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ from cdtool.evaluation.results import ContactResult, RecordingResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.traces.file import NO_LIMIT
 from cdtool.plain_text import plain
-from cdtool.report.figure_text import number, percent, with_interval
 from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import css_colour
-from cdtool.report.html.recordings import log_of
-from cdtool.report.html.tables import interval_cell
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
-from cdtool.report.plots.style import BAND, LIMIT, UNJUDGED, look_of
+from cdtool.report.number_text import number, percent, with_interval
+from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
+from cdtool.report.table import interval_cell
+from cdtool.report.tables.recordings import log_of
+from cdtool.report.writers.base import Report
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case, trace_of
 
@@ -118,7 +119,7 @@ def parsed(text: str) -> Page:
 @pytest.fixture(scope="module")
 def made() -> tuple[Evaluated, str]:
     evaluated, traces = case()
-    return evaluated, to_html(evaluated, traces)
+    return evaluated, to_html(Report(evaluated, traces))
 
 
 @pytest.fixture(scope="module")
@@ -162,14 +163,14 @@ def test_every_other_script_is_a_block_of_strict_json(made, page):
 
 
 def test_the_same_input_gives_the_same_bytes(made):
-    assert to_html(*case()) == made[1]
+    assert to_html(Report(*case())) == made[1]
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_are_text_and_nothing_else(page, kind):
     hostile = HOSTILE[kind]
     # Names have to differ from one another, as those of detectors and groups do.
-    text = to_html(*case(lambda name: f"{hostile}{name}"))
+    text = to_html(Report(*case(lambda name: f"{hostile}{name}")))
     found = parsed(text)
     assert found.tags == page.tags
     assert [name for _, name, _ in found.attributes if name != "class"] == [
@@ -178,19 +179,19 @@ def test_hostile_names_are_text_and_nothing_else(page, kind):
     assert all(character.isprintable() or character == "\n" for character in text)
     assert found.data["detectors"][0]["name"] == plain(f"{hostile}quick")
     assert found.data["recordings"][0] == plain(f"{hostile}stiff/{hostile}01.csv")
-    assert found.tables["figures-table"][1][0].split(" (")[0].strip() == plain(f"{hostile}quick").strip()
+    assert found.tables["results-table"][1][0].split(" (")[0].strip() == plain(f"{hostile}quick").strip()
 
 
 def test_a_name_that_is_empty_can_still_be_seen():
     evaluated, _ = case()
     results = replace(evaluated.results, recordings=(RecordingResult("", "stiff", "", 1.0, 1, 0),))
-    found = parsed(to_html(evaluate(results), ()))
+    found = parsed(to_html(Report(evaluate(results))))
     assert found.tables["recordings-table"][1][0] == "(no name)"
 
 
-def test_every_figure_of_the_summaries_is_in_the_table(made, page):
+def test_every_value_of_the_summaries_is_in_the_table(made, page):
     evaluated, _ = made
-    rows = page.tables["figures-table"][1:]
+    rows = page.tables["results-table"][1:]
     assert len(rows) == len(evaluated.summaries)
     for row, item in zip(rows, evaluated.summaries, strict=True):
         assert row[0].startswith(item.detector) and row[1] == item.group
@@ -216,8 +217,8 @@ def test_below_ten_contacts_the_table_shows_median_and_range_and_the_plots_no_in
     results = evaluated.results
     alone = tuple(replace(item, campaign=None) for item in results.recordings)
     evaluated = evaluate(replace(results, recordings=alone))
-    found = parsed(to_html(evaluated, traces))
-    head, *rows = found.tables["figures-table"]
+    found = parsed(to_html(Report(evaluated, traces)))
+    head, *rows = found.tables["results-table"]
     assert head[2:5] == ["median [ms]", "range [ms]", "contacts detected"]
     for row, item in zip(rows, evaluated.summaries, strict=True):
         if item.contacts:
@@ -229,31 +230,31 @@ def test_below_ten_contacts_the_table_shows_median_and_range_and_the_plots_no_in
     assert "Fewer than 10 contacts detected: median and range, no mean, std or P95." in found.text
     many, _ = case()
     unnamed = replace(many.results, recordings=tuple(replace(item, campaign=None) for item in many.results.recordings))
-    page = parsed(to_html(evaluate(unnamed), ()))
+    page = parsed(to_html(Report(evaluate(unnamed))))
     assert len(page.data["latency"][0]["rows"][0]["median"]) == 3 and "low" in page.data["survival"][0]["rows"][0]
 
 
 def test_an_interval_without_an_upper_end_takes_two_lines():
-    assert interval_cell(Interval(33.5, 31.0, 40.0)).lines == "33.5\n(31.0 to 40.0)"
-    assert interval_cell(Interval(33.5, 31.0, math.inf)).lines == "33.5\n(31.0\nto not reached)"
+    assert interval_cell(Interval(33.5, 31.0, 40.0)).lines == ("33.5", "(31.0 to 40.0)")
+    assert interval_cell(Interval(33.5, 31.0, math.inf)).lines == ("33.5", "(31.0", "to not reached)")
 
 
-def test_a_detector_that_judged_nothing_has_no_false_alarms_to_speak_of():
+def test_a_detector_that_assessed_nothing_has_no_count_of_false_alarms():
     evaluated, _ = case(limits=False)
     quick, *others = evaluated.results.detectors
     exposure = tuple(
         replace(item, not_assessable=item.operations, hours=0.0) if item.detector == quick else item
         for item in evaluated.results.exposure
     )
-    found = parsed(to_html(evaluate(replace(evaluated.results, exposure=exposure)), ()))
-    rows = found.tables["figures-table"][1:]
+    found = parsed(to_html(Report(evaluate(replace(evaluated.results, exposure=exposure)))))
+    rows = found.tables["results-table"][1:]
     assert {tuple(row[9:11]) for row in rows if row[0].startswith(quick)} == {
-        ("not assessable judged in none of 12 operations", "–")
+        ("not assessable in any of 12 operations", "–")
     }
     assert all("at most" in row[10] for row in rows if row[0] == others[0])
     assert found.tables["recordings-table"][-1][3:5] == ["not assessable", "1 false alarm"]
     blind = tuple(replace(item, not_assessable=item.operations, hours=0.0) for item in exposure)
-    text = parsed(to_html(evaluate(replace(evaluated.results, exposure=blind, false_alarms=())), ())).text
+    text = parsed(to_html(Report(evaluate(replace(evaluated.results, exposure=blind, false_alarms=()))))).text
     assert "false alarms not assessable" in text
     assert "0 false alarms" not in text
 
@@ -266,12 +267,12 @@ def test_pairs_without_a_difference_say_whether_there_were_enough_recordings_for
             for i, item in enumerate(evaluated.results.contacts)
         )
         recordings = tuple(replace(item, campaign="") for item in evaluated.results.recordings)
-        found = parsed(to_html(evaluate(replace(evaluated.results, contacts=same, recordings=recordings)), ()))
+        found = parsed(to_html(Report(evaluate(replace(evaluated.results, contacts=same, recordings=recordings)))))
         assert {row[3] for row in found.tables["comparisons-table"][1:]} == {words}
 
 
-def test_misses_and_what_could_not_be_assessed_stand_beside_the_latencies(page):
-    slow = next(row for row in page.tables["figures-table"] if row[:2] == ["slow", "stiff"])
+def test_a_row_of_latencies_includes_missed_and_not_assessable_contacts(page):
+    slow = next(row for row in page.tables["results-table"] if row[:2] == ["slow", "stiff"])
     assert slow[6:9] == ["10 of 12", "1 of 11 at most 36 %", "1"]
     assert "not reached" in slow[5]
     lane = page.data["latency"][0]["rows"][1]
@@ -280,7 +281,7 @@ def test_misses_and_what_could_not_be_assessed_stand_beside_the_latencies(page):
 
 
 def test_the_verdict_names_violated_limits_first_and_folds_those_that_are_met(made, page):
-    outcomes = [row[0] for row in page.tables["limits-table"][1:]]
+    outcomes = [row[0] for row in page.tables["not-met-table"][1:]]
     assert outcomes == ["violated"]
     assert len(page.tables["met-table"]) - 1 == len(made[0].results.limits) - 1
     assert "1 of 8 limits not met (1 violated)" in page.text
@@ -290,13 +291,13 @@ def test_the_verdict_names_violated_limits_first_and_folds_those_that_are_met(ma
 
 def test_without_limits_the_verdict_says_what_was_found():
     evaluated, traces = case(limits=False)
-    found = parsed(to_html(evaluated, traces))
+    found = parsed(to_html(Report(evaluated, traces)))
     assert "limits are set 24 contacts with 2 detectors: 44 detected, 2 missed, 2 not assessable" in found.text
-    assert "limits-table" not in found.tables
+    assert "not-met-table" not in found.tables
 
 
-def test_nothing_scored_is_said_and_makes_no_plots():
-    found = parsed(to_html(evaluate(Results({}, (), (), (), (), ())), ()))
+def test_a_report_without_scored_recordings_states_this_and_has_no_plots():
+    found = parsed(to_html(Report(evaluate(Results({}, (), (), (), (), ())))))
     assert "Nothing was scored." in found.text
     assert "svg" not in found.tags
     assert not found.tables
@@ -305,7 +306,7 @@ def test_nothing_scored_is_said_and_makes_no_plots():
 def test_colours_are_those_of_the_figures(page):
     looks = [(item["colour"], item["marker"]) for item in page.data["detectors"]]
     assert looks == [(css_colour(look_of(name).colour), look_of(name).marker) for name in ("quick", "slow")]
-    for name, colour in (("band", BAND), ("limit", LIMIT), ("unjudged", UNJUDGED)):
+    for name, colour in (("band", BAND), ("limit", LIMIT), ("not-assessed", NOT_ASSESSED)):
         assert f"--{name}: {css_colour(colour).lower()};" in page.styles[0]
 
 
@@ -330,8 +331,8 @@ def test_a_force_curve_has_the_verdict_of_its_contact(page):
     panel = page.data["force"][0]
     assert panel["steps"] == [[0, 400, "dynamic"], [0.75, 150, "static"]]
     assert panel["curves"][0] == {"trace": 0, "contact": 0, "verdict": "fail", "peak": 900, "budget": 12.5}
-    assert "values to be checked against the standard" in page.text
-    assert page.tables["forces-table"][1][6] == "dynamic 500 of 400 N: fail; static 750 of 150 N: not assessable"
+    assert "Values to be checked against the standard." in page.text
+    assert page.tables["forces-table"][1][7] == "dynamic 500 of 400 N: fail; static 750 of 150 N: not assessable"
 
 
 def test_every_recording_has_a_row_without_script_and_opens_its_own_trace(made, page):
@@ -351,12 +352,12 @@ def test_a_hash_sign_in_a_logs_own_name_is_no_operation():
     assert log_of("a", "run#3", logs) == ("a", "run")
 
 
-def test_what_was_left_out_and_where_it_came_from_is_told(page):
+def test_what_was_left_out_and_the_provenance_are_shown(page):
     assert page.tables["skipped-table"][1] == ["broken.csv", "empty file"]
     assert page.tables["findings-table"][1] == ["odd.csv", "a gap of 2 s"]
-    assert page.tables["not-judged-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
-    assert page.tables["calibration-table"][1] == ["quick", "1/15op", "5.50", "2", "30", "0.0600"]
-    assert ["its version", "9.8.7"] in page.tables["provenance-table"]
+    assert page.tables["not-assessable-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
+    assert page.tables["calibration-table"][1] == ["quick (q)", "1/15op", "5.50", "2", "30", "0.0600"]
+    assert ["cdtool version", "9.8.7"] in page.tables["provenance-table"]
     assert page.tables["learned-table"][1] == ["learn.csv", "ef" * 32]
 
 
@@ -417,6 +418,6 @@ def test_five_thousand_recordings_stay_below_fifteen_megabytes():
         for panel in trace_of(str, "stiff", log).panels[:1]
     ]
     summaries = tuple(replace(evaluated.summaries[0], detector=name) for name in detectors)
-    text = to_html(Evaluated(results, summaries, ()), traces)
+    text = to_html(Report(Evaluated(results, summaries, ()), tuple(traces)))
     assert 2e6 < len(text.encode()) < 15e6
     assert all(log in text for log in (logs[0], logs[-1]))

@@ -1,4 +1,4 @@
-"""The HTML report as a reader meets it: in a real browser, without network."""
+"""The HTML report in a real browser, without network."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 from cdtool.plain_text import plain
 from cdtool.report.html.page import to_html
+from cdtool.report.writers.base import Report
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
 
@@ -22,7 +23,7 @@ FLAGS = (
 )
 
 pytestmark = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER), reason="Chromium or chromedriver is absent: the HTML report was not looked at"
+    not (CHROMIUM and DRIVER), reason="Chromium or chromedriver is absent: the HTML report was not checked"
 )
 
 
@@ -68,14 +69,14 @@ def texts(browser: Any, selector: str) -> list[str]:
 
 
 def drawn_range(browser: Any, selector: str = "#viewer-plot") -> tuple[float, float]:
-    """What the plot's axis spans; a zoom is drawn with the next frame."""
+    """Return the range of the plot's axis; a zoom is drawn with the next frame."""
     browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
     element = all_of(browser, selector)[0]
     return float(element.get_attribute("data-from")), float(element.get_attribute("data-to"))
 
 
 def drag(browser: Any, element: Any, begin: float, end: float) -> None:
-    """From one share of an element's width to another."""
+    """Drag from one share of an element's width to another."""
     from selenium.webdriver.common.action_chains import ActionChains
 
     browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", element)
@@ -90,7 +91,7 @@ def press(element: Any, keys: str) -> None:
 
 
 def test_the_page_loads_without_errors_and_draws_every_plot(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     assert browser.get_log("browser") == []
     kinds = [item.get_attribute("data-plot") for item in all_of(browser, "svg[data-plot]")]
     assert kinds == ["latency"] * 2 + ["survival"] * 2 + ["amoc"] * 2 + ["force"] * 2
@@ -105,7 +106,7 @@ def test_the_page_loads_without_errors_and_draws_every_plot(shown):
 
 
 def test_a_click_on_a_recording_shows_its_trigger_plot(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     row = next(
         item for item in all_of(browser, '.paged[data-table="recordings-table"] tr.opens') if "02.csv" in item.text
     )
@@ -121,8 +122,8 @@ def test_a_click_on_a_recording_shows_its_trigger_plot(shown):
     assert "stiff/02.csv" in texts(browser, "tr.open")[0]
 
 
-def test_an_operation_without_contact_tells_its_false_alarm_and_who_could_judge_nothing(shown):
-    browser = shown(to_html(*case()))
+def test_an_operation_without_contact_shows_false_alarms_and_detectors_that_assessed_nothing(shown):
+    browser = shown(to_html(Report(*case())))
     for _ in range(3):
         all_of(browser, '[data-do="after"]')[0].click()
     assert texts(browser, "#viewer-title") == ["free.csv#2"]
@@ -133,7 +134,7 @@ def test_an_operation_without_contact_tells_its_false_alarm_and_who_could_judge_
 
 
 def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     plot = all_of(browser, "#viewer-plot")[0]
     home = drawn_range(browser)
     assert home == pytest.approx((1.9, 2.5))
@@ -154,7 +155,7 @@ def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
 
 
 def test_the_wheel_zooms_only_a_plot_that_has_the_focus(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     turn = "arguments[0].dispatchEvent(new WheelEvent('wheel', { deltaY: -100, clientX: 700, cancelable: true }))"
     plot = all_of(browser, "#viewer-plot")[0]
     home = drawn_range(browser)
@@ -167,10 +168,10 @@ def test_the_wheel_zooms_only_a_plot_that_has_the_focus(shown):
 
 
 def test_the_first_table_sorts_by_a_click_on_its_heading(shown):
-    browser = shown(to_html(*case(limits=False)))
-    rows = "#figures-table tbody tr td:nth-child(5)"
+    browser = shown(to_html(Report(*case(limits=False))))
+    rows = "#results-table tbody tr td:nth-child(5)"
     before = texts(browser, rows)
-    heading = all_of(browser, "#figures-table th:nth-child(5) button")[0]
+    heading = all_of(browser, "#results-table th:nth-child(5) button")[0]
     heading.click()
     rising = [text.split(" ")[0] for text in texts(browser, rows)]
     assert rising[:4] == sorted((text.split(" ")[0] for text in before[:4]), key=float)
@@ -179,11 +180,11 @@ def test_the_first_table_sorts_by_a_click_on_its_heading(shown):
     falling = [text.split(" ")[0] for text in texts(browser, rows)]
     assert falling[:4] == rising[3::-1]
     assert falling[4:] == ["–", "–"]
-    assert all_of(browser, "#figures-table th:nth-child(5)")[0].get_attribute("aria-sort") == "descending"
+    assert all_of(browser, "#results-table th:nth-child(5)")[0].get_attribute("aria-sort") == "descending"
 
 
 def test_recordings_are_paged_searched_and_filtered(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     table = '.paged[data-table="recordings-table"]'
     assert len(all_of(browser, f"{table} tbody tr")) == 15
     assert texts(browser, f"{table} .pages span") == ["1 to 15 of 25"]
@@ -199,7 +200,7 @@ def test_recordings_are_paged_searched_and_filtered(shown):
 
 
 def test_a_detectors_curve_is_hidden_by_its_name(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     assert len(all_of(browser, '[data-plot="survival"] path.line')) == 4
     button = all_of(browser, '.legend[data-for="survival"] button')[0]
     browser.execute_script("arguments[0].click()", button)
@@ -207,38 +208,38 @@ def test_a_detectors_curve_is_hidden_by_its_name(shown):
     assert len(all_of(browser, '[data-plot="survival"] path.line')) == 2
 
 
-def test_what_is_under_the_pointer_is_told(shown):
+def test_a_tooltip_shows_the_values_under_the_pointer(shown):
     from selenium.webdriver.common.action_chains import ActionChains
 
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     plot = all_of(browser, '[data-plot="survival"]')[0]
     browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
     ActionChains(browser, duration=20).move_to_element(plot).perform()
-    told = texts(browser, "#tooltip")[0].split("\n")
-    assert told[0].endswith("ms after the onset, undetected:")
-    assert told[1].startswith("quick: ") and told[2].startswith("slow: ")
+    lines = texts(browser, "#tooltip")[0].split("\n")
+    assert lines[0].endswith("ms after the onset, undetected:")
+    assert lines[1].startswith("quick: ") and lines[2].startswith("slow: ")
     assert all_of(browser, "#tooltip")[0].is_displayed()
 
 
 @pytest.mark.parametrize("width", [400, 1400])
 def test_nothing_makes_the_page_scroll_sideways(shown, width):
     for named in (str, lambda name: HOSTILE["long"] + name):
-        browser = shown(to_html(*case(named)), width)
+        browser = shown(to_html(Report(*case(named))), width)
         assert browser.execute_script("return document.documentElement.scrollWidth") <= width
 
 
-def test_the_table_of_figures_fits_a_wide_screen_with_all_its_columns(shown):
-    browser = shown(to_html(*case(lambda name: f"{name}_observer")), 1400)
+def test_the_table_of_results_fits_a_wide_screen_with_all_its_columns(shown):
+    browser = shown(to_html(Report(*case(lambda name: f"{name}_observer"))), 1400)
     widths = (
-        "const box = document.getElementById('figures-table').parentNode; return [box.scrollWidth, box.clientWidth]"
+        "const box = document.getElementById('results-table').parentNode; return [box.scrollWidth, box.clientWidth]"
     )
     wanted, given = browser.execute_script(widths)
     assert wanted <= given
-    assert "force limit" in texts(browser, "#figures-table th:last-child")[0]
+    assert "force limit" in texts(browser, "#results-table th:last-child")[0]
 
 
 def test_no_tick_of_a_trigger_plot_touches_the_name_of_its_row(shown):
-    browser = shown(to_html(*case()))
+    browser = shown(to_html(Report(*case())))
     boxes = (
         "return [...document.querySelectorAll('#viewer-plot text')].map((item) => { const box = item."
         "getBoundingClientRect(); return [item.getAttribute('class'), box.left, box.right, box.top, box.bottom]; })"
@@ -260,7 +261,7 @@ def test_nothing_moves_while_the_page_is_built(shown, browser):
     try:
         for times_slower in (1, 8, 8, 8, 50):  # a busy machine shows a page while it is still read in
             browser.execute_cdp_cmd("Emulation.setCPUThrottlingRate", {"rate": times_slower})
-            shown(to_html(*case()))
+            shown(to_html(Report(*case())))
             drawn_range(browser)
             assert sum(browser.execute_script("return window.moved")) < 0.001
     finally:
@@ -273,7 +274,7 @@ def test_hostile_names_stay_text(shown, kind):
     from selenium.common.exceptions import NoAlertPresentException
 
     hostile = f'{HOSTILE[kind]}"><img src=x onerror=alert(1)>'
-    browser = shown(to_html(*case(lambda name: f"{hostile}{name}")))
+    browser = shown(to_html(Report(*case(lambda name: f"{hostile}{name}"))))
     with pytest.raises(NoAlertPresentException):
         _ = browser.switch_to.alert
     assert browser.get_log("browser") == []
@@ -287,9 +288,9 @@ def test_hostile_names_stay_text(shown, kind):
 def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(shown, browser):
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
-        shown(to_html(*case()))
-        said = [item.text for item in all_of(browser, "noscript p")]
-        assert said == ["This plot needs script."] * 4
+        shown(to_html(Report(*case())))
+        notes = [item.text for item in all_of(browser, "noscript p")]
+        assert notes == ["This plot needs script."] * 4
         assert len(all_of(browser, "#recordings-table tbody tr")) == 25
         assert not any(item.is_displayed() for item in all_of(browser, "svg.plot"))
     finally:

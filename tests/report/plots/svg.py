@@ -1,4 +1,4 @@
-"""What a figure says and holds."""
+"""The texts and marks of a figure."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def texts(path: Path) -> list[str]:
-    """Every text of an SVG, in order; an XML error where the file is none."""
+    """Return every text of an SVG, in order; raises an XML error for any other file."""
     return ["".join(item.itertext()) for item in ElementTree.parse(path).iter(f"{SVG}text")]
 
 
 def joined(path: Path) -> str:
-    """All texts, a line each."""
+    """Return all texts, a line each."""
     found = texts(path)
     assert found
     return "\n".join(found)

@@ -1,4 +1,4 @@
-"""The figure of latency against false alarms: rates, the zone without any, the factor in use, what was not reached."""
+"""The figure of latency against false alarms: rates, zone without any, factor in use, medians not reached."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_every_safety_factor_is_a_mark_at_its_rate_and_median():
     assert marks[loud, 0] == pytest.approx([alarms(multiple) / 0.1 for multiple in MULTIPLES[loud]])
 
 
-def test_points_without_a_false_alarm_stand_left_of_all_rates_in_a_zone_that_says_what_that_means(tmp_path):
+def test_points_without_a_false_alarm_are_left_of_all_rates_in_a_zone_with_its_bound(tmp_path):
     evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms, operations=40, hours=0.1))
     marks = small_marks(drawn(evaluated), False)
     loud = MULTIPLES < QUIET_FROM
@@ -78,7 +78,7 @@ def test_points_without_a_false_alarm_stand_left_of_all_rates_in_a_zone_that_say
         assert expected in shown
 
 
-def test_detectors_that_watched_for_different_times_have_a_range_of_bounds(tmp_path):
+def test_detectors_with_different_exposure_have_a_range_of_bounds(tmp_path):
     rows = swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)
     rows += swept("direct", "stiff", lambda m: 70.0 * m, none, operations=30, hours=0.05)
     plot_amoc(of(rows, ("momentum", "direct")), tmp_path / "a.svg")
@@ -87,13 +87,13 @@ def test_detectors_that_watched_for_different_times_have_a_range_of_bounds(tmp_p
     assert "(at most 30.0 to 59.9 per hour)" in shown
 
 
-def test_in_the_zone_each_detector_has_a_column_of_its_own():
+def test_in_the_zone_each_detector_has_its_own_column():
     rows = [row for name in ("momentum", "direct") for row in swept(name, "stiff", lambda m: 60.0 * m, none)]
     marks = small_marks(drawn(of(rows, ("momentum", "direct"))), False)
     assert len(set(marks[:, 0])) == 2
 
 
-def test_the_factor_in_use_is_marked_on_each_curve_and_its_figures_stand_beside_it(tmp_path):
+def test_the_factor_in_use_is_marked_on_each_curve_and_its_results_are_listed(tmp_path):
     evaluated = of(swept("momentum", "stiff", lambda m: 62.0 * m, alarms, lambda _: 1, not_assessable=2))
     (mark,) = in_use(drawn(evaluated))
     assert mark.get_ydata() == pytest.approx([62.0])
@@ -126,7 +126,7 @@ def test_a_curve_whose_median_is_not_reached_ends_with_an_arrow_up(tmp_path):
     assert "arrow: the median is not reached" in joined(tmp_path / "a.svg")
 
 
-def test_a_factor_in_use_whose_median_is_not_reached_stands_at_the_top_and_is_said(tmp_path):
+def test_a_factor_in_use_whose_median_is_not_reached_is_drawn_at_the_top_and_explained(tmp_path):
     evaluated = of(
         swept("momentum", "stiff", lambda m: 60.0 if m < 0.5 else None, alarms, lambda m: 0 if m < 0.5 else 15)
     )
@@ -149,7 +149,7 @@ def test_a_curve_is_named_where_there_is_room_and_the_key_names_all(tmp_path):
     assert [texts(tmp_path / "same.svg").count(name) for name in names] == [1] * 12
 
 
-def test_a_detector_without_a_curve_stays_in_the_key_with_what_it_could_not_assess(tmp_path):
+def test_a_detector_without_a_curve_is_in_the_key_with_its_contacts_not_assessable(tmp_path):
     contacts = [*contacts_of("momentum", "stiff", [30.0]), *contacts_of("direct", "stiff", ["blind"] * 3)]
     rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
     evaluated = evaluate(Results({}, ("momentum", "direct"), ("stiff",), tuple(contacts), (), (), sweep=rows))
@@ -186,7 +186,7 @@ def test_no_sweep_no_false_alarm_everything_missed_and_nothing_assessable_are_dr
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_figure_has_the_same_bytes(tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(tmp_path, suffix):
     evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
     for name in ("a", "b"):
         plot_amoc(evaluated, tmp_path / f"{name}{suffix}")
@@ -206,7 +206,7 @@ def test_nothing_is_clipped_whatever_the_names(name):
     assert_within(drawn(of(rows, (name,), (name,))))
 
 
-def test_a_median_of_zero_is_drawn_at_the_floor_of_a_logarithmic_axis_and_said(tmp_path):
+def test_a_median_of_zero_is_drawn_at_the_lower_end_of_a_logarithmic_axis_and_explained(tmp_path):
     rows = [
         *swept("quick", "stiff", lambda _: 0.0, alarms, hours=0.1),
         *swept("slow", "stiff", lambda m: 60.0 * m, alarms, hours=0.1),

@@ -1,4 +1,4 @@
-"""The figure of a season: runs, limit, trend, the map of the stroke over the runs, and what is shown in words."""
+"""The figure of a season: runs, limit, trend, the map of the stroke over the runs, and the verdicts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def marks(axes, marker: str) -> int:
     return sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == marker)
 
 
-def test_runs_within_the_limit_and_alarmed_ones_have_marks_of_their_own(growing):
+def test_runs_within_the_limit_and_runs_with_an_alarm_have_different_marks(growing):
     margin, *_ = drawn(growing).axes
     alarmed = len(growing.alarms)
     assert alarmed > 3
@@ -53,7 +53,7 @@ def test_runs_within_the_limit_and_alarmed_ones_have_marks_of_their_own(growing)
     assert any(set(line.get_ydata()) == {100.0} for line in margin.lines)
 
 
-def test_the_map_shows_the_place_that_grows_darkest_in_the_last_runs(growing):
+def test_the_map_is_darkest_at_the_growing_location_in_the_last_runs(growing):
     places = drawn(growing).axes[2]
     image = places.get_images()[0].get_array()
     row, column = np.unravel_index(np.argmax(image), image.shape)
@@ -76,7 +76,7 @@ def test_a_step_is_drawn_as_a_step():
     assert list(stairs.get_xdata()) == [1.0, 18.5, 18.5, 30.0]
 
 
-def test_the_verdicts_stand_above_the_panels(growing, steady, tmp_path):
+def test_the_verdicts_are_written_above_the_panels(growing, steady, tmp_path):
     plot_drift(growing, tmp_path / "a.svg")
     shown = joined(tmp_path / "a.svg").replace("\n", " ")
     for expected in (
@@ -90,7 +90,7 @@ def test_the_verdicts_stand_above_the_panels(growing, steady, tmp_path):
         assert expected in shown, expected
     plot_drift(steady, tmp_path / "b.svg")
     shown = joined(tmp_path / "b.svg")
-    assert "no drift shown" in shown and "alarm" not in shown and "the place that changes" not in shown
+    assert "no drift shown" in shown and "alarm" not in shown and "location that changes" not in shown
 
 
 def test_of_many_joints_those_with_a_change_are_drawn_first(growing, steady, tmp_path):
@@ -102,7 +102,7 @@ def test_of_many_joints_those_with_a_change_are_drawn_first(growing, steady, tmp
     assert sum(f"still{i}" in shown for i in range(4)) == 2
 
 
-def test_one_run_and_a_stroke_without_places_are_drawn_too(tmp_path):
+def test_one_run_and_a_stroke_without_locations_are_drawn_too(tmp_path):
     one = audit(count=1)
     plot_drift(one, tmp_path / "one.svg")
     assert "too few to show a drift" in joined(tmp_path / "one.svg").replace("\n", " ")
@@ -111,7 +111,7 @@ def test_one_run_and_a_stroke_without_places_are_drawn_too(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_figure_has_the_same_bytes(growing, tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(growing, tmp_path, suffix):
     for name in ("a", "b"):
         plot_drift(growing, tmp_path / f"{name}{suffix}")
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()

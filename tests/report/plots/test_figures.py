@@ -1,7 +1,8 @@
-"""Figures say what happened, in plain text, with the same bytes each time."""
+"""Figures show outcomes in plain text, with the same bytes each time."""
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from importlib.resources import files
@@ -21,16 +22,19 @@ from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, judge
 from cdtool.recording import Contact, Recording, Series
+from cdtool.report.html.plots import plot_data
 from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
 from cdtool.report.plots.detection_plot import plot_detected
 from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
 from cdtool.report.plots.latency_plot import plot_latencies
 from cdtool.report.plots.style import HATCHES, look_of
 from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.writers.base import Report
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.detection import Detected
 from tests.report.bench import NAMES, Bench
 from tests.report.hostile import HOSTILE
+from tests.report.html.html_case import case
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
 
 
@@ -90,17 +94,17 @@ def test_a_run_without_alarm_has_neither_zoom_nor_latency(bench: Bench, simulate
     assert "[ms]" not in shown
 
 
-def judged_anew(found: Detected, detection: Detection) -> Detected:
-    """The same log with another detection, matched with its contacts."""
+def with_detection(found: Detected, detection: Detection) -> Detected:
+    """Return the log with another detection, matched with its contacts."""
     matching = match(detection.verdict, found.contacts, detection.statistic)
     return replace(found, detections=(detection,), matchings=(matching,))
 
 
-def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simulated, tmp_path):
+def test_a_missed_and_a_not_assessable_contact_have_different_words(bench: Bench, simulated, tmp_path):
     found = bench.detected(simulated("stiff", 1), "momentum")
     detection = found.detections[0]
     silent = replace(detection, verdict=Verdict("no alarm"))
-    plot_detected(judged_anew(found, silent), tmp_path / "missed.svg")
+    plot_detected(with_detection(found, silent), tmp_path / "missed.svg")
     assert "missed" in joined(tmp_path / "missed.svg")
     assert "not assessable: missing samples" not in joined(tmp_path / "missed.svg")
     status = np.full_like(detection.statistic.status, Status.GAP)
@@ -109,7 +113,7 @@ def test_a_missed_and_a_not_assessable_contact_are_told_apart(bench: Bench, simu
         statistic=replace(detection.statistic, status=status),
         verdict=Verdict("not_assessable", reason="missing samples 100 %"),
     )
-    plot_detected(judged_anew(found, blind), tmp_path / "blind.svg")
+    plot_detected(with_detection(found, blind), tmp_path / "blind.svg")
     shown = joined(tmp_path / "blind.svg")
     assert "not assessable: missing samples 100 %" in shown
     assert "missed" not in shown
@@ -148,7 +152,7 @@ def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(ben
     assert "missed" in shown
 
 
-def test_a_detector_that_could_not_judge_says_so_in_its_row(bench: Bench, simulated, tmp_path):
+def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(bench: Bench, simulated, tmp_path):
     trace = bench.trace(simulated("stiff", 2), "stiff", ("momentum",))
     blind = replace(trace.panels[0], seen=(Seen("not_assessable", nan, nan, "the axis stands still"),))
     plot_triggers(replace(trace, panels=(blind,)), tmp_path / "a.svg")
@@ -157,7 +161,7 @@ def test_a_detector_that_could_not_judge_says_so_in_its_row(bench: Bench, simula
     assert not any(text.endswith(" ms") for text in shown)
 
 
-def test_a_trace_without_a_load_cell_has_a_row_for_each_detector_alone(bench: Bench, simulated):
+def test_a_trace_without_a_load_cell_has_only_rows_of_detectors(bench: Bench, simulated):
     trace = bench.trace(simulated("stiff", 2), "stiff")
     with drawing():
         assert len(trigger_plot._figure(trace).axes) == len(NAMES) + 1
@@ -165,7 +169,7 @@ def test_a_trace_without_a_load_cell_has_a_row_for_each_detector_alone(bench: Be
     assert len(figure.axes) == len(NAMES)
 
 
-def test_triggers_of_a_run_without_contact_say_so(bench: Bench, simulated, tmp_path):
+def test_triggers_of_a_run_without_contact_state_this(bench: Bench, simulated, tmp_path):
     plot_triggers(bench.trace(simulated("none", 77), "holdout"), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert shown.count("no alarm") == len(NAMES)
@@ -173,7 +177,7 @@ def test_triggers_of_a_run_without_contact_say_so(bench: Bench, simulated, tmp_p
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_same_figure_has_the_same_bytes(bench: Bench, simulated, evaluated, tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(bench: Bench, simulated, evaluated, tmp_path, suffix):
     found, trace = bench.detected(simulated("soft", 1), "pure_inertia"), bench.trace(simulated("soft", 1), "soft")
     written = []
     for name in ("a", "b"):
@@ -260,7 +264,7 @@ def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(evaluated, tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch):
+def test_a_failed_write_leaves_the_old_file_and_no_temporary_file(tmp_path, monkeypatch):
     target = tmp_path / "a.png"
     target.write_bytes(b"old")
 
@@ -320,7 +324,7 @@ def test_alarms_of_several_joints_are_one_trigger_with_a_mark_for_each(six_joint
     assert len(panel.lines[1].get_xdata()) == len(six_joints.detections[0].verdict.alarms) == 2
 
 
-def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_armed_again(five_alarms, tmp_path):
+def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_re_armed(five_alarms, tmp_path):
     (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
     trace = make_trace("free", detection.operation, (), (detection,), (matching,))
     assert trace.panels[0].rearmed == detection.verdict.rearmed
@@ -341,17 +345,17 @@ def test_traces_of_earlier_versions_have_no_times_of_rearming_and_are_still_read
     assert trace_from(values).panels[0].rearmed == ()
 
 
-def test_every_reason_not_to_judge_has_a_hatch_and_a_name_in_the_page():
+def test_every_reason_for_not_assessable_has_a_hatch_and_a_name_in_the_page():
     assert set(HATCHES) == set(REASONS)
     assert len(set(HATCHES.values())) == len(HATCHES)
-    script = (files("cdtool.report.html") / "page_files" / "trace.js").read_text(encoding="utf-8")
-    named = dict(re.findall(r'(\d): "([a-z -]+)"', script.split("const REASONS = {")[1].split("}")[0]))
+    named = json.loads(json.dumps(plot_data(Report(*case()))["reasons"]))
     assert named == {str(int(code)): text for code, text in REASONS.items()}
+    script = (files("cdtool.report.html") / "page_files" / "trace.js").read_text(encoding="utf-8")
     drawn = dict(re.findall(r'(\d): "(M[^"]+)"', script.split("const HATCHES = {")[1].split("}")[0]))
     assert set(drawn) == set(named) and len(set(drawn.values())) == len(drawn)
 
 
-def test_a_contact_that_is_detected_while_an_alarm_still_stands_begins_a_piece_of_its_own(five_alarms):
+def test_a_contact_that_is_detected_during_an_earlier_alarm_begins_its_own_interval(five_alarms):
     (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
     trace = make_trace("stiff", detection.operation, (), (detection,), (matching,))
     first, again = detection.verdict.alarms[0].time, detection.verdict.rearmed[0]

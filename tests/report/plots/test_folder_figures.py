@@ -1,4 +1,4 @@
-"""A report folder's figures: those for which there is something to show, under names that are safe."""
+"""The figures of a report folder: those with content, under safe names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.plots.folder_figures import write_figures
-from cdtool.report.plots.trigger_plot import most_telling
+from cdtool.report.plots.trigger_plot import most_informative
 from cdtool.report.writers.base import Report
 from cdtool.workflows.benchmark.force_rows import force_rows
 from tests.evaluation.sweeps import swept
@@ -58,7 +58,7 @@ def written(folder) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_every_figure_is_written_and_named_with_a_caption(results, bench, simulated, hit, free, tmp_path):
+def test_all_figures_are_written_and_named_with_a_caption(results, bench, simulated, hit, free, tmp_path):
     rows = swept("momentum", "stiff", lambda m: 60.0 * m, lambda m: 3 if m < 1.0 else 0)
     full = replace(with_forces(results, bench, simulated, hit.recording), sweep=tuple(rows))
     images = write_figures(Report(evaluate(full), (hit, free)), tmp_path)
@@ -70,22 +70,22 @@ def test_every_figure_is_written_and_named_with_a_caption(results, bench, simula
     assert f"{hit.recording}: all detectors" == images[4].caption
 
 
-def test_what_there_is_nothing_to_show_of_is_not_written(results, tmp_path):
+def test_a_figure_without_content_is_not_written(results, tmp_path):
     images = write_figures(Report(evaluate(replace(results, contacts=())), ()), tmp_path)
     assert [image.name for image in images] == written(tmp_path) == ["latency.png"]
 
 
-def test_force_verdicts_without_a_kept_curve_draw_nothing(results, bench, simulated, hit, tmp_path):
+def test_force_verdicts_without_a_stored_curve_are_not_drawn(results, bench, simulated, hit, tmp_path):
     full = with_forces(results, bench, simulated, "another log")
     images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
     assert "forces.png" not in [image.name for image in images]
 
 
-def test_a_caption_says_how_many_of_the_judged_contacts_are_drawn(results, bench, simulated, hit, tmp_path):
+def test_a_caption_states_how_many_of_the_contacts_with_a_verdict_are_drawn(results, bench, simulated, hit, tmp_path):
     full = with_forces(results, bench, simulated, hit.recording, "another log", "a third")
     images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
     caption = next(image.caption for image in images if image.name == "forces.png")
-    assert "the 1 of 3 contacts whose curves were kept" in caption
+    assert "the 1 of 3 contacts with stored curves" in caption
     assert "mass" not in caption
     heavy = replace(full, provenance={**full.provenance, "mass_before_cell_kg": 4.0})
     images = write_figures(Report(evaluate(heavy), (hit,)), tmp_path)
@@ -103,7 +103,7 @@ def test_each_of_several_profiles_has_a_figure_of_its_own(results, bench, simula
     ]
 
 
-def test_groups_named_alike_or_with_a_path_get_safe_names_of_their_own(evaluated: Evaluated, hit, tmp_path):
+def test_groups_with_similar_names_or_a_path_get_safe_and_different_file_names(evaluated: Evaluated, hit, tmp_path):
     groups = ("a b", "A/B", "../../etc/passwd", *HOSTILE.values())
     results = replace(evaluated.results, groups=groups)
     traces = tuple(replace(hit, group=group) for group in groups)
@@ -119,12 +119,12 @@ def test_groups_named_alike_or_with_a_path_get_safe_names_of_their_own(evaluated
     ]
 
 
-def test_the_most_telling_trace_has_a_contact_and_most_detectors_that_could_judge(hit, free):
+def test_the_most_informative_trace_has_a_contact_and_most_detectors_that_could_assess_it(hit, free):
     fewer = replace(hit, panels=hit.panels[:1])
     blind = replace(hit, panels=(replace(hit.panels[0], verdict="not_assessable"), hit.panels[1]))
-    assert most_telling([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
-    assert most_telling([free, fewer]) is fewer
-    assert most_telling([free]) is free
+    assert most_informative([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
+    assert most_informative([free, fewer]) is fewer
+    assert most_informative([free]) is free
 
 
 def test_the_same_report_gives_the_same_bytes(evaluated: Evaluated, hit, tmp_path):

@@ -1,4 +1,4 @@
-"""Force curves under their limits: what the figure says, in plain text, with the same bytes each time."""
+"""Force curves and their limits: texts of the figure, plain, with the same bytes each time."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def drawn(tmp_path: Path, *panels: ForcePanel, profile: ForceProfile = GAP) -> s
     return "\n".join(texts(tmp_path / "a.svg"))
 
 
-def test_a_panel_tells_the_worst_contact_its_peak_its_time_budget_and_its_alarms(tmp_path):
+def test_a_panel_shows_the_worst_contact_with_peak_time_budget_and_alarms(tmp_path):
     shown = drawn(tmp_path, STIFF)
     for expected in (
         "stiff",
@@ -83,7 +83,7 @@ def test_a_contact_that_cannot_be_assessed_is_worse_than_one_that_passes(tmp_pat
     assert "exceeded" not in shown
 
 
-def test_the_footer_names_the_source_and_says_that_this_is_no_certificate(tmp_path):
+def test_the_footer_names_the_source_and_states_that_this_is_not_a_certificate(tmp_path):
     shown = drawn(tmp_path, SOFT)
     assert "EN 12453:2017+A1:2021" in shown
     assert "evidence, not a certificate; values to be checked against the standard" in shown
@@ -138,7 +138,7 @@ def test_a_short_record_with_its_limits_in_view_is_not_compressed(tmp_path):
 
 
 @pytest.mark.parametrize("until", [0.3, 1.2, 6.5])
-def test_the_whole_staircase_is_drawn_and_what_comes_after_the_record_is_hatched(tmp_path, until):
+def test_all_steps_of_the_limit_are_drawn_and_the_time_after_the_record_is_hatched(tmp_path, until):
     cut = ForcePanel("cut", (curve("x", 900.0, until=until, alarms={"momentum": 0.4}),))
     with drawing():
         (axes,) = force_plot._figure([cut], GAP).axes
@@ -148,7 +148,7 @@ def test_the_whole_staircase_is_drawn_and_what_comes_after_the_record_is_hatched
     assert ("record has ended" in drawn(tmp_path, cut)) == (until < 6.0)
 
 
-def test_an_alarm_is_marked_on_the_curve_and_one_after_the_record_is_only_told(tmp_path):
+def test_an_alarm_is_marked_on_the_curve_and_an_alarm_after_the_record_is_only_listed(tmp_path):
     late = ForcePanel("late", (curve("x", 900.0, until=0.9, alarms={"momentum": 0.02, "direct": 1.5}),))
     with drawing():
         (axes,) = force_plot._figure([late], GAP).axes
@@ -169,7 +169,7 @@ def test_many_alarms_are_counted_after_the_first_four(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_same_figure_has_the_same_bytes(tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(tmp_path, suffix):
     for name in ("a", "b"):
         plot_forces([STIFF, SOFT], GAP, tmp_path / f"{name}{suffix}")
     first = (tmp_path / f"a{suffix}").read_bytes()
@@ -223,6 +223,6 @@ def test_no_curve_crosses_the_name_of_a_limit():
                     assert not np.any((heights > box.y0) & (heights < box.y1))
 
 
-def test_a_name_that_is_no_figure_is_refused(tmp_path):
+def test_a_file_name_that_does_not_name_a_figure_is_refused(tmp_path):
     with pytest.raises(UsageError, match=r"a\.gif"):
         plot_forces([STIFF], GAP, tmp_path / "a.gif")

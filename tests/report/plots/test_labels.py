@@ -1,4 +1,4 @@
-"""Names beside curves: near their own, clear of all others, none where there is no room."""
+"""Labels of curves: near their own curve, clear of all others, none without room."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def boxes(figure, axes) -> dict[str, np.ndarray]:
     return {text.get_text(): to_data.transform(text.get_window_extent().get_points()) for text in axes.texts}
 
 
-def test_a_name_stands_by_its_curve_and_inside_the_panel(panel):
+def test_a_label_is_next_to_its_curve_and_inside_the_panel(panel):
     figure, axes = panel
     assert write_labels(axes, [labelled("one", np.full(21, 3.0)), labelled("two", np.full(21, 7.0))]) == ["one", "two"]
     for text, level in (("one", 3.0), ("two", 7.0)):
@@ -39,7 +39,7 @@ def test_a_name_stands_by_its_curve_and_inside_the_panel(panel):
         assert min(abs(low - level), abs(high - level)) < 0.5
 
 
-def test_names_keep_off_curves_and_off_each_other(panel):
+def test_labels_cover_neither_curves_nor_each_other(panel):
     figure, axes = panel
     levels = {f"curve {i}": np.full(21, 1.0 + 1.2 * i) for i in range(7)}
     written = write_labels(axes, [labelled(text, y) for text, y in levels.items()])
@@ -53,14 +53,14 @@ def test_names_keep_off_curves_and_off_each_other(panel):
             assert np.any(first[1] < second[0]) or np.any(second[1] < first[0])
 
 
-def test_without_room_no_name_is_written(panel):
+def test_without_room_no_label_is_written(panel):
     _, axes = panel
     crowded = [labelled(f"curve {i}", np.full(21, 5.0 + 0.05 * i)) for i in range(9)]
     assert set(write_labels(axes, crowded)) <= {"curve 0", "curve 8"}
     assert write_labels(axes, [labelled("n" * 300, np.full(21, 5.0))]) == []
 
 
-def test_a_curve_without_a_place_for_its_name_and_no_curve_are_no_fault(panel):
+def test_a_curve_without_a_position_for_its_label_and_a_panel_without_curves_are_valid(panel):
     _, axes = panel
     nowhere = Labelled("one", "black", X, X, np.array([], dtype=int))
     assert write_labels(axes, [nowhere]) == []

@@ -1,4 +1,4 @@
-"""The latency figure: a mark a contact, missed ones open, the median with its interval, and the counts beside them."""
+"""The latency figure: a mark per contact, open if missed, the median with its interval, and the counts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def drawn(results: Results):
         return latency_plot._figure(evaluate(results))
 
 
-def test_counts_stand_beside_the_latencies(evaluated, tmp_path):
+def test_counts_are_listed_next_to_the_latencies(evaluated, tmp_path):
     plot_latencies(evaluated, tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     for expected in ("stiff", "soft", "friction_ekf", "momentum", "3 of 4", "2 of 3", "30 of 30", "missed"):
@@ -58,7 +58,7 @@ def test_every_detected_contact_has_a_filled_mark_and_every_missed_one_an_open_m
     assert len(opened) == 2
 
 
-def test_missed_contacts_stand_in_a_strip_that_says_how_long_they_were_watched(results, tmp_path):
+def test_missed_contacts_are_drawn_in_a_strip_with_the_duration_of_their_monitoring(results, tmp_path):
     one = of(results, [30.0, 34.0, None])
     figure = drawn(one)
     _, opened = marks(figure)
@@ -66,28 +66,28 @@ def test_missed_contacts_stand_in_a_strip_that_says_how_long_they_were_watched(r
     assert low < 34.0 < opened[0] < high < 1000.0
     plot_latencies(evaluate(one), tmp_path / "a.svg")
     assert "> 1000 ms" in joined(tmp_path / "a.svg")
-    assert "open where it was missed" in joined(tmp_path / "a.svg")
+    assert "open if missed" in joined(tmp_path / "a.svg")
     lasting = tuple(replace(item, watched_ms=400.0 + 10.0 * i) for i, item in enumerate(one.contacts))
     plot_latencies(evaluate(replace(one, contacts=lasting)), tmp_path / "b.svg")
     assert "> 420 ms" in joined(tmp_path / "b.svg")
 
 
-def test_a_missed_contact_that_was_watched_for_less_than_others_took_stands_at_its_time(results):
+def test_a_missed_contact_monitored_for_less_than_other_latencies_is_drawn_at_its_time(results):
     rows = of(results, [30.0, 60.0, None]).contacts
     cut_off = tuple(replace(item, watched_ms=45.0) if item.outcome == "missed" else item for item in rows)
     _, opened = marks(drawn(replace(of(results, []), contacts=cut_off)))
     assert opened.tolist() == [45.0]
 
 
-def test_without_a_miss_there_is_neither_a_strip_nor_a_word_of_it(results, tmp_path):
+def test_without_a_miss_there_is_neither_a_strip_nor_a_note_on_it(results, tmp_path):
     plot_latencies(evaluate(of(results, [30.0, 34.0])), tmp_path / "a.svg")
     shown = joined(tmp_path / "a.svg")
     assert "open" not in shown
     assert "> " not in shown
-    assert "black: median; no bar below 10 contacts" in shown
+    assert "black: median; no bar with fewer than 10 contacts" in shown
 
 
-def test_below_ten_contacts_the_median_has_no_bar_and_from_ten_on_it_has_one(results, tmp_path):
+def test_the_median_has_a_bar_only_with_ten_or_more_contacts(results, tmp_path):
     for count in (1, 4, 9, 10):
         figure = drawn(of(results, [30.0 + i for i in range(count)]))
         bars = [line for line in figure.axes[0].lines if line.get_color() == "black" and line.get_linewidth() != TICK]
@@ -97,14 +97,14 @@ def test_below_ten_contacts_the_median_has_no_bar_and_from_ten_on_it_has_one(res
     assert "black: median and its 95 % interval" in joined(tmp_path / "a.svg")
 
 
-def test_a_median_that_is_not_reached_is_said_and_has_no_tick(results, tmp_path):
+def test_a_median_that_is_not_reached_is_written_and_has_no_tick(results, tmp_path):
     one = of(results, [30.0, None, None, None])
     plot_latencies(evaluate(one), tmp_path / "a.svg")
     assert any(text.startswith("not reached") for text in texts(tmp_path / "a.svg"))
     assert not [line for line in drawn(one).axes[0].lines if line.get_linewidth() == TICK]
 
 
-def test_a_median_between_the_last_detection_and_the_end_of_watching_stands_in_the_strip(results):
+def test_a_median_between_the_last_detection_and_the_end_of_monitoring_is_in_the_strip(results):
     one = of(results, [30.0, 34.0, None, None])
     median = evaluate(one).summaries[0].median.value
     assert median > 100.0
@@ -120,20 +120,20 @@ def test_latencies_over_more_than_a_decade_get_a_logarithmic_axis(results):
     assert narrow.axes[0].get_xlim()[0] == 0.0
 
 
-def test_panels_share_their_axis_and_stand_below_each_other(results):
+def test_panels_share_their_axis_and_are_below_each_other(results):
     first, second = drawn(results).axes
     assert first.get_xlim() == second.get_xlim()
     assert (first.get_position().x0, first.get_position().x1) == (second.get_position().x0, second.get_position().x1)
     assert first.get_position().y0 > second.get_position().y1
 
 
-def test_a_latency_of_zero_is_drawn_on_a_logarithmic_axis_and_said(results, tmp_path):
+def test_a_latency_of_zero_is_drawn_on_a_logarithmic_axis_and_explained(results, tmp_path):
     more = replace(results, contacts=(*results.contacts, contact("momentum", "stiff", 0.0)))
     plot_latencies(evaluate(more), tmp_path / "a.svg")
     assert "below 1 ms drawn there" in joined(tmp_path / "a.svg")
 
 
-def test_a_detector_that_watched_nothing_has_no_count_of_false_alarms(results, tmp_path):
+def test_a_detector_without_exposure_has_no_count_of_false_alarms(results, tmp_path):
     blind = tuple(replace(item, hours=0.0) for item in results.exposure)
     plot_latencies(evaluate(replace(results, exposure=blind, false_alarms=())), tmp_path / "a.svg")
     assert not any(text.endswith("op.") for text in texts(tmp_path / "a.svg"))
@@ -150,15 +150,15 @@ def test_no_contact_only_missed_and_a_single_one_are_drawn_too(results, tmp_path
     assert "1 of 1" in texts(tmp_path / "one.svg")
 
 
-def test_thousands_of_contacts_are_thinned_to_marks_that_span_them_and_it_is_said(results, tmp_path):
+def test_thousands_of_contacts_are_thinned_to_marks_that_span_them_and_this_is_stated(results, tmp_path):
     many = of(results, [float(x) for x in np.linspace(20.0, 90.0, 2000)])
     filled, _ = marks(drawn(many))
     assert len(filled) == 400
     assert (filled.min(), filled.max()) == (20.0, 90.0)
     plot_latencies(evaluate(many), tmp_path / "a.svg")
-    assert "(400 at most are drawn)" in joined(tmp_path / "a.svg")
+    assert "(at most 400 are drawn)" in joined(tmp_path / "a.svg")
     plot_latencies(evaluate(of(results, [20.0, 30.0])), tmp_path / "b.svg")
-    assert "at most are drawn" not in joined(tmp_path / "b.svg")
+    assert "are drawn)" not in joined(tmp_path / "b.svg")
 
 
 @pytest.mark.parametrize("kind", HOSTILE)

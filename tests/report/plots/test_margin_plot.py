@@ -1,4 +1,4 @@
-"""The figure of one alarm or one missed contact: what it says, and the same bytes each time."""
+"""The figure of an alarm or a missed contact: its texts, and the same bytes each time."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_an_alarm_shows_channels_in_order_signal_margin_onset_and_debounce(drawn
     assert "reference_speed" not in shown  # it neither moved nor does the detector read it
 
 
-def test_a_missed_contact_marks_where_it_came_nearest(drawn):
+def test_a_missed_contact_has_a_mark_where_the_signal_was_nearest_to_its_limit(drawn):
     shown = drawn(50.0)
     assert "missed: no alarm in the 1000 ms" in shown and "nearest, " in shown
     assert "outside for" not in shown and "\nalarm\n" not in shown
@@ -87,7 +87,7 @@ def test_an_alarm_without_a_contact_counts_from_the_alarm(drawn):
     assert "load cell [" not in shown and "contact onset" not in shown
 
 
-def test_what_could_not_be_judged_is_hatched_and_has_no_margin(drawn):
+def test_samples_not_assessable_are_hatched_and_have_no_margin(drawn):
     shown = drawn(1.0, blind=True)
     assert "not assessable: missing samples 100 %" in shown
     assert "nearest" not in shown

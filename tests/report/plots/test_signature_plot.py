@@ -1,4 +1,4 @@
-"""The figure of a signature: mean, limits now and at first, how many runs were where."""
+"""The figure of a signature: mean, limits now and as first learned, number of runs by location."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_two_sides_have_two_limits_and_a_backward_stroke_has_the_lower_one():
     assert np.nanmax(limit) < np.nanmin(back.by_position.band(True)[0])
 
 
-def test_where_too_few_runs_were_valid_it_is_hatched():
+def test_locations_with_too_few_valid_runs_are_hatched():
     blind = season(12)
     for _, found in blind[:6]:
         found.status[2400:2800] = Status.GAP
@@ -83,7 +83,7 @@ def test_more_classes_than_fit_are_counted(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_figure_has_the_same_bytes(tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(tmp_path, suffix):
     for name in ("a", "b"):
         plot_signature([NOW], [FIRST], "N", "momentum", tmp_path / f"{name}{suffix}")
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()

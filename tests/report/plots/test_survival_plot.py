@@ -1,4 +1,4 @@
-"""The survival figure: a step curve a detector, its band where there are few, missed contacts open at their end."""
+"""The survival figure: a step curve per detector, bands of a few curves, missed contacts as open marks."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def opened(figure, panel: int = 0) -> list[tuple[float, float]]:
     return [point for line in lines for point in zip(line.get_xdata(), line.get_ydata(), strict=True)]
 
 
-def test_a_curve_falls_by_one_step_a_contact_to_nothing():
+def test_a_curve_falls_to_zero_by_one_step_per_contact():
     (curve,) = steps(drawn(of({"momentum": [20.0, 40.0, 60.0, 80.0]})))
     assert curve.get_xdata().tolist() == [0.0, 20.0, 40.0, 60.0, 80.0, 80.0]
     assert curve.get_ydata() == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0, 0.0])
 
 
-def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_watching():
+def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_monitoring():
     figure = drawn(of({"momentum": [20.0, 40.0, None, "blind"]}))
     assert opened(figure) == [(1000.0, pytest.approx(1 / 3))]
     assert steps(figure)[0].get_xdata()[-1] == 1000.0
@@ -64,14 +64,14 @@ def test_few_curves_have_bands_and_many_have_none(tmp_path):
     assert "band" not in joined(tmp_path / "many.svg")
 
 
-def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_says_so(tmp_path):
+def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_states_this(tmp_path):
     nine = {"momentum": [20.0 + i for i in range(9)], "direct": [20.0 + i for i in range(10)]}
     assert len(drawn(of(nine)).axes[0].collections) == 1
     plot_survival(of(nine), tmp_path / "a.svg")
-    assert "band: 95 % at each time; no band below 10 contacts" in joined(tmp_path / "a.svg")
+    assert "band: 95 % at each time; no band with fewer than 10 contacts" in joined(tmp_path / "a.svg")
 
 
-def test_counts_stand_beside_the_curves_the_fastest_first(evaluated, tmp_path):
+def test_counts_are_listed_next_to_the_curves_the_fastest_first(evaluated, tmp_path):
     plot_survival(evaluated, tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     for expected in ("stiff", "soft", "3 of 4", "2 of 3", "30 of 30", "missed", "34.0", "still undetected"):
@@ -80,7 +80,7 @@ def test_counts_stand_beside_the_curves_the_fastest_first(evaluated, tmp_path):
     assert "open mark: missed" in joined(tmp_path / "a.svg")
 
 
-def test_a_panel_a_group_with_contacts_all_on_one_axis(evaluated):
+def test_each_group_with_contacts_has_a_panel_all_on_one_axis(evaluated):
     first, second = drawn(evaluated).axes
     assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("stiff", "soft")
     assert first.get_xlim() == second.get_xlim()
@@ -113,7 +113,7 @@ def test_thousands_of_contacts_give_few_marks():
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_figure_has_the_same_bytes(evaluated, tmp_path, suffix):
+def test_the_same_input_gives_the_same_bytes(evaluated, tmp_path, suffix):
     for name in ("a", "b"):
         plot_survival(evaluated, tmp_path / f"{name}{suffix}")
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()

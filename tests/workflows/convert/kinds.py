@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-LIBRARIES = {
-    ".parquet": "pyarrow", ".feather": "pyarrow", ".h5": "h5py", ".hdf5": "h5py", ".mf4": "asammdf", ".tdms": "nptdms"
-}  # fmt: skip
-KINDS = [".csv", ".mcap", ".parquet", ".feather", ".h5", ".mf4", ".tdms"]
-SEVERAL_CLOCKS = KINDS[1:]
+from cdtool.formats import FORMATS
+from cdtool.workflows.convert.converting import _ONE_CLOCK, _WRITERS
+
+# One suffix per writer: others mean the same container.
+KINDS = list({writer: suffix for suffix, writer in reversed(_WRITERS.items())}.values())[::-1]
+SEVERAL_CLOCKS = [suffix for suffix in KINDS if suffix not in _ONE_CLOCK]
+_EXTRAS = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+    "optional-dependencies"
+]
 
 
 def needs(*suffixes: str) -> None:
-    """Skip, by name, where a container's library is absent."""
-    for suffix in suffixes:
-        if suffix in LIBRARIES:
-            pytest.importorskip(LIBRARIES[suffix])
+    """Skip, by name, where a package of the extra is absent that reads a container of one of these suffixes."""
+    formats = [FORMATS.load(name) for name in FORMATS.names()]
+    for extra in {found.name for found in formats if not {*suffixes}.isdisjoint(found.suffixes)} & {*_EXTRAS}:
+        for package in (re.split(r"[^\w-]", requirement)[0] for requirement in _EXTRAS[extra]):
+            try:
+                version(package)
+            except PackageNotFoundError:
+                pytest.skip(f"{package} is not installed")
 
 
 def table(path: Path, rows: int = 400) -> Path:

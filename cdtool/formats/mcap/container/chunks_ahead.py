@@ -7,7 +7,10 @@ when its turn comes. Otherwise its chunks are read one after the other, and what
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
+import mmap
+import weakref
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,17 +22,17 @@ from typing import Self
 import numpy as np
 
 from cdtool.cores import usable_cores
-from cdtool.formats.mcap.container.buffers import Buffers
 from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Decompressor, chunk_header
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.foretold import foretold_messages
-from cdtool.formats.mcap.container.records import ChunkIndex
+from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taken, Taker
 
+_LARGE_PAGE = 2 << 20
+_MOST_KEPT = 3
 # Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
 # through the processor's cache, with less, what there is to do for each piece of memory counts.
 JOINED = 14 << 20
@@ -37,6 +40,45 @@ _LARGEST = 16 << 20  # chunks beyond this size are read one by one
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
 _SUBMITTED = 3  # chunks to one thread: handing them over costs as much as a tenth of one
+# Channel's id and the length of all entries precede these; each is a time and an offset [bytes].
+_BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
+
+
+class Buffers:
+    """Memory for decompressed chunks: in large pages, and used again once nothing refers to it any more.
+
+    Arrays have `size` bytes, a multiple of a large page; larger ones are made where they are asked for. Messages lie
+    far apart, and a page of 4 KiB holds few of them: with small pages most of the time goes into finding where they are
+    (a quarter of decompressing, half of gathering).
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._free: list[mmap.mmap] = []
+
+    def take(self, size: int) -> Bytes:
+        """An array of at least `size` bytes, with whatever stands in it."""
+        if size > self.size:
+            return np.empty(size, np.uint8)
+        memory = self._free.pop() if self._free else _large_pages(self.size)
+        whole: Bytes = np.frombuffer(memory, np.uint8)
+        # Every part of it refers to `whole`, which therefore lives as long as any of them.
+        weakref.finalize(whole, self._give_back, memory)
+        start = -whole.ctypes.data % _LARGE_PAGE
+        return whole[start : start + self.size]
+
+    def _give_back(self, memory: mmap.mmap) -> None:
+        if len(self._free) < _MOST_KEPT:
+            self._free.append(memory)
+
+
+def _large_pages(size: int) -> mmap.mmap:
+    memory = mmap.mmap(-1, size + _LARGE_PAGE)
+    if hasattr(mmap, "MADV_HUGEPAGE"):  # Linux
+        memory.madvise(mmap.MADV_HUGEPAGE)
+    return memory
+
+
 # Memory that was never used before costs as much as decompressing into it does: it is kept from log to log.
 _BUFFERS = Buffers(JOINED)
 
@@ -201,3 +243,26 @@ def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
             size += index.uncompressed_size
     if group:
         yield group
+
+
+def foretold_messages(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
+    """By a chunk's place and a channel's id the numbers of its messages among all of the channel in these chunks.
+
+    A message index has 16 bytes for each message of its channel, and its place in the file is in the chunk's
+    index (section "Chunk Index").
+    It ends before the first chunk whose message indexes cannot be as long as they claim.
+    """
+    foretold: dict[int, Mapping[int, range]] = {}
+    passed: Counter[int] = Counter()
+    for index in chunks:
+        places = sorted((at, channel) for channel, at in index.message_index_offsets.items())
+        behind = index.chunk_start_offset + index.chunk_length + index.message_index_length
+        rows = {}
+        for (at, channel), (end, _) in pairwise((*places, (behind, 0))):
+            count, rest = divmod(end - at - _BEFORE_ENTRIES, _ENTRY)
+            if count < 0 or rest:
+                return foretold
+            rows[channel] = range(passed[channel], passed[channel] + count)
+            passed[channel] += count
+        foretold[index.chunk_start_offset] = rows
+    return foretold

@@ -47,7 +47,7 @@ class CleanFile:
             self._define(item, builder, covered)
         content = [_end(builder)]
         offset = len(content[0])
-        entries: dict[int, list[tuple[int, int]]] = {item.stream.channel.id: [] for item in messages}
+        entries: dict[int, list[tuple[int, int]]] = {item.stream.id: [] for item in messages}
         for start, length, time, channel, data in _in_file_order(messages):
             content.append(bytes(data[start - _HEADER : start + length]))
             entries[channel].append((time, offset))
@@ -56,18 +56,7 @@ class CleanFile:
 
     def add_attachment(self, record: Iterable[bytes], index: AttachmentIndex) -> None:
         """An attachment's record as it stood, in pieces, and what an index told of it there."""
-        at = self._file.tell()
-        self._attachments.append(
-            written.AttachmentIndex(
-                offset=at,
-                length=index.length,
-                log_time=index.log_time,
-                create_time=index.create_time,
-                data_size=index.data_size,
-                name=index.name,
-                media_type=index.media_type,
-            )
-        )
+        self._attachments.append(written.AttachmentIndex(**(vars(index) | {"offset": self._file.tell()})))
         for piece in record:
             self._file.write(piece)
 
@@ -114,18 +103,10 @@ class CleanFile:
         known.add(channel.id)
         self._defined.add(channel.id)
         if schema is not None:
-            made = written.Schema(id=schema.id, name=schema.name, encoding=schema.encoding, data=schema.data)
-            self._schemas[schema.id] = made
-            made.write(builder)
-        opened = written.Channel(
-            id=channel.id,
-            topic=channel.topic,
-            message_encoding=channel.message_encoding,
-            metadata=dict(channel.metadata),
-            schema_id=channel.schema_id,
-        )
-        self._channels[channel.id] = opened
-        opened.write(builder)
+            self._schemas[schema.id] = written.Schema(**vars(schema))
+            self._schemas[schema.id].write(builder)
+        self._channels[channel.id] = written.Channel(**vars(channel))
+        self._channels[channel.id].write(builder)
 
     def _chunk(self, content: bytes, entries: dict[int, list[tuple[int, int]]], covered: bool) -> None:
         packed = self._compressor.compress(content)
@@ -197,7 +178,7 @@ def _in_file_order(messages: Sequence[Messages]) -> Iterable[tuple[int, int, int
     batches = [item.batch for item in messages]
     starts = np.concatenate([batch.start for batch in batches])
     order = np.argsort(starts, kind="stable")
-    channels = np.repeat([item.stream.channel.id for item in messages], [len(batch) for batch in batches])
+    channels = np.repeat([item.stream.id for item in messages], [len(batch) for batch in batches])
     lengths = np.concatenate([batch.length for batch in batches])[order].tolist()
     times = np.concatenate([batch.log_time for batch in batches])[order].tolist()
     data = batches[0].data

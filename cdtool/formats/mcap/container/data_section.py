@@ -7,8 +7,11 @@ covered by no CRC.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Mapping
 from itertools import pairwise
+
+import numpy as np
 
 from cdtool.formats.mcap.container import walk_kernel as why
 from cdtool.formats.mcap.container.attachments import check_attachment
@@ -25,7 +28,6 @@ from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss, Losses
-from cdtool.formats.mcap.container.record_length import NO_KIND, record_length
 from cdtool.formats.mcap.container.records import (
     MAGIC,
     PREFIX,
@@ -39,19 +41,21 @@ from cdtool.formats.mcap.container.records import (
     Metadata,
     Schema,
 )
-from cdtool.formats.mcap.container.resync import Resync
 from cdtool.formats.mcap.container.room import Piece, Room, Walked
 from cdtool.formats.mcap.container.skim import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taker
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
+_NO_KIND = "a record of kind 0, which there is not"
 _REASONS = {
-    why.NO_KIND: NO_KIND,
+    why.NO_KIND: _NO_KIND,
     why.TOO_LONG: "a record claims more bytes than its chunk has left",
     why.SHORT_MESSAGE: "a message shorter than its header",
 }
+_WINDOW = 1 << 20
 
 
 class DataSection:
@@ -249,3 +253,80 @@ class DataSection:
                 self.extras[opcode, at, length] = None
                 if opcode == Attachment.opcode:
                     self._resync.proven = at + length
+
+
+def record_length(at: int, head: memoryview, size: int) -> int:
+    """Return the length of the record at byte `at`, prefix included, as far as that can be believed.
+
+    Section "Records": opcode, length of the content, content. The file has `size` bytes. Raises DamageError.
+    """
+    left = size - at - PREFIX
+    if left < 0:
+        raise DamageError(f"the file ends within a record: {left + PREFIX} bytes are left")
+    length = int.from_bytes(head[1:PREFIX], "little")
+    if head[0] == 0:
+        raise DamageError(_NO_KIND)
+    if length > left:
+        raise DamageError(f"a record claims {length} bytes where {left} are left")
+    return PREFIX + length
+
+
+class Resync:
+    """Where reading goes on. `proven`: all before it was given, or a CRC proved it; what follows may still be read.
+
+    A wrong length that no CRC covers leads over whole chunks into the midst of something: these lie before the place
+    where that shows. The way back is bounded, as a file could be made of such lengths.
+    """
+
+    def __init__(self, file: FileBytes, summary: Summary) -> None:
+        self.proven = len(MAGIC)
+        self._file = file
+        self._known = sorted(summary.chunks) if summary.verified else []
+        self._back = file.size  # bytes that may still be gone back
+
+    def check(self, at: int, length: int) -> None:
+        """Raise DamageError where a record, no chunk, reaches over a chunk that a verified summary names."""
+        following = bisect_right(self._known, at)
+        if following < len(self._known) and (place := self._known[following]) < at + length:
+            header = chunk_header(place, self._file.read(place, HEADER_LENGTH))
+            if header is not None and header.consistent:
+                raise DamageError(f"a record of {length} bytes reaches over a chunk")
+
+    def after(self, at: int) -> tuple[int, int | None]:
+        """Behind byte `at`, which begins no record: from where on bytes are lost, and the next chunk (None: none)."""
+        found = self._next(self.proven)
+        if found is not None and found <= at:
+            self._back -= at - found
+            if found == at or self._back < 0:
+                found = self._next(at + 1)
+        if found is None:
+            return at, None
+        begin, self.proven = min(at, self.proven) if found < at else at, found + 1
+        return begin, found
+
+    def _next(self, at: int) -> int | None:
+        place = bisect_left(self._known, at)
+        return self._known[place] if place < len(self._known) else next_chunk(self._file, at)
+
+
+def next_chunk(file: FileBytes, at: int) -> int | None:
+    """The first place from byte `at` on that looks like a chunk: its sizes and its compression agree."""
+    while at < file.size - HEADER_LENGTH:
+        window = file.array(at, _WINDOW + HEADER_LENGTH)
+        for place in _candidates(window):
+            header = chunk_header(at + place, window[place : place + HEADER_LENGTH].data)
+            if header is not None and header.consistent and header.size <= LARGEST:
+                return header.at
+        at += _WINDOW
+    return None
+
+
+def _candidates(window: Bytes) -> list[int]:
+    """Return where the opcode of a chunk precedes a length below 4 GiB."""
+    last = len(window) - HEADER_LENGTH
+    if last <= 0:
+        return []
+    fits = window[:last] == Chunk.opcode
+    for i in range(PREFIX - 4, PREFIX):
+        fits &= window[i : i + last] == 0
+    return [int(place) for place in np.flatnonzero(fits)]

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.records import Channel, Schema
 from cdtool.formats.mcap.container.summary import Summary
+from cdtool.messages.stream import Stream
 
 
 @dataclass(frozen=True)
-class Stream:
-    """A channel with its schema; `covered`: a CRC covers both definitions, or copies of them."""
+class DefinedStream(Stream):
+    """A channel with its schema as records; `covered`: a CRC covers both definitions, or copies of them."""
 
     channel: Channel
     schema: Schema | None
@@ -30,7 +31,7 @@ class Definitions:
         # Channels (by id) whose meaning changed, and why.
         self.ambiguous: dict[int, str] = {}
         self._ambiguous_schemas: dict[int, str] = {}
-        self._streams: dict[int, Stream | DamageError] = {}
+        self._streams: dict[int, DefinedStream | DamageError] = {}
         self._taken: dict[tuple[int, bytes, bool], bytes] = {}
 
     def knows(self, opcode: int, body: bytes, covered: bool) -> bool:
@@ -63,7 +64,7 @@ class Definitions:
                 self.ambiguous[channel.id] = self._ambiguous_schemas[channel.schema_id]
         self._streams.clear()
 
-    def stream(self, channel_id: int) -> Stream:
+    def stream(self, channel_id: int) -> DefinedStream:
         """A channel and its schema; raises DamageError where either is not defined."""
         if channel_id not in self._streams:
             self._streams[channel_id] = self._find(channel_id)
@@ -72,14 +73,14 @@ class Definitions:
             raise found
         return found
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[DefinedStream]:
         """All channels that are whole, in the order of their definitions."""
         found = (self._find(channel) for channel in self._channels | self._fallback.channels)
-        return [stream for stream in found if isinstance(stream, Stream)]
+        return [stream for stream in found if isinstance(stream, DefinedStream)]
 
     def told_otherwise(self) -> list[str]:
         """Topics whose channel or schema the summary defines otherwise than the data."""
-        known = {stream.channel.id: stream for stream in self.streams()}
+        known = {stream.id: stream for stream in self.streams()}
         return [
             channel.topic
             for channel in self._fallback.channels.values()
@@ -93,7 +94,7 @@ class Definitions:
             )
         ]
 
-    def _find(self, channel_id: int) -> Stream | DamageError:
+    def _find(self, channel_id: int) -> DefinedStream | DamageError:
         # A definition that was lost with its chunk may still stand in a summary without a CRC.
         channel = self._channels.get(channel_id) or self._fallback.channels.get(channel_id)
         if channel is None:
@@ -103,4 +104,5 @@ class Definitions:
         if number and schema is None:
             return DamageError(f"channel '{channel.topic}' names schema {number}, which is not there")
         covered = channel_id in self._covered_channels and (not number or number in self._covered_schemas)
-        return Stream(channel, schema, covered)
+        definition = ("", "", b"") if schema is None else (schema.encoding, schema.name, schema.data)
+        return DefinedStream(channel_id, channel.topic, channel.message_encoding, definition, channel, schema, covered)

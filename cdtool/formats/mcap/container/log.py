@@ -12,10 +12,10 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
-from cdtool.formats.mcap.container.definitions import Definitions, Stream
-from cdtool.formats.mcap.container.ends import end_of_log, profile_of
+from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
+from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
@@ -23,6 +23,8 @@ from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.taken import Part, Taker
 from cdtool.plain_text import counted
 from cdtool.recording import Finding
+
+_LONGEST_HEADER = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Messages:
     They are either a batch or `parts` that a taker made columns of, chunk by chunk.
     """
 
-    stream: Stream
+    stream: DefinedStream
     batch: Batch
     covered: bool
     parts: tuple[Part, ...] = ()
@@ -132,7 +134,7 @@ class Log:
         self.counts[channel] += count
         covered = covered and stream.covered
         self.unverified += 0 if covered else count
-        if self._wanted(stream.channel.topic):
+        if self._wanted(stream.topic):
             yield Messages(stream, batch, covered, parts)
 
     def _finish(self) -> None:
@@ -140,11 +142,11 @@ class Log:
         for place in self._skip.keys() & section.chunks.keys():
             self.counts.update(self._skip[place])
         for stream in self._definitions.streams():
-            name = stream.channel.topic
+            name = stream.topic
             schema = stream.schema.name if stream.schema is not None else "no schema"
-            topic = self.topics.setdefault(name, Topic(name, schema, stream.channel.message_encoding))
-            topic.count += self.counts[stream.channel.id]
-            topic.channels += bool(self.counts[stream.channel.id])
+            topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
+            topic.count += self.counts[stream.id]
+            topic.channels += bool(self.counts[stream.id])
         self.origin = section.room.first_time or 0
         self._check_data_crc()
         self._look_behind()
@@ -238,3 +240,27 @@ class Log:
                 found.append(Finding("the summary disagrees with the data: other message counts by channel"))
         text = "the summary defines it otherwise than the data"
         return found + [Finding(text, topic) for topic in self._definitions.told_otherwise()]
+
+
+def profile_of(file: FileBytes) -> str:
+    """Return what the header calls the file's profile, such as `ros2`; empty where it has no header."""
+    head = file.read(len(MAGIC), PREFIX)
+    length = int.from_bytes(head[1:], "little")
+    if len(head) < PREFIX or head[0] != Header.opcode or length > _LONGEST_HEADER:
+        return ""
+    try:
+        return Header.read(file.read(len(MAGIC) + PREFIX, length)).profile
+    except DamageError:
+        return ""
+
+
+def end_of_log(file: FileBytes, at: int) -> int | None:
+    """Where the log ends whose end of data stands at byte `at`: behind the magic bytes that follow its footer."""
+    while True:
+        head = file.read(at, PREFIX)
+        length = PREFIX + int.from_bytes(head[1:], "little")
+        if len(head) < PREFIX or not head[0] or length > file.size - at:
+            return None
+        at += length
+        if head[0] == Footer.opcode:
+            return at + len(MAGIC) if bytes(file.read(at, len(MAGIC))) == MAGIC else None

@@ -1,4 +1,4 @@
-// A plot whose horizontal axis can be zoomed by dragging, wheel, keys and buttons, with a tooltip under the pointer.
+// A plot whose horizontal axis can be zoomed by dragging, wheel, keys and buttons, with a tooltip at the pointer.
 
 const SVG = "http://www.w3.org/2000/svg";
 const SMALLEST_SHARE = 1e-5;
@@ -106,7 +106,7 @@ const SHAPES = {
   ],
 };
 
-/** The outline of a marker: thousands of them make one path, which a browser draws fast. */
+/** The outline of a marker: thousands of them are one path, which a browser draws fast. */
 function outline(marker, x, y, size) {
   const shape = SHAPES[marker];
   if (!shape) {
@@ -130,7 +130,7 @@ function showTooltip(words, event) {
 /**
  * plan: `whole` and `home`: the widest and the first range; `log`; `margin`; `label`; optional `offset` and `scale` of
  * what the axis writes; draw(chart) fills `chart.layer` (clipped to the data area) and `chart.front`;
- * probe(chart, x, y) gives {x, y, words, open} of what is under the pointer, or nothing.
+ * probe(chart, x, y) returns {x, y, words, open} for the position of the pointer, or nothing.
  */
 class Chart {
   constructor(svg, plan) {

@@ -1,4 +1,4 @@
-// The force of single contacts over the time since their onset, under the staircase of its limits.
+// The force of single contacts over the time since their onset, with its stepped limits.
 
 /** The part of a trace's load-cell curve that belongs to one contact, turned so that it presses upward. */
 function forceCurve(trace, item) {
@@ -14,7 +14,7 @@ function forceCurve(trace, item) {
   return { ...item, times, force, onset, highest: Math.max(high, -low), record: trace };
 }
 
-/** What the detectors of a trace made of one of its contacts: when they raised the alarm [ms after the onset]. */
+/** When the detectors of a trace raised the alarm for one of its contacts [ms after the onset]. */
 function alarmsOf(curve) {
   return curve.record.panels
     .map((panel) => ({ detector: panel.detector, seen: panel.seen[curve.contact] }))
@@ -86,8 +86,13 @@ function forcePlan(data, panel, readTrace, openTrace) {
       draw(
         chart.layer,
         "text",
-        { class: "small told halo", x: after ? x + 8 : x - 8, y: at + 15, "text-anchor": after ? "start" : "end" },
-        `exceeded after ${figure(worst.budget)} ms`,
+        {
+          class: "small worst-note halo",
+          x: after ? x + 8 : x - 8,
+          y: at + 15,
+          "text-anchor": after ? "start" : "end",
+        },
+        `exceeded after ${numberText(worst.budget)} ms`,
       );
     }
   }
@@ -97,11 +102,11 @@ function forcePlan(data, panel, readTrace, openTrace) {
     home: [0, home],
     log: false,
     margin,
-    label: "time since contact onset [ms]",
+    label: data.axes.time,
     draw(chart) {
       drawStaircase(chart);
       chart.drawLevels(y, 0, highest, 5, margin.top);
-      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, "force [N]");
+      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, data.axes.force);
       drawCurves(chart);
       nameSteps(chart);
     },
@@ -118,12 +123,12 @@ function forcePlan(data, panel, readTrace, openTrace) {
       if (!best) return null;
       const { curve, force } = best;
       const late = alarmsOf(curve).map(
-        (alarm) => `alarm ${data.detectors[alarm.detector].name} ${figure(alarm.late)} ms`,
+        (alarm) => `alarm ${data.detectors[alarm.detector].name} ${numberText(alarm.late)} ms`,
       );
       const words = [
         `${curve.record.recording}, contact ${curve.contact + 1}`,
-        `${figure(force)} N at ${figure(time)} ms`,
-        `${curve.verdict.replace("_", " ")}${curve.budget === null ? "" : `: first limit exceeded after ${figure(curve.budget)} ms`}`,
+        `${numberText(force)} N at ${numberText(time)} ms`,
+        `${curve.verdict.replace("_", " ")}${curve.budget === null ? "" : `: first limit exceeded after ${numberText(curve.budget)} ms`}`,
         ...late,
         "click: trigger plot",
       ];
@@ -132,7 +137,7 @@ function forcePlan(data, panel, readTrace, openTrace) {
   };
 }
 
-/** Which marks the force plots show: the alarms on the coloured curves. */
+/** The legend of the force plots: the alarms on the coloured curves. */
 function makeForceLegend(host, data, plans) {
   const worst = make(host, "span");
   draw(draw(worst, "svg", { class: "plot swatch", "aria-hidden": "true" }), "path", { class: "worst", d: "M0 6H26" });

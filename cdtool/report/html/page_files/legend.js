@@ -1,4 +1,4 @@
-// Names beside colours and markers; a name that is clicked hides its curve in all plots below it.
+// Names with colours and markers; a click on a name hides its curve in all plots below it.
 
 /** A small picture of a detector's marker. */
 function markerOf(parent, detector) {
@@ -22,7 +22,7 @@ function makeLegend(host, detectors, shown, changed) {
   return hidden;
 }
 
-/** The detectors that any of the panels has a row of, in their order. */
+/** The detectors with a row in any of the panels, in their order. */
 function detectorsIn(panels) {
   return [...new Set(panels.flatMap((panel) => panel.rows.map((row) => row.detector)))].sort((a, b) => a - b);
 }

@@ -1,4 +1,4 @@
-// Latencies, the share still undetected, and latency against false alarms: one chart a group of contacts.
+// Latencies, the share still undetected, and latency against false alarms: one chart per group of contacts.
 
 const FLOOR_MS = 1;
 const GOLDEN = 0.6180339887;
@@ -14,7 +14,7 @@ function recordingName(data, number) {
   return number < 0 ? "a recording that is not listed" : data.recordings[number];
 }
 
-/** Each contact a mark in its detector's lane, with the median and its interval. */
+/** A mark per contact in its detector's lane, with the median and its interval. */
 function latencyPlan(data, panel, openRecording) {
   const detected = panel.rows.flatMap((row) => row.latency);
   const all = detected.concat(panel.rows.flatMap((row) => row.watched));
@@ -43,7 +43,7 @@ function latencyPlan(data, panel, openRecording) {
     draw(chart.front, "text", { class: "small", x: chart.right, y: top + 15, "text-anchor": "end" }, row.words);
     draw(chart.front, "text", { class: "small", x: 10, y: top + 29 }, row.counts);
     const group = tint(draw(chart.layer, "g"), detector);
-    // Where there are thousands, smaller marks still show where they are.
+    // Thousands of contacts have smaller marks.
     const size = Math.min(3.2, Math.max(1.1, 60 / Math.sqrt(row.latency.length + 1)));
     const marks = row.latency.map((value, i) =>
       outline(detector.marker, chart.x(clamp(value)), heightOf(place, i), size),
@@ -58,7 +58,7 @@ function latencyPlan(data, panel, openRecording) {
     if (middle === null) return;
     const x = chart.x(clamp(middle));
     if (low === undefined) {
-      // Too few contacts for an interval that holds what it says.
+      // Too few contacts for an interval.
       draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}` });
       return;
     }
@@ -88,7 +88,7 @@ function latencyPlan(data, panel, openRecording) {
     home: whole,
     log,
     margin,
-    label: `latency from contact onset to alarm [ms]${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
+    label: `${data.axes.latency}${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
     draw: (chart) => panel.rows.forEach((row, place) => drawLane(chart, row, place)),
     probe(chart, x, y) {
       const place = Math.floor(y / lane);
@@ -106,7 +106,7 @@ function latencyPlan(data, panel, openRecording) {
       const words = [
         data.detectors[row.detector].name,
         `${recordingName(data, recording)}, contact ${contact}`,
-        missed ? `missed: no alarm within ${figure(value)} ms` : `${figure(value)} ms`,
+        missed ? `missed: no alarm within ${numberText(value)} ms` : `${numberText(value)} ms`,
       ];
       if (open) words.push("click: trigger plot");
       return { x: chart.x(clamp(value)), y: heightOf(place, i), mark: true, words: words.join("\n"), open };
@@ -114,7 +114,7 @@ function latencyPlan(data, panel, openRecording) {
   };
 }
 
-/** Share of the contacts still undetected over the time since the onset: a step curve a detector. */
+/** Share of the contacts still undetected over the time since the onset: a step curve per detector. */
 function survivalPlan(data, panel, hidden) {
   const until = Math.max(...panel.rows.map((row) => row.until), FLOOR_MS);
   const last = Math.max(...panel.rows.map((row) => row.times[row.times.length - 1]), FLOOR_MS);
@@ -143,7 +143,7 @@ function survivalPlan(data, panel, hidden) {
     home: [0, Math.min(until * 1.02, last * 1.15)],
     log: false,
     margin,
-    label: "time since contact onset [ms]",
+    label: data.axes.time,
     draw(chart) {
       chart.drawLevels(y, 0, 1, 4, margin.top, (share) => `${Math.round(100 * share)} %`);
       const rows = visible(panel, hidden);
@@ -158,19 +158,19 @@ function survivalPlan(data, panel, hidden) {
       const time = chart.valueAtPixel(x);
       const words = visible(panel, hidden).map((row) => {
         const i = stepAt(row, time);
-        if (time > row.until) return `${data.detectors[row.detector].name}: not watched any more`;
+        if (time > row.until) return `${data.detectors[row.detector].name}: no longer monitored`;
         const [share, ...band] = [row.share, row.low, row.high]
           .filter((values) => values)
-          .map((values) => figure(100 * values[i], 2));
+          .map((values) => numberText(100 * values[i], 2));
         const bounds = band.length ? ` (${band.join(" to ")})` : "";
         return `${data.detectors[row.detector].name}: ${share} %${bounds} of ${row.n}`;
       });
-      return { x, y: pointerY, words: [`${figure(time)} ms after the onset, undetected:`, ...words].join("\n") };
+      return { x, y: pointerY, words: [`${numberText(time)} ms after the onset, undetected:`, ...words].join("\n") };
     },
   };
 }
 
-/** Median latency against the rate of false alarms: a point a safety factor. */
+/** Median latency against the rate of false alarms: a point per safety factor. */
 function amocPlan(data, panel, hidden, unit) {
   const zone = 92;
   const margin = { left: 48 + zone, right: 16, top: 34, bottom: 56 };
@@ -222,13 +222,13 @@ function amocPlan(data, panel, hidden, unit) {
   function wordsOf(row, i) {
     const per = unit === "hour" ? "hour" : "operation";
     const alarms = row.alarms[i];
-    const rate = alarms ? `${figure(alarms / exposure(row))} per ${per}` : `at most ${row.none[unit]} per ${per}`;
-    const median = row.median[i] === null ? "median not reached" : `median ${figure(row.median[i])} ms`;
+    const rate = alarms ? `${numberText(alarms / exposure(row))} per ${per}` : `at most ${row.none[unit]} per ${per}`;
+    const median = row.median[i] === null ? "median not reached" : `median ${numberText(row.median[i])} ms`;
     const inUse = i === row.chosen ? " (in use)" : "";
     return [
-      `${data.detectors[row.detector].name}, safety factor ${figure(row.factor[i])}${inUse}`,
+      `${data.detectors[row.detector].name}, safety factor ${numberText(row.factor[i])}${inUse}`,
       `${median}: ${row.detected[i]} detected, ${row.missed[i]} missed, ${row.not_assessable} not assessable`,
-      `${counted(alarms, "false alarm")} in ${row.operations} operations, ${figure(row.hours)} h: ${rate}`,
+      `${counted(alarms, "false alarm")} in ${row.operations} operations, ${numberText(row.hours)} h: ${rate}`,
     ].join("\n");
   }
 
@@ -250,11 +250,11 @@ function amocPlan(data, panel, hidden, unit) {
           tickWords(tick, 0),
         );
       }
-      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, "median latency [ms]");
+      draw(chart.front, "text", { class: "small", x: 0, y: 10 }, data.axes.median);
       draw(chart.front, "path", { class: "axis", d: `M${left} ${chart.bottom}H${margin.left}V${margin.top}` });
       const fewest = panel.rows.reduce((a, b) => (exposure(b) < exposure(a) ? b : a));
       const middle = margin.left - zone / 2;
-      const watched = unit === "hour" ? `${figure(fewest.hours)} h` : `${fewest.operations} operations`;
+      const watched = unit === "hour" ? `${numberText(fewest.hours)} h` : `${fewest.operations} operations`;
       draw(
         chart.front,
         "text",
@@ -287,7 +287,7 @@ function amocPlan(data, panel, hidden, unit) {
   };
 }
 
-/** Two choices beside each other; calls back with the one chosen. */
+/** Two choices next to each other; calls back with the selected one. */
 function makeChoice(host, words, options, changed) {
   make(host, "span", {}, words);
   options.forEach(([value, text], i) => {

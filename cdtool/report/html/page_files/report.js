@@ -1,10 +1,10 @@
-// What the page does once it is there: sort tables, page through long ones, draw plots, show traces.
+// Runs when the page is complete: sort tables, page through long ones, draw plots, show traces.
 
 function elements(kind) {
   return [...document.querySelectorAll(`svg[data-plot="${kind}"]`)];
 }
 
-/** The charts of one kind; where the page has a place for a legend, its names hide curves. */
+/** The charts of one kind; if the page has a legend for them, its names hide curves. */
 function makeCharts(kind, data, panels, plan) {
   const host = document.querySelector(`.legend[data-for="${kind}"]`);
   let charts = [];
@@ -42,13 +42,13 @@ function makeForces(data, viewer) {
   if (!host || !viewer) return;
   const plans = data.force.map((panel) => forcePlan(data, panel, viewer.traceAt, viewer.open));
   elements("force").forEach((svg) => new Chart(svg, plans[Number(svg.dataset.number)]));
-  const told = data.force.flatMap((panel) =>
+  const detectors = data.force.flatMap((panel) =>
     panel.curves.flatMap((item) => viewer.traceAt(item.trace).panels.map((row) => row.detector)),
   );
-  makeForceLegend(host, data, told);
+  makeForceLegend(host, data, detectors);
 }
 
-/** Folded parts are printed too. */
+/** Print collapsed parts too. */
 function unfoldForPrint() {
   let folded = [];
   addEventListener("beforeprint", () => {

@@ -1,6 +1,6 @@
 "use strict";
 
-// Numbers: curves that were packed, axes with their ticks, figures in words.
+// Numbers: packed curves, axes with their ticks, numbers as text.
 
 const ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 const DIGITS = new Map([...ALPHABET].map((letter, digit) => [letter, digit]));
@@ -33,7 +33,7 @@ function unpack(curve) {
   return Float64Array.from(found);
 }
 
-/** The least and the greatest of numbers that may be too many to be arguments of a call. */
+/** The smallest and largest of numbers that may be too many for the arguments of a call. */
 function leastOf(numbers, start = Infinity) {
   return numbers.reduce((a, b) => Math.min(a, b), start);
 }
@@ -42,7 +42,7 @@ function mostOf(numbers, start = -Infinity) {
   return numbers.reduce((a, b) => Math.max(a, b), start);
 }
 
-/** Where the value would stand in rising numbers. */
+/** The index at which a value belongs in ascending numbers. */
 function placeOf(numbers, value) {
   let low = 0,
     high = numbers.length;
@@ -63,8 +63,8 @@ function valueAt(times, values, time) {
   return values[after - 1] + share * (values[after] - values[after - 1]);
 }
 
-/** A figure as the tables write it: three digits, no exponent. */
-function figure(value, digits = 3) {
+/** A number as the tables write it: three digits, no exponent. */
+function numberText(value, digits = 3) {
   if (value === null || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return "not reached";
   const size = value ? Math.floor(Math.log10(Math.abs(value)) + 1e-12) : 0;
@@ -75,7 +75,7 @@ function counted(count, thing) {
   return `${count} ${thing}${count === 1 ? "" : "s"}`;
 }
 
-/** Round numbers from low to high, about so many. */
+/** Round numbers from low to high, about `most` of them. */
 function ticksOf(low, high, most) {
   const raw = (high - low) / Math.max(most, 1);
   const power = 10 ** Math.floor(Math.log10(raw));
@@ -85,7 +85,7 @@ function ticksOf(low, high, most) {
   return { values: found, step };
 }
 
-/** Round numbers for a logarithmic axis; where it spans little, those of a linear one. */
+/** Round numbers for a logarithmic axis; for a short one those of a linear axis. */
 function logTicksOf(low, high, most) {
   for (const factors of [[1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
     const found = [];

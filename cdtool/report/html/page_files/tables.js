@@ -1,11 +1,11 @@
 // Tables that are sorted by a click on a heading, and long ones that are paged, filtered and searched.
 
-// A table's figures that are not there; they stay last in either order.
+// Missing numbers of a table; they stay last in either order.
 const NO_KEY = 1e299;
 const PAGE_SIZES = [15, 50, 200, 1000];
 const LONGEST_WORD = 28;
 
-/** Which of two rows comes first: by figure where there is one, else by text. */
+/** Which of two rows comes first: by number if they have one, else by text. */
 function compareRows(first, second, direction) {
   if (typeof first === "number") {
     const [a, b] = [first > NO_KEY, second > NO_KEY];
@@ -15,7 +15,7 @@ function compareRows(first, second, direction) {
   return direction * first.localeCompare(second, "en", { numeric: true });
 }
 
-/** Turn headings into buttons; sort(column, direction) is called with the heading's place and 1 or -1. */
+/** Turn headings into buttons; sort(column, direction) is called with the heading's index and 1 or -1. */
 function makeSortable(headings, sort) {
   headings.forEach((heading, column) => {
     const words = heading.textContent;
@@ -30,7 +30,7 @@ function makeSortable(headings, sort) {
   });
 }
 
-/** A table that the page came with: its rows are put in another order. */
+/** Sort a table of the page: its rows are reordered. */
 function sortInPlace(table) {
   const body = table.tBodies[0];
   const rows = [...body.rows];

@@ -1,16 +1,8 @@
-// One recording: the load cell on top, below it a row a detector with signal, band, limits and alarm.
+// One recording: the load cell on top, below it a row per detector with signal, band, limits and alarm.
 
 const HEAD = 26,
   GAP = 10;
 const HEADROOM = 1.5;
-const REASONS = {
-  1: "start-up",
-  2: "not applicable",
-  3: "missing samples",
-  4: "no limit known here",
-  5: "other speed",
-  6: "other sample rate",
-};
 const HATCHES = {
   1: "M0 8L8 0",
   2: "M0 8L8 0M0 0L8 8",
@@ -37,29 +29,29 @@ function shownContact(trace) {
   return trace.contact >= 0 ? trace.contacts[trace.contact] : null;
 }
 
-/** What a row says at its right: the latency, or why there is none. */
+/** The text right of a row: the latency, or why it is missing. */
 function verdictOf(trace, panel) {
   const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
   const extra = panel.false_alarms.length ? counted(panel.false_alarms.length, "false alarm") : "";
   const outcome = seen ? seen.outcome : panel.verdict === "not_assessable" ? panel.verdict : "";
   if (outcome === "not_assessable") return { words: "not assessable", reason: (seen && seen.reason) || panel.reason };
   if (!seen) return { words: extra || "no alarm", reason: "" };
-  const words = outcome === "detected" ? `${figure(1e3 * seen.late)} ms` : "missed";
+  const words = outcome === "detected" ? `${numberText(1e3 * seen.late)} ms` : "missed";
   return { words, reason: extra };
 }
 
-/** From when to when each alarm stands: until it is armed again; to the end where it never is or that is unknown. */
+/** From when to when each alarm is raised: until it is re-armed; to the end if never or unknown. */
 function triggersOf(trace, panel) {
   const spans = panel.alarms.map((time, i) => [time, panel.rearmed[i] ?? trace.end]);
   const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
-  // The contact's own crossing may come while an earlier alarm still stands.
+  // The contact's own crossing may be during an earlier alarm.
   if (seen && seen.outcome === "detected" && !spans.some(([from, to]) => from <= seen.alarm && seen.alarm <= to))
     spans.push([seen.alarm, trace.end]);
   return spans;
 }
 
-/** Stretches of samples that could not be judged: first and last time, and the reason's number. */
-function unjudged(panel) {
+/** Intervals of samples that are not assessable: first and last time, and the number of the reason. */
+function notAssessed(panel) {
   const found = [];
   for (let i = 0; i < panel.status.length; i += 1) {
     const code = panel.status[i];
@@ -72,7 +64,7 @@ function unjudged(panel) {
   return found;
 }
 
-/** The vertical range: all limits and judged values in view, excursions up to some bands beyond. */
+/** The vertical range: all limits and valid values in view, excursions up to some bands beyond. */
 function frame(panel, first, last) {
   const values = [],
     bounds = [];
@@ -128,7 +120,7 @@ function tracePlan(data, trace) {
   function area(top, height, low, high) {
     const from = top + HEAD,
       to = top + height - GAP;
-    // Beyond some screens a browser would no longer draw it.
+    // A browser does not draw far beyond the screen.
     return { from, to, y: (value) => Math.min(Math.max(to - ((value - low) / (high - low)) * (to - from), -1e5), 1e5) };
   }
 
@@ -181,10 +173,10 @@ function tracePlan(data, trace) {
     drawBand(layer, chart, panel, box, from, to);
     levels(chart, box, low, high);
     drawTrigger(chart, panel, detector, box);
-    drawUnjudged(chart, panel, box);
+    drawNotAssessed(chart, panel, box);
     const group = tint(draw(layer, "g"), detector);
     draw(layer, "path", {
-      class: "unjudged",
+      class: "not-assessed",
       d: line(chart, panel.time, panel.value, box.y, from, to, (i) => panel.status[i] !== 0),
     });
     draw(group, "path", {
@@ -219,8 +211,8 @@ function tracePlan(data, trace) {
     draw(layer, "path", { class: "band", d: path });
   }
 
-  function drawUnjudged(chart, panel, box) {
-    for (const { code, from, to } of unjudged(panel)) {
+  function drawNotAssessed(chart, panel, box) {
+    for (const { code, from, to } of notAssessed(panel)) {
       const left = Math.max(chart.x(from), margin.left),
         width = Math.min(chart.x(to), chart.right) - left;
       if (width < 1) continue;
@@ -231,7 +223,8 @@ function tracePlan(data, trace) {
         height: box.to - box.from,
         fill: `url(#hatch-${code})`,
       });
-      const words = [`not assessable: ${REASONS[code]}`, REASONS[code]].find((text) => text.length * 6.2 + 8 < width);
+      const reason = data.reasons[code];
+      const words = [`not assessable: ${reason}`, reason].find((text) => text.length * 6.2 + 8 < width);
       if (words) draw(chart.front, "text", { class: "small halo", x: left + 4, y: box.to - 4 }, words);
     }
   }
@@ -268,7 +261,7 @@ function tracePlan(data, trace) {
     margin,
     offset: contact ? contact.start : 0,
     scale: contact ? 1e3 : 1,
-    label: contact ? "time from contact onset [ms]" : "time [s]",
+    label: contact ? data.axes.time : "time [s]",
     draw(chart) {
       const defs = draw(chart.svg, "defs");
       for (const [code, d] of Object.entries(HATCHES)) {
@@ -288,16 +281,19 @@ function tracePlan(data, trace) {
     probe(chart, x, y) {
       if (x < margin.left || x > chart.right || y > chart.bottom) return null;
       const time = chart.valueAtPixel(x);
-      const when = contact ? `${figure(1e3 * (time - contact.start), 4)} ms from onset` : `${time.toFixed(3)} s`;
-      if (y < first) return { x, y, words: `${when}\nload cell ${figure(valueAt(trace.times, trace.values, time))} N` };
+      const when = contact ? `${numberText(1e3 * (time - contact.start), 4)} ms from onset` : `${time.toFixed(3)} s`;
+      const force = () => numberText(valueAt(trace.times, trace.values, time));
+      if (y < first) return { x, y, words: `${when}\nload cell ${force()} N` };
       const panel = rows[Math.floor((y - first) / heights.row)];
       if (!panel) return null;
       const i = Math.max(placeOf(panel.time, time) - 1, 0);
-      const status = panel.status[i] ? `not assessable: ${REASONS[panel.status[i]]}` : "";
-      const limits = [panel.lower[i], panel.upper[i]].map((limit) => (Number.isFinite(limit) ? figure(limit) : "none"));
+      const status = panel.status[i] ? `not assessable: ${data.reasons[panel.status[i]]}` : "";
+      const limits = [panel.lower[i], panel.upper[i]].map((limit) =>
+        Number.isFinite(limit) ? numberText(limit) : "none",
+      );
       const words = [
         when,
-        `${data.detectors[panel.detector].name}: ${figure(panel.value[i])} ${panel.unit}`,
+        `${data.detectors[panel.detector].name}: ${numberText(panel.value[i])} ${panel.unit}`,
         `limits: ${limits[0]} to ${limits[1]}`,
         status,
       ];
@@ -343,10 +339,10 @@ function makeViewer(data, sources, opened) {
     const words = [trace.group];
     if (!contact) words.push("no contact");
     else if (trace.contacts.length > 1) words.push(`contact ${trace.contact + 1} of ${trace.contacts.length}`);
-    if (contact && contact.peak_force !== null) words.push(`peak ${figure(contact.peak_force)} N`);
+    if (contact && contact.peak_force !== null) words.push(`peak ${numberText(contact.peak_force)} N`);
     if (contact)
       words.push(
-        `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${figure(1e3 * contact.uncertainty, 2)} ms)`,
+        `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${numberText(1e3 * contact.uncertainty, 2)} ms)`,
       );
     words.push(`plot ${number + 1} of ${sources.length}${trace.chosen ? `: ${trace.chosen}` : ""}`);
     document.getElementById("viewer-title").textContent = trace.recording || "(no name)";
@@ -385,7 +381,7 @@ function makeTraceLegend(host) {
     ["onset", "M0 6H26", "contact onset"],
     ["limit", "M0 6H26", "limit"],
     ["band", "M0 0H26V12H0Z", "normal band"],
-    ["unjudged", "M0 12L12 0M8 12L20 0M16 12L26 2", "not assessable"],
+    ["not-assessed", "M0 12L12 0M8 12L20 0M16 12L26 2", "not assessable"],
   ];
   for (const [kind, d, words] of marks) {
     const entry = make(host, "span");

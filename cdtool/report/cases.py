@@ -1,0 +1,108 @@
+"""Results as test cases for CI: every limit, force profile and recording, so that a report shows which one failed.
+
+Conventions: a failure is a limit or force profile that is not met, or a recording's part in one; so there is a failure
+exactly where the exit status is 1. What was left out is an error, and so is a force profile that could not be assessed
+and a detector that could not assess anything of a group; other outcomes that are not assessable are skipped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+
+from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
+from cdtool.evaluation.results import ContactResult, LimitResult
+from cdtool.evaluation.summary import later_ms
+from cdtool.report.number_text import number, spoken
+from cdtool.report.tables.results import required, value_of
+
+
+@dataclass(frozen=True)
+class Case:
+    """One test case: `kind` is "failure", "error", "skipped" or, of one that passed, empty; `lines` are its output."""
+
+    name: str
+    kind: str = ""
+    message: str = ""
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Suite:
+    """The test cases of one subject."""
+
+    name: str
+    cases: tuple[Case, ...]
+
+
+def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
+    """Yield limits, force profiles, what was left out, then the recordings of each detector and group."""
+    results = evaluated.results
+    if results.limits:
+        yield Suite("limits", tuple(_limit(item) for item in results.limits))
+    checks = force_checks(results)
+    if checks:
+        yield Suite("force", tuple(_force(item) for item in checks))
+    if results.skipped:
+        yield Suite("left out", tuple(Case(item.recording, "error", item.reason) for item in results.skipped))
+    silent = {(item.detector, item.group) for item in nothing_assessed(evaluated.summaries)}
+    forbidden = {(item.detector, item.group) for item in force_missed(results, evaluated.summaries)}
+    outcomes = recording_outcomes(results)
+    for pair, items in groupby(outcomes, key=lambda item: (item.detector, item.group)):
+        cases = (_recording(item, pair in silent, pair in forbidden) for item in items)
+        yield Suite(".".join(pair), tuple(cases))
+    if not outcomes:
+        yield Suite("benchmark", (Case("scored", "error", "nothing was scored"),))
+
+
+def _limit(item: LimitResult) -> Case:
+    name = f"{item.limit} ({item.detector}, {item.group})"
+    words = f"{item.figure} is {value_of(item)}; required: {required(item)}"
+    if item.outcome == "met":
+        return Case(name, lines=(words,))
+    return Case(name, "failure", f"{spoken(item.outcome)}: {words}; {item.reason}")
+
+
+def _force(item: ForceCheck) -> Case:
+    name = f"{item.group}: {item.name or 'no contact'}"
+    if item.verdict == "pass":
+        return Case(name, lines=(f"{item.profile}: pass",))
+    kind = "failure" if item.verdict == "fail" else "error"
+    return Case(name, kind, f"{item.profile}: {spoken(item.verdict)}: {item.reason}")
+
+
+def _recording(item: RecordingOutcome, silent: bool, forbidden: bool) -> Case:
+    """Return the case of one recording with one detector.
+
+    `silent`: the detector could not assess anything of the group; `forbidden`: a missed contact violates its profile.
+    """
+    lines = [_contact(contact) for contact in item.contacts]
+    lines += [f"false alarm at {alarm.time_s:.3f} s on {alarm.joint}" for alarm in item.false_alarms]
+    missed = [contact.contact for contact in item.contacts if forbidden and contact.outcome == "missed"]
+    breaks = [*item.breaks, *(f"contact {number} is missed where a force profile is set" for number in missed)]
+    if breaks:
+        return Case(item.recording, "failure", "; ".join(breaks), tuple(lines))
+    if item.blind:
+        why = "; ".join(dict.fromkeys(contact.reason or "" for contact in item.contacts))
+        kind = "error" if silent else "skipped"
+        return Case(item.recording, kind, f"not assessable: {why or 'the detector gave no result'}", tuple(lines))
+    return Case(item.recording, lines=tuple(lines) or ("no contact and no alarm",))
+
+
+def _contact(item: ContactResult) -> str:
+    words = f"contact {item.contact} at {item.onset_s:.3f} s: {spoken(item.outcome)}"
+    if item.latency_ms is not None:
+        words += f" after {number(item.latency_ms)} ms"
+        words += " (before the onset, within its uncertainty)" if item.clipped else ""
+        if item.onset_hole_ms is not None:
+            words += f" or up to {number(later_ms(item))} ms later (load-cell samples missing at the onset)"
+    if item.force_at_alarm_n is not None:
+        words += f" at {number(item.force_at_alarm_n)} N"
+    if item.peak_force_n is not None:
+        words += f", peak {number(item.peak_force_n)} N"
+    if item.force_hole_ms is not None:
+        words += f" or more (load-cell samples missing for {number(item.force_hole_ms)} ms)"
+    return f"{words} ({item.reason})" if item.reason else words

@@ -1,0 +1,238 @@
+"""What every report of a benchmark shows, computed once as plain values: headline, tables, notes and test cases.
+
+Renderers (HTML, Markdown, JUnit) add markup, choose what fits, and neither compute, format nor word anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results import Results
+from cdtool.plain_text import counted, shorten
+from cdtool.report.cases import Suite, suites_of
+from cdtool.report.few_contacts import explained
+from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
+from cdtool.report.table import Table
+from cdtool.report.tables import forces, recordings
+from cdtool.report.tables.provenance import provenance_tables
+from cdtool.report.tables.results import (
+    calibration_table,
+    comparisons_table,
+    differences_note,
+    differences_table,
+    limits_table,
+    part_of,
+    results_table,
+)
+
+NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
+UNCHECKED = "Values to be checked against the standard."
+AXES = {
+    "latency": "latency from contact onset to alarm [ms]",
+    "median": "median latency [ms]",
+    "time": "time from contact onset [ms]",
+    "force": "force [N]",
+}
+TITLES = {
+    "limits": "Limits",
+    "results": "Results",
+    "latency": "Latency of each contact",
+    "survival": "Share of contacts undetected over time",
+    "amoc": "Median latency against false alarms",
+    "comparisons": "Comparisons",
+    "force": "Force",
+    "recordings": "Recordings",
+    "not_assessable": "Not assessable",
+    "left_out": "Left out and warnings",
+    "calibration": "False-alarm budget",
+    "provenance": "Provenance",
+}
+# A text from a file that is part of a sentence is cut to this length.
+_LONGEST = 200
+
+_NOTES = {
+    "latency": (
+        "Each mark is a contact. Open marks: missed contacts, at the time up to which an alarm would have counted. "
+        "Vertical line and bar: median and, with ten or more contacts, its interval; dotted if its end is not "
+        "reached."
+    ),
+    "survival": (
+        "Share of the assessable contacts still undetected at a time after the onset (Kaplan–Meier); lower and "
+        "further left is better. With up to three detectors shown, the 95 % band is drawn for ten or more contacts."
+    ),
+    "amoc": (
+        "Each point is a safety factor; the ringed point is in use. False alarms are those of the impact-free "
+        "operations. Left of the line there is no false alarm; this does not mean a rate of zero, and the upper bound "
+        "is given below. Open points: contacts were missed. A triangle at the top: the median is not reached."
+    ),
+    "comparisons": (
+        "Paired: the same contacts, as far as both detectors could assess them. Latency: over the contacts that both "
+        "detected, with its 95 % interval from ten or more recordings or campaigns. The p are corrected by Holm over "
+        "all tests of a group; a difference is shown if its p is below 0.05. “No difference shown” is not a proof of "
+        "none. “Too few recordings”: no latencies could have resulted in a p below 0.05; recordings of one campaign "
+        "count as one."
+    ),
+    "force": (
+        "Load cell as it was read, over the time since the onset; verdicts use the force corrected for its reading at "
+        "rest and for the mass before the cell. Coloured: the contact with the highest peak, and the detectors' "
+        "alarms on it."
+    ),
+    "calibration": (
+        "Each factor was set on impact-free operations, each assessed with a threshold that was not learned from it."
+    ),
+    "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
+}
+
+
+@dataclass(frozen=True)
+class ProfileText:
+    """The force profile of a group in sentences; `unchecked` is empty once its values have been checked."""
+
+    source: str
+    unchecked: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Model:
+    """The plain values of a report. Texts from files are unchanged: renderers escape them.
+
+    `tone` of the headline is good, bad, unknown, or empty if nothing was required. `scope`: version, machine, number of
+    detectors and recordings. `left_out`: how much data was left out or lost, empty if none. `tables`: by name, those
+    with rows; `groups`: the results of each group with its name; `notes`: how to read each part.
+    """
+
+    headline: str
+    counts: str
+    tone: str
+    scope: tuple[str, ...]
+    reasons: tuple[str, ...]
+    left_out: str
+    tables: Mapping[str, Table]
+    groups: tuple[tuple[str, Table], ...]
+    provenance: tuple[Table, ...]
+    profiles: Mapping[str, ProfileText]
+    notes: Mapping[str, str]
+    suites: tuple[Suite, ...]
+
+    def first_reasons(self, most: int) -> list[str]:
+        """Return the first reasons behind the headline, and how many more there are."""
+        more = len(self.reasons) - most
+        return [*self.reasons[:most], *([f"and {more} more"] if more > 0 else [])]
+
+
+def report_model(evaluated: Evaluated) -> Model:
+    """Return everything that the reports of a benchmark show."""
+    results, summaries = evaluated.results, evaluated.summaries
+    provenance = results.provenance
+    version = provenance.get("tool_version")
+    scope = (
+        f"cdtool {version}" if version else "cdtool",
+        str(provenance.get("machine") or ""),
+        counted(len(results.detectors), "detector"),
+        counted(len(results.recordings), "recording"),
+    )
+    tables = (
+        limits_table(results, met=False),
+        limits_table(results, met=True),
+        results_table(results, summaries),
+        comparisons_table(evaluated),
+        differences_table(evaluated),
+        forces.groups_table(results),
+        forces.points_table(results),
+        forces.contacts_table(results),
+        forces.contacts_table(results, only_exceptions=True),
+        recordings.recordings_table(results),
+        recordings.scored_table(results),
+        *recordings.contact_tables(results),
+        recordings.false_alarms_table(results),
+        recordings.not_assessable_table(results),
+        *recordings.reasons_tables(results),
+        calibration_table(results),
+    )
+    groups = {group: [item for item in summaries if item.group == group] for group in results.groups}
+    return Model(
+        headline=results.conclusion.headline,
+        counts=counts_text(evaluated),
+        tone=_tone(results),
+        scope=tuple(part for part in scope if part),
+        reasons=results.conclusion.reasons,
+        left_out=f"{counted(len(results.skipped), 'entry')} of data left out or lost" if results.skipped else "",
+        tables={table.name: table for table in tables if table.rows},
+        groups=tuple((group, results_table(results, items, group)) for group, items in groups.items()),
+        provenance=tuple(provenance_tables(results)),
+        profiles=_profiles(results),
+        notes={
+            **_NOTES,
+            "results": _results_note(evaluated),
+            "differences": differences_note(evaluated) if evaluated.comparisons else "",
+        },
+        suites=tuple(suites_of(evaluated)),
+    )
+
+
+def counts_text(evaluated: Evaluated) -> str:
+    """Return the outcomes of the contacts in one line, over all detectors and groups."""
+    summaries, results = evaluated.summaries, evaluated.results
+    if not any(item.contacts or item.operations for item in summaries):
+        return "nothing was scored"
+    contacts = len({(item.group, item.recording, item.contact) for item in results.scored_contacts})
+    counts = (
+        ("detected", sum(item.detected for item in summaries)),
+        ("missed", sum(item.missed for item in summaries)),
+        (NOT_ASSESSABLE, sum(item.not_assessable for item in summaries)),
+    )
+    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in counts)
+    if clipped := sum(item.clipped for item in summaries):
+        outcomes += f" ({clipped} before the onset, counted as 0 ms)"
+    if holes := len(
+        {(item.group, item.recording, item.contact) for item in results.contacts if item.onset_hole_ms is not None}
+    ):
+        outcomes += f"; {counted(holes, 'contact')} may have begun where load-cell samples are missing"
+    if begun := len({(item.group, item.recording, item.contact) for item in results.contacts if item.in_progress}):
+        outcomes += f"; {counted(begun, 'contact')} in progress at the start, not scored"
+    assessed = any(item.watched and item.judged_operations for item in summaries)
+    count = counted(sum(item.false_alarms for item in summaries), "false alarm")
+    alarms = count if assessed else f"false alarms {NOT_ASSESSABLE}"
+    return f"{counted(contacts, 'contact')} with {counted(len(results.detectors), 'detector')}: {outcomes}; {alarms}"
+
+
+def _tone(results: Results) -> str:
+    conclusion = results.conclusion
+    if conclusion.outcome == "violated":
+        return "bad"
+    if conclusion.outcome == "not_assessable" or conclusion.missed_without_limit:
+        return "unknown"
+    return "good" if conclusion.outcome == "met" else ""
+
+
+def _results_note(evaluated: Evaluated) -> str:
+    """Return how to read the results: from when to when, what is in brackets, what counts where."""
+    results = evaluated.results
+    onset = shorten(str(results.provenance.get("onset") or "rule not stated"), _LONGEST)
+    label_file = shorten(str(results.provenance.get("label_file") or ""), _LONGEST)
+    labels = f"; labels: {label_file}" if label_file else ""
+    resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
+    resolution = f"; resolution up to {number(max(resolutions))} ms" if resolutions else ""
+    note = (
+        f"Latency: from the onset of the contact ({onset}{labels}) to the sample that raised the alarm, debounce "
+        f"included{resolution}. In brackets: 95 % interval; “{NOTHING}” means no value. Mean and std are those of the "
+        "detected contacts. Median and P95 count a missed contact as later than all others. “At most” is the one-sided "
+        "95 % bound. Force at alarm: median of the detected contacts. Peak force: median of all contacts. Read a "
+        "latency together with missed, not assessable and false alarms."
+    )
+    return f"{note} {explained(evaluated.summaries)}".rstrip()
+
+
+def _profiles(results: Results) -> dict[str, ProfileText]:
+    return {
+        group: ProfileText(
+            f"{profile.get('title') or ''} (source: {profile.get('source') or ''}).",
+            "" if profile.get("checked") else UNCHECKED,
+            str(profile.get("note") or ""),
+        )
+        for group, profile in part_of(results.provenance, "force_profiles").items()
+        if isinstance(profile, Mapping)
+    }

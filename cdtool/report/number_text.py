@@ -1,0 +1,78 @@
+"""Numbers as text: "38.0 (36.2 to 41.5)", "not reached" where infinite, "–" where there is no value.
+
+Conventions: three significant digits, those of the value for its bounds too; never an exponent. Functions that return
+several texts return a value and what follows it, each with the punctuation that joins it to the text before it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cdtool.evaluation.statistics.interval import Interval
+
+NOTHING = "–"
+NOT_REACHED = "not reached"
+NOT_ASSESSABLE = "not assessable"
+# The remainder of rounding equal numbers is shown as 0: below this, or below this share of the interval's width.
+_ZERO_BELOW = 1e-12
+_ZERO_SHARE = 1e-9
+
+
+def spoken(word: str) -> str:
+    """Return a word of the data as people read it: "not assessable"."""
+    return word.replace("_", " ")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number with the given count of significant digits."""
+    return NOTHING if value is None else _written(value, _decimals(value, digits))
+
+
+def with_interval(interval: Interval) -> str:
+    """Return a value with its interval; "(–)" where there is too little data for one."""
+    return "".join(value_and_interval(interval))
+
+
+def value_and_interval(interval: Interval) -> tuple[str, ...]:
+    """Return a value and its interval in brackets; an interval without an upper end is in two parts."""
+    if not interval.known:
+        return (NOTHING,)
+    width = interval.high - interval.low
+    least = max(_ZERO_BELOW, _ZERO_SHARE * width if math.isfinite(width) else 0.0)
+    parts = [0.0 if abs(item) < least else item for item in (interval.value, interval.low, interval.high)]
+    leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
+    value, low, high = (_written(item, _decimals(leading)) for item in parts)
+    if low == high == NOT_REACHED:
+        return (NOT_REACHED,)
+    if low == high == NOTHING:
+        return value, f" ({NOTHING})"
+    return (value, f" ({low}", f" to {high})") if high == NOT_REACHED else (value, f" ({low} to {high})")
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent with two significant digits."""
+    return NOTHING if math.isnan(share) else f"{number(100.0 * share, 2)} %"
+
+
+def missed(count: int, assessable: int, at_most: float) -> tuple[str, ...]:
+    """Return missed contacts with the one-sided bound of their share: "0 of 30", ": at most 9.5 %"."""
+    return (f"{count} of {assessable}", f": at most {percent(at_most)}") if assessable else (NOTHING,)
+
+
+def rate(count: int, interval: Interval, at_most: float) -> tuple[str, ...]:
+    """Return a rate of false alarms with its interval and its one-sided bound; of no alarm only the bound."""
+    if math.isnan(at_most):
+        return (NOTHING,)
+    return (*(value_and_interval(interval) if count else ("0",)), f": at most {number(at_most)}")
+
+
+def _written(value: float, decimals: int) -> str:
+    if math.isnan(value):
+        return NOTHING
+    return f"{value:z.{decimals}f}" if math.isfinite(value) else NOT_REACHED
+
+
+def _decimals(value: float, digits: int = 3) -> int:
+    if not math.isfinite(value) or value == 0.0:
+        return 0
+    return max(digits - 1 - math.floor(math.log10(abs(value))), 0)

@@ -1,0 +1,164 @@
+"""A table of a report as plain values, which every renderer shows: headings, cells with their sort keys, and marks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.report.number_text import NOTHING, number, spoken, value_and_interval
+
+Item = TypeVar("Item")
+# A recording's group and name.
+Log = tuple[str, str]
+
+# Sorts after every number.
+_LAST = 1e300
+_TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
+_JOINTS = " ,;:"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column; `numeric` columns are right-aligned and begin with their largest number when sorted.
+
+    `choice`: readers may select one of its values. `below`: where width is scarce, it is shown in small print below the
+    column to its left.
+    """
+
+    heading: str
+    numeric: bool = False
+    choice: bool = False
+    below: bool = False
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The text of a cell, and `details` for small print, each with the punctuation that joins it to the text before it.
+
+    `key` sorts the cell, by default its text does. `tone` is good, bad or unknown.
+    """
+
+    text: str
+    details: tuple[str, ...] = ()
+    key: float | None = None
+    tone: str = ""
+
+    @property
+    def line(self) -> str:
+        """All of it in one line."""
+        return "".join((self.text, *self.details))
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The text, and the details without their punctuation."""
+        return (self.text, *(detail.lstrip(_JOINTS) for detail in self.details))
+
+
+Row = Sequence[Cell]
+Fields = Sequence[tuple[Column, Callable[[Item], Cell]]]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table under its title; `source` names its rows in results.json.
+
+    `marks`: by a property that readers may select, whether each row has it. `logs`: the recording of each row.
+    """
+
+    name: str
+    title: str
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    source: str = ""
+    marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
+    logs: Sequence[Log] = ()
+
+    @property
+    def counted_title(self) -> str:
+        """The title with the number of rows."""
+        return f"{self.title} ({len(self.rows)})"
+
+    def cells(self, heading: str) -> list[Cell]:
+        """Return the cells below a heading."""
+        place = [column.heading for column in self.columns].index(heading)
+        return [row[place] for row in self.rows]
+
+    def narrow(self) -> Table:
+        """Return the table with each `below` column in small print below the one to its left."""
+        columns: list[Column] = []
+        rows: list[list[Cell]] = [[] for _ in self.rows]
+        for place, column in enumerate(self.columns):
+            if column.below:
+                columns[-1] = replace(columns[-1], heading=f"{columns[-1].heading}, {column.heading}")
+                for made, row in zip(rows, self.rows, strict=True):
+                    made[-1] = _joined(made[-1], column.heading, row[place])
+            else:
+                columns.append(column)
+                for made, row in zip(rows, self.rows, strict=True):
+                    made.append(row[place])
+        return replace(self, columns=columns, rows=rows)
+
+
+def tabulate(
+    name: str, title: str, fields: Fields[Item], items: Sequence[Item], source: str = "", logs: Sequence[Log] = ()
+) -> Table:
+    """Return the table with a row per item and a column per field."""
+    rows = [[make(item) for _, make in fields] for item in items]
+    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs)
+
+
+def count_cell(count: int, tone: str = "") -> Cell:
+    """Return the cell of a count, with a tone unless it is zero."""
+    return Cell(str(count), key=count, tone=tone if count else "")
+
+
+def number_cell(value: float | None) -> Cell:
+    """Return the cell of a number without an interval."""
+    return Cell(number(value), key=key_of(value))
+
+
+def interval_cell(interval: Interval) -> Cell:
+    """Return the cell of a value with its interval; one without an upper end takes two lines of small print."""
+    value, *details = value_and_interval(interval)
+    return Cell(value, tuple(details), key_of(interval.value))
+
+
+def name_cell(name: object) -> Cell:
+    """Return the cell of a name from a file."""
+    return Cell(shown(name))
+
+
+def outcome_cell(outcome: str) -> Cell:
+    """Return the cell of an outcome or verdict in words, with its tone."""
+    return Cell(spoken(outcome), tone=tone_of(outcome))
+
+
+def empty_cell() -> Cell:
+    """Return the cell of a value that does not exist."""
+    return Cell(NOTHING, key=key_of(None))
+
+
+def key_of(value: float | None) -> float:
+    """Return what sorts a number: infinite ones follow all others, missing ones are last."""
+    if value is None or math.isnan(value):
+        return _LAST
+    return max(min(value, 0.5 * _LAST), -0.5 * _LAST)
+
+
+def tone_of(outcome: str) -> str:
+    """Return whether an outcome or verdict is good, bad or unknown."""
+    return _TONES.get(outcome, "")
+
+
+def shown(name: object) -> str:
+    """Return a name from a file as a text that is never empty."""
+    return str(name) or "(no name)"
+
+
+def _joined(above: Cell, heading: str, cell: Cell) -> Cell:
+    if cell.text == NOTHING:
+        return above
+    return replace(above, details=(*above.details, f"; {heading}: {cell.text}", *cell.details))

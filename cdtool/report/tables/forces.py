@@ -1,0 +1,94 @@
+"""Tables of contact forces against their limits: by group, by test point, by contact."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, Results
+from cdtool.report.number_text import NOTHING, number, spoken
+from cdtool.report.table import (
+    Cell,
+    Column,
+    Fields,
+    Row,
+    Table,
+    count_cell,
+    key_of,
+    name_cell,
+    number_cell,
+    outcome_cell,
+    tabulate,
+    tone_of,
+)
+
+_VERDICTS = ("pass", "fail", "not_assessable")
+
+
+def groups_table(results: Results) -> Table:
+    """Return how many contacts of each group meet their force profile."""
+    columns = [Column("group"), Column("profile"), *(Column(spoken(verdict), numeric=True) for verdict in _VERDICTS)]
+    columns += [Column("largest peak [N]", numeric=True), Column("earliest exceeded after [ms]", numeric=True)]
+    parts: dict[tuple[str, str], list[ForceResult]] = {}
+    for item in results.forces:
+        parts.setdefault((item.group, item.profile), []).append(item)
+    return Table("force", "Force", columns, [_group_row(*part) for part in parts.items()], "forces")
+
+
+def points_table(results: Results) -> Table:
+    """Return the test points, averaged as their profile requires."""
+    fields: Fields[PointResult] = (
+        (Column("test point"), lambda item: name_cell(item.point)),
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("profile"), lambda item: name_cell(item.profile)),
+        (Column("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
+        (Column("tests"), lambda item: Cell(item.note)),
+        (Column("steps"), lambda item: _steps(item.steps)),
+        (Column("why"), lambda item: Cell(item.reason or "")),
+    )
+    return tabulate("points", "Force by test point", fields, results.points, "points")
+
+
+def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
+    """Return every contact against its force profile, or only those that do not pass."""
+    fields: Fields[ForceResult] = (
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("group", choice=True), lambda item: name_cell(item.group)),
+        (Column("contact", numeric=True), lambda item: count_cell(item.contact)),
+        (Column("profile", choice=True), lambda item: name_cell(item.profile)),
+        (Column("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
+        (Column("peak [N]", numeric=True), lambda item: number_cell(item.peak_n)),
+        (Column("first exceeded after [ms]", numeric=True), lambda item: _budget(item.time_budget_ms)),
+        (Column("steps"), lambda item: _steps(item.steps)),
+        (Column("test point", choice=True), lambda item: Cell(item.point or NOTHING)),
+        (Column("why"), lambda item: Cell(item.reason or "")),
+    )
+    name, title = ("force_exceptions", "Force limits not met") if only_exceptions else ("forces", "Force by contact")
+    items = [item for item in results.forces if not only_exceptions or item.verdict != "pass"]
+    return tabulate(name, title, fields, items, "forces", logs=[(item.group, item.recording) for item in items])
+
+
+def _group_row(key: tuple[str, str], forces: Sequence[ForceResult]) -> Row:
+    counts = Counter(item.verdict for item in forces)
+    peaks = [item.peak_n for item in forces if item.peak_n is not None]
+    budgets = [item.time_budget_ms for item in forces if item.time_budget_ms is not None]
+    return (
+        *map(name_cell, key),
+        *(count_cell(counts[verdict], tone_of(verdict)) for verdict in _VERDICTS),
+        number_cell(max(peaks, default=None)),
+        _budget(min(budgets, default=None)),
+    )
+
+
+def _budget(after_ms: float | None) -> Cell:
+    """Return when the first limit was exceeded, after the onset of the contact."""
+    return Cell("never", key=key_of(math.inf)) if after_ms is None else number_cell(after_ms)
+
+
+def _steps(steps: Sequence[ForceStepResult]) -> Cell:
+    return Cell(
+        "; ".join(
+            f"{item.name} {number(item.peak_n)} of {item.at_most_n:g} N: {spoken(item.verdict)}" for item in steps
+        )
+    )

@@ -1,0 +1,274 @@
+"""Tables of recordings: what every detector made of each, single contacts and false alarms, what was left out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from cdtool.evaluation.alike import alike
+from cdtool.evaluation.results import (
+    ContactResult,
+    ExposureResult,
+    FalseAlarmResult,
+    RecordingResult,
+    Results,
+    Skipped,
+)
+from cdtool.evaluation.summary import later_ms
+from cdtool.plain_text import counted
+from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number, percent
+from cdtool.report.table import (
+    Cell,
+    Column,
+    Fields,
+    Log,
+    Table,
+    count_cell,
+    key_of,
+    name_cell,
+    number_cell,
+    outcome_cell,
+    shown,
+    tabulate,
+)
+from cdtool.report.tables.results import detector_cell, part_of
+
+_OPERATION = re.compile(r"#\d+\Z")
+_MOST_LISTED = 3
+_DIGEST = 12
+_FORCE_ORDER = ("fail", "not_assessable", "pass")
+
+
+@dataclass
+class _Outcome:
+    """The outcome of one log with one detector."""
+
+    contacts: list[ContactResult] = field(default_factory=list)
+    false_alarms: int = 0
+
+    @property
+    def outcomes(self) -> set[str]:
+        return {item.outcome for item in self.contacts}
+
+
+def recordings_table(results: Results) -> Table:
+    """Return a row per log with a column per detector."""
+    outcomes, forces = _outcomes(results), _force_verdicts(results)
+    silent = {
+        (item.group, item.detector)
+        for item in results.exposure
+        if not item.hours or item.not_assessable >= item.operations
+    }
+
+    def part_of_log(item: RecordingResult, name: str) -> _Outcome:
+        return outcomes.get((item.group, item.recording, name), _Outcome())
+
+    def parts_of(item: RecordingResult) -> list[_Outcome]:
+        return [part_of_log(item, name) for name in results.detectors]
+
+    def column_of(name: str) -> Callable[[RecordingResult], Cell]:
+        return lambda item: _outcome_cell(part_of_log(item, name), item, (item.group, name) in silent)
+
+    def verdict_of(item: RecordingResult) -> str:
+        return forces.get((item.group, item.recording), NOTHING)
+
+    fields: list[tuple[Column, Callable[[RecordingResult], Cell]]] = [
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("group", choice=True), lambda item: name_cell(item.group)),
+        (Column("contacts", numeric=True), lambda item: count_cell(item.contacts)),
+    ]
+    fields += [(Column(f"{shown(name)} [ms]", numeric=True), column_of(name)) for name in results.detectors]
+    fields.append((Column("peak [N]", numeric=True), lambda item: number_cell(_peak(parts_of(item)))))
+    if forces:
+        fields.append((Column("force limits", choice=True), lambda item: outcome_cell(verdict_of(item))))
+    fields.append((Column("length [s]", numeric=True), lambda item: number_cell(item.seconds)))
+    if any(item.campaign for item in results.recordings):
+        fields.append((Column("campaign", choice=True), lambda item: Cell(item.campaign or NOTHING)))
+    fields.append((Column(f"SHA-256, first {_DIGEST} digits"), lambda item: Cell(item.sha256[:_DIGEST] or NOTHING)))
+    logs = [(item.group, item.recording) for item in results.recordings]
+    table = tabulate("recordings", "Recordings", fields, results.recordings, "recordings", logs)
+    marks = [_marks(parts_of(item), verdict_of(item)) for item in results.recordings]
+    return replace(table, marks={name: [mark[name] for mark in marks] for name in (marks[0] if marks else {})})
+
+
+def scored_table(results: Results) -> Table:
+    """Return the logs that were scored, with their hashes."""
+    fields: Fields[RecordingResult] = (
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("contacts", numeric=True), lambda item: count_cell(item.contacts)),
+        (Column("operations", numeric=True), lambda item: count_cell(item.operations)),
+        (Column("length [s]", numeric=True), lambda item: number_cell(item.seconds)),
+        (Column("campaign"), lambda item: Cell(item.campaign or "")),
+        (Column("test point"), lambda item: Cell(item.point or "")),
+        (Column("SHA-256"), lambda item: Cell(item.sha256)),
+    )
+    return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings")
+
+
+def contact_tables(results: Results) -> list[Table]:
+    """Return the contacts that were missed, not assessable, or in progress at the start of their recording."""
+    fields: Fields[ContactResult] = (
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("contact", numeric=True), lambda item: count_cell(item.contact)),
+        (Column("onset [s]", numeric=True), lambda item: Cell(f"{item.onset_s:.3f}", key=item.onset_s)),
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("alarm possible for [ms]", numeric=True), lambda item: number_cell(item.watched_ms)),
+        (Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force_n)),
+        (Column("why"), lambda item: Cell(item.reason or ("no alarm in its window" * (item.outcome == "missed")))),
+    )
+    tables = {
+        "missed": ("missed", "Contacts missed"),
+        "not_assessable": ("not_assessable_contacts", "Contacts not assessable"),
+        "in_progress": ("in_progress", "Contacts in progress at the start"),
+    }
+    return [
+        tabulate(name, title, fields, [item for item in results.contacts if item.outcome == outcome], "contacts")
+        for outcome, (name, title) in tables.items()
+    ]
+
+
+def false_alarms_table(results: Results) -> Table:
+    """Return every alarm without a contact."""
+    units = part_of(results.provenance, "units")
+    fields: Fields[FalseAlarmResult] = (
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("joint"), lambda item: name_cell(item.joint)),
+        (Column("at [s]", numeric=True), lambda item: Cell(f"{item.time_s:.3f}", key=item.time_s)),
+        (Column("crossed"), lambda item: Cell(item.side or NOTHING)),
+        (Column("value", numeric=True), lambda item: _with_unit(item.statistic, units.get(item.detector, ""))),
+        (Column("limit", numeric=True), lambda item: _with_unit(item.limit, units.get(item.detector, ""))),
+    )
+    return tabulate("false_alarms", "False alarms", fields, results.false_alarms, "false_alarms")
+
+
+def not_assessable_table(results: Results) -> Table:
+    """Return the share of the samples that each detector could not assess, and why."""
+    fields: Fields[ExposureResult] = (
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("operations assessable nowhere", numeric=True), _operations),
+        (Column("share of its samples", numeric=True), _share),
+        (Column("why"), lambda item: Cell(", ".join(f"{why} {percent(share)}" for why, share in _reasons(item)))),
+    )
+    items = [item for item in results.exposure if _reasons(item) or item.not_assessable]
+    return tabulate("not_assessable", "Samples not assessable", fields, items, "exposure")
+
+
+def reasons_tables(results: Results) -> tuple[Table, Table]:
+    """Return what was left out, and the warnings about recordings that were used."""
+    fields: Fields[Skipped] = (
+        (Column("recording"), lambda item: name_cell(item.recording)),
+        (Column("reason"), lambda item: Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING)),
+    )
+    skipped, findings = alike(results.skipped), alike(results.findings)
+    return (
+        tabulate("skipped", "Left out", fields, skipped, "skipped"),
+        tabulate("findings", "Warnings", fields, findings, "findings"),
+    )
+
+
+def log_of(group: str, operation: str, logs: frozenset[Log]) -> Log:
+    """Return the log that an operation belongs to: its name, without the "#2" where it was cut into several."""
+    if (group, operation) in logs:
+        return group, operation
+    return group, _OPERATION.sub("", operation)
+
+
+def logs_of(results: Results) -> frozenset[Log]:
+    """Return every log that was scored."""
+    return frozenset((item.group, item.recording) for item in results.recordings)
+
+
+def _outcomes(results: Results) -> dict[tuple[str, str, str], _Outcome]:
+    logs = logs_of(results)
+    outcomes: dict[tuple[str, str, str], _Outcome] = {}
+    for item in results.contacts:
+        outcomes.setdefault((item.group, item.recording, item.detector), _Outcome()).contacts.append(item)
+    for alarm in results.false_alarms:
+        log = log_of(alarm.group, alarm.recording, logs)
+        outcomes.setdefault((*log, alarm.detector), _Outcome()).false_alarms += 1
+    return outcomes
+
+
+def _force_verdicts(results: Results) -> dict[Log, str]:
+    """Return the worst verdict of each log."""
+    verdicts: dict[Log, str] = {}
+    for item in results.forces:
+        log = (item.group, item.recording)
+        verdicts[log] = min(verdicts.get(log, item.verdict), item.verdict, key=_FORCE_ORDER.index)
+    return verdicts
+
+
+def _peak(parts: Sequence[_Outcome]) -> float | None:
+    peaks = [item.peak_force_n for part in parts for item in part.contacts if item.peak_force_n is not None]
+    return max(peaks, default=None)
+
+
+def _outcome_cell(part: _Outcome, recording: RecordingResult, silent: bool) -> Cell:
+    """Return latencies, misses and false alarms; sorted by the slowest contact, a missed one after all others.
+
+    `silent`: the detector could assess nothing in the whole group, so that "no false alarm" means nothing.
+    """
+    words = _contact_words(part.contacts)
+    if silent and not part.contacts and not part.false_alarms:
+        return Cell(NOT_ASSESSABLE, key=key_of(None), tone="unknown")
+    if part.false_alarms or not (words or recording.contacts):
+        words.append(counted(part.false_alarms, "false alarm"))
+    missed = "missed" in part.outcomes
+    latencies = [item.latency_ms for item in part.contacts if item.latency_ms is not None]
+    slowest = float("inf") if missed else max(latencies, default=None)
+    tone = "bad" if missed or part.false_alarms else "unknown" if "not_assessable" in part.outcomes else ""
+    first, *others = words or [NOTHING]
+    return Cell(first, tuple(f"; {other}" for other in others), key_of(slowest), tone)
+
+
+def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
+    if len(contacts) <= _MOST_LISTED:
+        return [", ".join(map(_contact_word, contacts))] if contacts else []
+    latencies = [item.latency_ms for item in contacts if item.latency_ms is not None]
+    slowest = f", slowest {number(max(latencies))}" if latencies else ""
+    return [f"{len(latencies)} of {len(contacts)} detected{slowest}"]
+
+
+def _contact_word(item: ContactResult) -> str:
+    """Return a latency, as a range if the load cell missed the beginning of the contact, or the outcome without one."""
+    if item.latency_ms is not None:
+        later = later_ms(item)
+        return f"{number(item.latency_ms)} to {number(item.latency_ms + later)}" if later else number(item.latency_ms)
+    if item.in_progress:
+        return "in progress at the start"
+    return "missed" if item.outcome == "missed" else NOT_ASSESSABLE
+
+
+def _marks(parts: Sequence[_Outcome], verdict: str) -> dict[str, bool]:
+    outcomes = {outcome for part in parts for outcome in part.outcomes}
+    false_alarms = any(part.false_alarms for part in parts)
+    return {
+        "with a missed contact": "missed" in outcomes,
+        "with a false alarm": false_alarms,
+        "with a contact that was not assessable": "not_assessable" in outcomes,
+        "with a force limit exceeded": verdict == "fail",
+        "detected by all": outcomes == {"detected"} and not false_alarms,
+    }
+
+
+def _with_unit(value: float | None, unit: object) -> Cell:
+    return Cell(NOTHING if value is None else f"{number(value)} {unit}".strip(), key=key_of(value))
+
+
+def _operations(item: ExposureResult) -> Cell:
+    return Cell(f"{item.not_assessable} of {item.operations}", key=item.not_assessable)
+
+
+def _share(item: ExposureResult) -> Cell:
+    share = sum(share for _, share in _reasons(item))
+    return Cell(percent(share), key=share)
+
+
+def _reasons(item: ExposureResult) -> list[tuple[str, float]]:
+    return list(item.not_judged.items())  # language: the name of the field in results.json

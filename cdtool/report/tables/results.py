@@ -1,0 +1,300 @@
+"""Tables of a benchmark's results: limits, latencies and false alarms, pairs of detectors, false-alarm budgets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from cdtool.evaluation.comparison import SIGNIFICANT, Comparison
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results import CalibrationResult, LimitResult, Results
+from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.paired import holm
+from cdtool.evaluation.summary import Summary
+from cdtool.plain_text import counted
+from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_interval
+from cdtool.report.number_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, missed, number, rate, with_interval
+from cdtool.report.table import (
+    Cell,
+    Column,
+    Fields,
+    Row,
+    Table,
+    count_cell,
+    empty_cell,
+    interval_cell,
+    key_of,
+    name_cell,
+    number_cell,
+    outcome_cell,
+    shown,
+    tabulate,
+)
+
+_WORST_FIRST = ("violated", "not_assessable", "met")
+_TOO_FEW = "too few recordings to show one"
+_NONE_SHOWN = "no difference shown"
+
+
+def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return a table of the provenance; empty where it has none, because a file may contain anything there."""
+    found = provenance.get(key)
+    return found if isinstance(found, Mapping) else {}
+
+
+def detector_cell(results: Results, detector: str) -> Cell:
+    """Return the cell of a detector's full name with its short name."""
+    short = part_of(results.provenance, "short_names").get(detector)
+    return Cell(shown(detector), (f" ({shown(short)})",) if short else ())
+
+
+def limits_table(results: Results, *, met: bool) -> Table:
+    """Return the limits that are met, or the others, violated ones first."""
+    fields: Fields[LimitResult] = (
+        (Column("outcome", choice=True), lambda item: outcome_cell(item.outcome)),
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("result"), lambda item: Cell(item.figure)),
+        (Column("value", numeric=True), lambda item: Cell(value_of(item), key=key_of(item.value))),
+        (Column("required"), lambda item: Cell(required(item))),
+        (Column("why"), lambda item: Cell(item.reason or "")),
+        (Column("limit"), lambda item: Cell(item.limit)),
+    )
+    items = [item for item in results.limits if (item.outcome == "met") == met]
+    items.sort(key=lambda item: _WORST_FIRST.index(item.outcome))
+    name, title = ("met", "Limits met") if met else ("not_met", "Limits not met")
+    return tabulate(name, title, fields, items, "limits")
+
+
+def value_of(limit: LimitResult) -> str:
+    """Return the value that a limit is compared with; one that was checked without a number is infinite."""
+    if limit.value is None:
+        return NOTHING if limit.outcome == "not_assessable" else NOT_REACHED
+    return f"{limit.value:.6g}"
+
+
+def required(limit: LimitResult) -> str:
+    """Return what a limit requires, with the digits of its file."""
+    least, largest = limit.least, limit.largest
+    if least is not None and largest is not None:
+        return f"{least:.6g} to {largest:.6g}"
+    if largest is not None:
+        return f"at most {largest:.6g}"
+    return NOTHING if least is None else f"at least {least:.6g}"
+
+
+def results_table(results: Results, items: Sequence[Summary], group: str | None = None) -> Table:
+    """Return the latencies with what they must be read with, a row per summary; of one `group` under its name.
+
+    Columns that no row fills are left out.
+    """
+    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
+        (Column("detector"), lambda item: detector_cell(results, item.detector))
+    ]
+    if group is None:
+        fields.append((Column("group", choice=True), lambda item: name_cell(item.group)))
+    if any(item.contacts for item in items):
+        fields += [
+            *((Column(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
+            (Column("contacts detected", numeric=True), _detected),
+            (Column("missed", numeric=True), _missed),
+            (Column("not assessable", numeric=True), _not_assessable),
+        ]
+    fields += [
+        (Column("false alarms", numeric=True), _false_alarms),
+        (Column("false alarms per operation", numeric=True), _per_operation),
+        (Column("per hour", numeric=True, below=True), _per_hour),
+    ]
+    if any(not math.isnan(item.force_at_alarm) for item in items):
+        fields.append((Column("force at alarm [N]", numeric=True), _force_at_alarm))
+    if any(not math.isnan(item.peak_force) for item in items):
+        fields.append((Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force)))
+    if any(not math.isnan(item.force_failed) for item in items):
+        fields.append((Column("force limit exceeded", numeric=True), _force_failed))
+    title = "Latency, misses and false alarms by detector and group"
+    if group is not None:
+        title = shown(group) + ("" if any(item.contacts for item in items) else ": no contacts, only false alarms")
+    return tabulate("results", title, fields, items, "contacts")
+
+
+def comparisons_table(evaluated: Evaluated) -> Table:
+    """Return every pair of detectors on the contacts that both could assess."""
+    results, without = evaluated.results, _without_difference(evaluated.comparisons)
+    fields: Fields[tuple[Comparison, str]] = (
+        (Column("group", choice=True), lambda pair: name_cell(pair[0].group)),
+        (Column("first"), lambda pair: detector_cell(results, pair[0].first)),
+        (Column("second"), lambda pair: detector_cell(results, pair[0].second)),
+        (Column("difference", choice=True), lambda pair: _difference_cell(*pair)),
+        (Column("contacts", numeric=True), lambda pair: count_cell(pair[0].contacts)),
+        (Column("latency, first minus second [ms]", numeric=True), lambda pair: interval_cell(pair[0].latency.mean)),
+        (Column("p", numeric=True), lambda pair: _p(pair[0].latency_p)),
+        (Column("missed only by first", numeric=True), lambda pair: count_cell(pair[0].only_first_missed)),
+        (Column("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
+        (Column("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
+    )
+    pairs = list(zip(evaluated.comparisons, without, strict=True))
+    return tabulate("comparisons", "Pairs of detectors on the same contacts", fields, pairs, "contacts")
+
+
+def differences_table(evaluated: Evaluated) -> Table:
+    """Return the differences between detectors that are shown, a sentence each."""
+    columns = [Column(name) for name in ("group", "shown", "by")]
+    columns += [Column("contacts", numeric=True), Column("p", numeric=True)]
+    rows = [row for item in evaluated.comparisons for row in _differences(evaluated.results, item)]
+    return Table("differences", "Comparisons", columns, rows, "contacts")
+
+
+def differences_note(evaluated: Evaluated) -> str:
+    """Return what was compared, how, and what it means where no difference is shown."""
+    comparisons = evaluated.comparisons
+    pairs = f"{counted(len(comparisons), 'pair')} of detectors on the same contacts"
+    how = f"p corrected by Holm over the tests of a group; shown: p below {SIGNIFICANT:g}"
+    none = (
+        ""
+        if any(item.faster or item.misses_less for item in comparisons)
+        else " No difference is shown; this is not a proof of none."
+    )
+    few = _without_difference(comparisons).count(_TOO_FEW)
+    of = "" if few == len(comparisons) else f" in {few} of them"
+    too_few = f" There are {_TOO_FEW}{of}; recordings of one campaign count as one." if few else ""
+    return f"{pairs}; {how}.{none}{too_few}"
+
+
+def calibration_table(results: Results) -> Table:
+    """Return how safety factors were set for a false-alarm budget."""
+    fields: Fields[CalibrationResult] = (
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("false alarms allowed"), lambda item: Cell(item.budget)),
+        (Column("safety factor set", numeric=True), lambda item: number_cell(item.safety_factor)),
+        (Column("alarms with it", numeric=True), lambda item: count_cell(item.alarms)),
+        (Column("operations", numeric=True), lambda item: count_cell(item.operations)),
+        (Column("hours", numeric=True), lambda item: number_cell(item.hours)),
+    )
+    return tabulate("calibration", "False-alarm budget", fields, results.calibration, "calibration")
+
+
+def _latency(column: LatencyColumn, item: Summary) -> Cell:
+    """Return a column of the latency; the range is sorted by its longer end."""
+    if column != "range":
+        interval = latency_interval(item, column)
+        return empty_cell() if interval is None else interval_cell(interval)
+    ends = dict.fromkeys((number(item.min_ms), number(item.max_ms)))
+    return Cell(" to ".join(ends), key=key_of(item.max_ms))
+
+
+def _detected(item: Summary) -> Cell:
+    return Cell(f"{item.detected} of {item.contacts}", key=item.detected) if item.contacts else empty_cell()
+
+
+def _missed(item: Summary) -> Cell:
+    count, *bound = missed(item.missed, item.detected + item.missed, item.missed_at_most)
+    return Cell(count, tuple(bound), item.missed if bound else key_of(None), "bad" if item.missed else "")
+
+
+def _not_assessable(item: Summary) -> Cell:
+    return count_cell(item.not_assessable, "unknown") if item.contacts else empty_cell()
+
+
+def _false_alarms(item: Summary) -> Cell:
+    """Return the count with its exposure; without any exposure no number but words."""
+    operations = counted(item.operations, "operation")
+    if not _has_exposure(item):
+        nowhere = (" in any of", f" {operations}")
+        return Cell(NOT_ASSESSABLE, nowhere, key_of(None), "unknown") if item.operations else empty_cell()
+    part = item.judged_operations < item.operations
+    within = (f" in {item.judged_operations} of", f" {operations}") if part else (f" in {operations}",)
+    return Cell(
+        str(item.false_alarms),
+        (*within, f", {number(item.hours)} h"),
+        item.false_alarms,
+        "bad" if item.false_alarms else "",
+    )
+
+
+def _per_operation(item: Summary) -> Cell:
+    return _rate(item, item.false_alarms_per_operation, item.at_most_per_operation)
+
+
+def _per_hour(item: Summary) -> Cell:
+    return _rate(item, item.false_alarms_per_hour, item.at_most_per_hour)
+
+
+def _rate(item: Summary, interval: Interval, at_most: float) -> Cell:
+    if not _has_exposure(item):
+        return empty_cell()
+    text, *details = rate(item.false_alarms, interval, at_most)
+    return Cell(text, tuple(details), key_of(interval.value))
+
+
+def _has_exposure(item: Summary) -> bool:
+    return item.watched and item.judged_operations > 0
+
+
+def _force_at_alarm(item: Summary) -> Cell:
+    if math.isnan(item.force_at_alarm):
+        return empty_cell()
+    return Cell(
+        number(item.force_at_alarm), (f", largest {number(item.force_at_alarm_max)}",), key_of(item.force_at_alarm)
+    )
+
+
+def _force_failed(item: Summary) -> Cell:
+    return empty_cell() if math.isnan(item.force_failed) else count_cell(int(item.force_failed), "bad")
+
+
+def _difference_cell(item: Comparison, without: str) -> Cell:
+    words = [f"{shown(item.faster)} is faster"] if item.faster else []
+    words += [f"{shown(item.misses_less)} misses fewer contacts"] if item.misses_less else []
+    return Cell("; ".join(words) or without, tone="" if words else "unknown")
+
+
+def _differences(results: Results, item: Comparison) -> list[Row]:
+    rows: list[Row] = []
+    names = {name: detector_cell(results, name).line for name in (item.first, item.second)}
+    other = {item.first: names[item.second], item.second: names[item.first]}
+    if item.faster:
+        mean = item.latency.mean
+        gain = Interval(-mean.value, -mean.high, -mean.low, mean.level) if item.faster == item.first else mean
+        words = f"{names[item.faster]} is faster than {other[item.faster]}"
+        by = Cell(f"{with_interval(gain)} ms")
+        rows.append((name_cell(item.group), Cell(words), by, count_cell(item.latency.n), _p(item.latency_p)))
+    if item.misses_less:
+        words = f"{names[item.misses_less]} misses fewer contacts than {other[item.misses_less]}"
+        fewer, more = sorted((item.only_first_missed, item.only_second_missed))
+        by = Cell(f"missed by only one: {fewer} to {more}")
+        rows.append((name_cell(item.group), Cell(words), by, count_cell(item.contacts), _p(item.missed_p)))
+    return rows
+
+
+def _p(value: float) -> Cell:
+    return Cell(NOTHING if math.isnan(value) else f"{value:.2g}", key=key_of(value))
+
+
+def _without_difference(comparisons: Sequence[Comparison]) -> list[str]:
+    """Return for each pair why it shows no difference: there are too few recordings, or none is shown; else ""."""
+    too_few: dict[int, bool] = {}
+    for group in dict.fromkeys(item.group for item in comparisons):
+        places = [i for i, item in enumerate(comparisons) if item.group == group]
+        too_few |= dict(zip(places, _too_few([comparisons[i] for i in places]), strict=True))
+    return [
+        "" if item.faster or item.misses_less else _TOO_FEW if too_few[i] else _NONE_SHOWN
+        for i, item in enumerate(comparisons)
+    ]
+
+
+def _too_few(group: Sequence[Comparison]) -> list[bool]:
+    """Return whether no outcome could have been below the level: each test of a group with its least p, then Holm's.
+
+    Least p: 2 / 2^k of k recordings for latency, of k contacts for misses. A corrected p falls only if others do.
+    """
+    latency = [_least_p(item.latency.clusters) if item.latency.clusters > 1 else math.nan for item in group]
+    tested = [not math.isnan(item.missed_p) or not item.latency.n for item in group]
+    missed_p = [_least_p(item.contacts) if known else math.nan for item, known in zip(group, tested, strict=True)]
+    least = holm(latency + missed_p)
+    return [not (least[i] < SIGNIFICANT or least[len(group) + i] < SIGNIFICANT) for i, item in enumerate(group)]
+
+
+def _least_p(count: int) -> float:
+    return float(min(1.0, 2.0 ** (1 - count)))

@@ -1,0 +1,37 @@
+"""The comparison of two builds as Markdown, for a pull request."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from cdtool.evaluation.builds.comparison import BuildComparison
+from cdtool.files import write_text
+from cdtool.foreign_files import Kind
+from cdtool.report.comparison_model import comparison_model
+from cdtool.report.markdown.text import escape, table_lines
+from cdtool.report.writers.base import Subject, Writer
+
+
+class ComparisonMarkdown(Writer[BuildComparison]):
+    """Comparison of two builds: Markdown with the verdict and a row per detector and group."""
+
+    name: ClassVar[str] = "comparison_markdown"
+    subject: ClassVar[Subject] = "comparison"
+    suffixes: ClassVar[tuple[str, ...]] = (".md",)
+    kinds: ClassVar[dict[str, Kind]] = {".md": Kind(b"**cdtool compare: ", "comparison of cdtool")}
+
+    def write(self, report: BuildComparison, target: Path) -> None:
+        """Write it; raises CdtoolError."""
+        write_text(target, to_markdown(report))
+
+
+def to_markdown(comparison: BuildComparison) -> str:
+    """Return the verdict, a table of the results, how to read it, and what differs between the builds."""
+    model = comparison_model(comparison)
+    parts = [f"**cdtool compare: {escape(model.verdict)}**", "\n".join(table_lines(model.results))]
+    parts += [escape(text, None) for text in model.how_to_read]
+    if model.changed.rows:
+        parts += [f"{model.changed.title}:", "\n".join(table_lines(model.changed))]
+    parts += [escape(note) for note in model.notes]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,117 @@
+"""Write the docs' lists of detectors and formats from the registry and the detectors' pages: python docs/make_lists.py
+
+docs/detectors/index.md is written as a whole; in README.md, docs/choosing.md and docs/containers.md the table between
+the two comments is. A detector's page gives its rows in its first lines: the heading is the title, the first paragraph
+says what the detector looks at, the second one says "Good at: ... Weak at: ... Use it: ...". A format's row is made of
+its class: its suffixes and the first words of its docstring, and of the extra of its name in pyproject.toml.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.detectors import DETECTORS
+from cdtool.formats import FORMATS
+
+DOCS = Path(__file__).resolve().parent
+_BEGIN, _END = "<!-- made by docs/make_lists.py -->\n", "<!-- end -->\n"
+_MODEL = "the machine file must give the inertia"
+_INDEX = """# The detectors
+
+Each page gives the equation, the signal and its unit, the gains with their defaults, and when the detector fails.
+[How to choose](../choosing.md) compares them. `cdtool list detectors` also lists those of installed plug-ins.
+
+| detector | short name | channels | what it looks at |
+|---|---|---|---|
+"""
+_README = "| detector | short | needs | good at | weak at |\n|---|---|---|---|---|\n"
+_CONTAINERS = "| format | what it reads | suffixes | `pip install` |\n|---|---|---|---|\n"
+_CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What the tables say of a detector; `needs_model`: the machine file must give the inertia."""
+
+    page: str
+    title: str
+    short_name: str
+    needs: tuple[str, ...]
+    needs_model: bool
+    looks_at: str
+    good_at: str
+    weak_at: str
+    use_it: str
+
+
+def files() -> Mapping[Path, str]:
+    """Return the files with their contents as they should be."""
+    rows = [_row(name) for name in DETECTORS.names()]
+    readme, choosing, containers = DOCS.parent / "README.md", DOCS / "choosing.md", DOCS / "containers.md"
+    return {
+        DOCS / "detectors" / "index.md": _INDEX + "".join(map(_index_line, rows)),
+        readme: _with_table(readme, _README, map(_readme_line, rows)),
+        choosing: _with_table(choosing, _CHOOSING, map(_choosing_line, rows)),
+        containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
+    }
+
+
+def _row(name: str) -> Row:
+    detector = DETECTORS.load(name)
+    page = f"{name.replace('_', '-')}.md"
+    text = (DOCS / "detectors" / page).read_text(encoding="utf-8")
+    heading, paragraph, use = (" ".join(part.split()) for part in text.split("\n\n")[:3])
+    title = heading.removeprefix("# ").partition(" (")[0]
+    said = re.fullmatch(r"Good at: (.+)\. Weak at: (.+)\. Use it: (.+)\.", use)
+    if said is None:
+        raise ValueError(f"{page}: its third paragraph is not 'Good at: ... Weak at: ... Use it: ...'")
+    return Row(
+        page, title, detector.short_name, detector.needs, _MODEL in " ".join(text.split()), paragraph, *said.groups()
+    )
+
+
+def _index_line(row: Row) -> str:
+    return _line(f"[{row.title}]({row.page})", f"`{row.short_name}`", ", ".join(row.needs), row.looks_at)
+
+
+def _readme_line(row: Row) -> str:
+    title = f"[{row.title}](docs/detectors/{row.page})"
+    return _line(title, f"`{row.short_name}`", _words(row.needs), row.good_at, row.weak_at)
+
+
+def _choosing_line(row: Row) -> str:
+    needs = _words((*row.needs, *(["model"] if row.needs_model else [])))
+    return _line(f"[{row.title}](detectors/{row.page})", f"`{row.short_name}`", needs, row.use_it)
+
+
+def _format_line(name: str) -> str:
+    found = FORMATS.load(name)
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    install = f"`'cdtool[{name}]'`" if name in project["optional-dependencies"] else "-"
+    summary = found.__doc__.strip().partition("\n")[0].partition(": ")[0].rstrip(".")
+    return _line(f"`{name}`", summary, f"`{' '.join(found.suffixes)}`", install)
+
+
+def _words(names: tuple[str, ...]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)
+
+
+def _line(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |\n"
+
+
+def _with_table(file: Path, head: str, lines: Iterable[str]) -> str:
+    before, begin, rest = file.read_text(encoding="utf-8").partition(_BEGIN)
+    _, end, after = rest.partition(_END)
+    if not (begin and end):
+        raise ValueError(f"{file.name}: the comments around its table are missing")
+    return f"{before}{begin}\n{head}{''.join(lines)}\n{end}{after}"
+
+
+if __name__ == "__main__":
+    for path, content in files().items():
+        path.write_text(content, encoding="utf-8")

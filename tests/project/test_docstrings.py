@@ -1,0 +1,278 @@
+"""The docstrings of public names have numpydoc sections, and their examples run.
+
+Public is what a user of the Python API or the author of a plug-in calls:
+
+* every name of `cdtool.__all__`;
+* every class in the tables of the detectors and the thresholds, and the methods of their contracts;
+* every public function of `cdtool.detectors.base`, `cdtool.detectors.filters` and `cdtool.thresholds.base`, which are
+  the tools of a plug-in, and of `cdtool.evaluation.statistics`;
+* every function of the detectors, the thresholds and the evaluation that another folder of cdtool imports.
+
+A public function needs Parameters with a description of each, Returns, Raises if it raises an error itself, and
+Examples; a class needs Parameters, Notes and Examples. Examples run as doctests, or name where there is one.
+Properties, internal functions and the fields of results have a line each.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import doctest
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cdtool
+from cdtool.detectors import DETECTORS
+from cdtool.detectors.base import Detector
+from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import FittedThreshold, Threshold
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("detectors", "thresholds", "evaluation")
+WHOLE_MODULES = ("cdtool.detectors.base", "cdtool.detectors.filters", "cdtool.thresholds.base")
+STATISTICS = "cdtool.evaluation.statistics"
+CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
+
+# Names that have no sections yet; a test fails for one that has them.
+TO_DOCUMENT = (
+    "cdtool.evaluation.explanation.",
+    "cdtool.evaluation.force.course.",
+    "cdtool.evaluation.force.verdict.judge",
+)
+
+_IMPORT = re.compile(rf"^ *from (cdtool\.(?:{'|'.join(ROOMS)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_FUNCTION = re.compile(r"^def ([a-z]\w*)", re.MULTILINE)
+_HEADING = re.compile(r"^([A-Z][a-z]+)\n-{3,}\n", re.MULTILINE)
+_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@cache
+def texts() -> dict[str, str]:
+    """The text of every module of cdtool."""
+    files = sorted((ROOT / "cdtool").rglob("*.py"))
+    names = (".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files)
+    return {name: file.read_text(encoding="utf-8") for name, file in zip(names, files, strict=True)}
+
+
+def room_of(module: str) -> str:
+    """The folder of cdtool that a module is in."""
+    return f"{module}..".split(".")[1]
+
+
+def imported_elsewhere() -> Iterator[tuple[str, str]]:
+    """Yield (module, name) of what a file imports from a folder of ROOMS that it is not in."""
+    for user, text in texts().items():
+        for module, names in _IMPORT.findall(text):
+            if room_of(user) != room_of(module):
+                yield from ((module, name) for name in re.findall(r"(\w+)(?: as \w+)?\s*(?:,|\)|$)", names))
+
+
+def functions_of(module: str) -> set[tuple[str, str]]:
+    return {(module, name) for name in _FUNCTION.findall(texts()[module])}
+
+
+@cache
+def names_of_functions() -> dict[str, Callable[..., Any]]:
+    """Every public function of ROOMS by its full name."""
+    wanted = {item for item in imported_elsewhere() if item in functions_of(item[0])}
+    for module in texts():
+        if module in WHOLE_MODULES or module.startswith(f"{STATISTICS}."):
+            wanted |= functions_of(module)
+    found = {f"{module}.{name}": getattr(import_module(module), name) for module, name in sorted(wanted)}
+    return found | {f"{item.__module__}.{item.__qualname__}": item for item in CONTRACTS}
+
+
+@cache
+def api() -> dict[str, Callable[..., Any]]:
+    return {f"cdtool.{name}": getattr(cdtool, name) for name in cdtool.__all__ if name != "__version__"}
+
+
+@cache
+def rules() -> dict[str, type]:
+    """The classes in the tables of the detectors and the thresholds."""
+    loaded = [registry.load(name) for registry in (DETECTORS, THRESHOLDS) for name in registry.table]
+    return {f"{item.__module__}.{item.__qualname__}": item for item in loaded}
+
+
+def is_to_document(name: str) -> bool:
+    return any(is_covered(name, entry) for entry in TO_DOCUMENT)
+
+
+def is_covered(name: str, entry: str) -> bool:
+    return name == entry or (entry.endswith(".") and name.startswith(entry))
+
+
+def sections(text: str) -> dict[str, str]:
+    """The sections of a docstring by heading, and what is before them as ""."""
+    parts = _HEADING.split(text)
+    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
+
+
+def described(section: str) -> dict[str, str]:
+    """The entries of a section Parameters: the description of each name."""
+    entries = {}
+    for part in re.split(r"^(?=\S)", section, flags=re.MULTILINE):
+        names, separator, rest = part.partition(" : ")
+        if separator:
+            entries |= {name.strip().lstrip("*"): rest.partition("\n")[2].strip() for name in names.split(",")}
+    return entries
+
+
+def raises_itself(function: Callable[..., Any]) -> bool:
+    """Whether the function has a raise statement, in itself and not in a function inside it."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(function))))
+    waiting = list(tree.body[0].body) if isinstance(tree.body[0], ast.FunctionDef) else []
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            return True
+        if not isinstance(node, ast.FunctionDef | ast.Lambda | ast.ClassDef):
+            waiting += ast.iter_child_nodes(node)
+    return False
+
+
+def faults_of_function(function: Callable[..., Any], contract: bool = False) -> list[str]:
+    found = sections(inspect.getdoc(function) or "")
+    signature = inspect.signature(function)
+    entries = described(found.get("Parameters", ""))
+    needed = [name for name in signature.parameters if name != "self"]
+    faults = [f"does not describe the parameter {name}" for name in needed if not entries.get(name)]
+    faults += [f"describes {name}, which is not a parameter" for name in entries if name not in needed]
+    if signature.return_annotation not in (None, "None") and not found.get("Returns", "").strip():
+        faults.append("has no section Returns")
+    if raises_itself(function) and not found.get("Raises", "").strip():
+        faults.append("has no section Raises")
+    return faults + ([] if contract else faults_of_text(found))
+
+
+def faults_of_class(rule: type) -> list[str]:
+    found = sections(inspect.getdoc(rule) or "")
+    entries, fields = described(found.get("Parameters", "")), {item.name: item for item in dataclasses.fields(rule)}
+    faults = [f"does not describe {name}" for name in fields if not entries.get(name)]
+    faults += [f"describes {name}, which is not a field" for name in entries if name not in fields]
+    units = {name: item.metadata.get("unit", "1") for name, item in fields.items()}
+    faults += [
+        f"does not state the unit [{unit}] of {name}"
+        for name, unit in units.items()
+        if unit != "1" and f"[{unit}]" not in entries.get(name, "")
+    ]
+    if "__post_init__" in vars(rule) and "Raises" not in found:
+        faults.append("has no section Raises")
+    if not re.search(r"Fails\b", found.get("Notes", "")):
+        faults.append("does not state in Notes when it fails")
+    return faults + faults_of_text(found)
+
+
+def faults_of_text(found: dict[str, str]) -> list[str]:
+    """What is wrong with the summary and the examples of a docstring."""
+    summary, examples = found[""].strip().split("\n\n")[0], found.get("Examples", "")
+    faults = [] if summary.endswith((".", "?")) and "\n" not in summary else ["has no summary of one line"]
+    if ">>>" not in examples and not any(name in known_names() for name in re.findall(r"`([\w.]+)`", examples)):
+        faults.append("has no example, and does not name a documented function that has one")
+    return faults
+
+
+@cache
+def known_names() -> set[str]:
+    """The names of functions with an example of their own, as a docstring writes them."""
+    functions = {**api(), **names_of_functions()}
+    with_example = [name for name, item in functions.items() if ">>>" in (inspect.getdoc(item) or "")]
+    return {*with_example, *(name.rpartition(".")[2] for name in with_example if not name.startswith("cdtool.cli"))}
+
+
+@pytest.mark.parametrize("name", sorted(api()))
+def test_a_function_of_the_api_describes_every_keyword_what_it_returns_and_raises(name):
+    faults = faults_of_function(api()[name])
+    if "Raises" not in sections(inspect.getdoc(api()[name]) or ""):
+        faults.append("has no section Raises")
+    assert not faults, f"{name}: {'; '.join(faults)}"
+
+
+def test_the_public_functions_of_detectors_thresholds_and_evaluation_have_their_sections():
+    faults = {
+        name: faults_of_function(function, contract=function in CONTRACTS)
+        for name, function in names_of_functions().items()
+        if not is_to_document(name)
+    }
+    assert not {name: found for name, found in faults.items() if found}
+
+
+@pytest.mark.parametrize("name", sorted(rules()))
+def test_a_detector_or_threshold_describes_its_settings_with_units_its_equation_and_when_it_fails(name):
+    assert not faults_of_class(rules()[name])
+
+
+def test_every_entry_still_to_document_is_needed():
+    for entry in TO_DOCUMENT:
+        names = [
+            name for name in names_of_functions() if name == entry or (entry[-1] == "." and name.startswith(entry))
+        ]
+        assert any(faults_of_function(names_of_functions()[name]) for name in names), f"remove {entry}"
+
+
+def test_a_missing_section_is_found():
+    def total(values: list[float], factor: float) -> float:
+        """Return a weighted sum.
+
+        Parameters
+        ----------
+        values : list of float
+            The values.
+
+        Examples
+        --------
+        >>> 1 + 1
+        2
+        """
+        if not values:
+            raise ValueError(factor)
+        return factor * sum(values)
+
+    assert faults_of_function(total) == [
+        "does not describe the parameter factor",
+        "has no section Returns",
+        "has no section Raises",
+    ]
+
+
+def run(tests: list[doctest.DocTest]) -> str:
+    """Run examples; return what is wrong, empty if all are right."""
+    said: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=_FLAGS, verbose=False)
+    for test in tests:
+        runner.run(test, out=said.append)
+    return "".join(said)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A fresh folder that looks like a checkout to an example."""
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
+    (tmp_path / "docs" / "examples").symlink_to(ROOT / "docs" / "examples")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", sorted(api()))
+def test_the_example_of_a_function_of_the_api_runs(name, folder):
+    text = inspect.getdoc(api()[name]) or ""
+    test = doctest.DocTestParser().get_doctest(text, {}, name, name, 0)
+    assert test.examples
+    assert not run([test])
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_the_examples_of_detectors_thresholds_and_evaluation_run(room, folder):
+    modules = [name for name, text in texts().items() if room_of(name) == room and ">>>" in text]
+    tests = [test for name in modules for test in doctest.DocTestFinder().find(import_module(name), name)]
+    assert sum(bool(test.examples) for test in tests) > 10
+    assert not run(tests)
