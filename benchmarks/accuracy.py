@@ -1,7 +1,7 @@
-"""What the accuracy benchmarks share: simulated runs in memory through detector and signature; scores, orders, rows.
+"""Shared parts of the accuracy benchmarks: simulated runs in memory, detectors, signatures, scores, orders, rows.
 
-Machine, gains, signature, onset and watched joints are read from the machine.toml and benchmark.toml that `cdtool
-simulate` writes: one source of truth. Only the recordings skip the disk.
+Machine, gains, signature, onset and monitored joints are read from the machine.toml and benchmark.toml written by
+`cdtool simulate`, so there is one definition. Only the recordings are not written to disk.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FALSE_ALARMS_ALLOWED = 1
 
 @dataclass(frozen=True)
 class Bench:
-    """A simulated machine: its two files, how many runs a seed has in each group, and one run as it was logged.
+    """A simulated machine: its two files, the number of runs per seed in each group, and one run as logged.
 
     `simulate` takes seed, group and number from 1.
     """
@@ -43,7 +43,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Cell:
-    """One kind of impact of a table: its title, its group, and the reference [ms] by detector, fastest first."""
+    """One kind of impact in a table: title, group, and the reference [ms] by detector, fastest first."""
 
     title: str
     group: str
@@ -51,7 +51,7 @@ class Cell:
     average: Callable[[Sequence[float]], float] = mean
 
     def of(self, score: Score) -> float:
-        """The average latency of a score [ms]; infinite where nothing was detected."""
+        """Return the average latency of a score [ms]; infinite without a detection."""
         latencies = score.latencies[self.group]
         return self.average(latencies) if latencies else float("inf")
 
@@ -71,9 +71,10 @@ Scores = Mapping[int, Mapping[str, Score]]
 
 
 def written_setup(write: Callable[[Path, Mapping[str, int]], int]) -> BenchmarkFile:
-    """The benchmark file and machine file that a simulator writes beside its recordings."""
+    """Return the benchmark file and machine file that a simulator writes with its recordings."""
     with tempfile.TemporaryDirectory() as folder:
-        # As few runs as make a benchmark: two to learn from, one of every other group, since it names no empty one.
+        # The fewest runs of a valid benchmark: two to learn from, one of every other group, since groups cannot be
+        # empty.
         write(Path(folder), {"free": 2, HOLDOUT: 1, **dict.fromkeys(IMPACTS, 1)})
         return read_benchmark_file(Path(folder) / "benchmark.toml")
 
@@ -97,7 +98,7 @@ def _score(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]], 
             sys.exit(f"error: {fitted.skipped[0].recording}: {fitted.skipped[0].reason}")
         thresholds = fitted.thresholds
     except NothingValidError:
-        pass  # as `cdtool benchmark` does: without a band every contact is not assessable
+        pass  # as in `cdtool benchmark`: without a band no contact is assessable
     score = Score()
     for group in (HOLDOUT, *IMPACTS):
         for operation in operations[group]:
@@ -118,7 +119,7 @@ def _score(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]], 
 
 
 def rows(cell: Cell, scores: Scores) -> list[tuple[object, ...]]:
-    """A row for each detector: the average of each seed and of all impacts, misses, false alarms, the reference."""
+    """Return a row per detector: average of each seed and of all impacts, misses, false alarms, the reference."""
     return [_row(cell, name, [by_name[name] for by_name in scores.values()]) for name in next(iter(scores.values()))]
 
 
@@ -127,7 +128,7 @@ def _row(cell: Cell, name: str, of_seeds: Sequence[Score]) -> tuple[object, ...]
     average = f"{cell.average(pooled):.1f}" if pooled else "-"
     if cell.average is mean and len(pooled) > 1:
         average += f" +- {stdev(pooled):.1f}"
-    # The references are means: beside a median they would mislead.
+    # The references are means: next to a median they would mislead.
     reference = cell.reference.get(name) if cell.average is mean else None
     worst = max((cell.of(score) / reference - 1.0 for score in of_seeds), key=abs) if reference else 0.0
     return (
@@ -151,7 +152,7 @@ def near(cell: Cell, scores: Scores) -> bool:
 
 
 def ordered(cell: Cell, scores: Scores) -> bool:
-    """Print the order of the detectors on every seed; True if it is the reference's on each."""
+    """Print the order of the detectors on every seed; return whether it is always that of the reference."""
     wanted = list(cell.reference)
     held = True
     for seed, by_name in scores.items():
@@ -167,7 +168,7 @@ def ordered(cell: Cell, scores: Scores) -> bool:
 
 
 def order_wanted(cell: Cell) -> str:
-    """The order that is asked for, in words."""
+    """Return the required order in words."""
     return f"order {cell.title} {'<'.join(cell.reference)}"
 
 
@@ -176,13 +177,13 @@ def _chain(names: Sequence[str]) -> str:
 
 
 def not_detected(cell: Cell, scores: Scores, detectors: Sequence[str]) -> int:
-    """Contacts missed or not assessable, over all seeds and the named detectors."""
+    """Return the contacts missed or not assessable, over all seeds and the named detectors."""
     of_all = (by_name[name] for by_name in scores.values() for name in detectors)
     return sum(score.missed[cell.group] + score.not_assessable[cell.group] for score in of_all)
 
 
 def print_false_alarms(scores: Scores, where: str = "") -> None:
-    """A line for each detector that raised any, by seed."""
+    """Return a line per detector with false alarms, by seed."""
     for name in next(iter(scores.values())):
         alarms = {seed: by_name[name].false_alarms for seed, by_name in scores.items()}
         if any(alarms.values()):
@@ -192,7 +193,7 @@ def print_false_alarms(scores: Scores, where: str = "") -> None:
 
 
 def conclude(wanted: Sequence[tuple[str, bool]], seeds: Sequence[int]) -> int:
-    """Print what held and what did not; the exit status, 0 if all held."""
+    """Print which requirements are met; return the exit status, 0 if all are."""
     held = all(good for _, good in wanted)
     print()
     for text, good in wanted:

@@ -3,12 +3,11 @@
     python benchmarks/arm_accuracy.py            # seeds 801 802 803 804 805
     python benchmarks/arm_accuracy.py 806 807    # others
 
-Trial 1: the arm is hit; trial 2: the forearm, which does not move. Each seed and trial: 14 free runs to learn from, 30
-hold-out runs, 30 stiff and 30 soft impacts, simulated in memory: the runs that `cdtool simulate arm --seed` writes, but
+Trial 1: impact on the arm; trial 2: on the forearm, which does not move. Each seed and trial: 14 free runs to learn
+from, 30 hold-out runs, 30 stiff and 30 soft impacts, simulated in memory: the runs of `cdtool simulate arm --seed`, but
 not rounded to a log's decimals (means differ by less than 0.5 ms). Detectors, gains and rules are those of the files
-that it writes beside them, one set for both trials. The simulated arm
-is tuned so that the thesis's latencies come out (see docs/simulators.md): this checks how surely it reproduces them
-from seed to seed, and says nothing of a real arm.
+written with them, one set for both trials. The simulated arm is tuned to reproduce the thesis's latencies (see
+docs/simulators.md): this measures how reliably it does so from seed to seed, and is no evidence about a real arm.
 """
 
 from __future__ import annotations
@@ -49,12 +48,12 @@ from cdtool.simulation.recording_folder import GROUPS, IMPACT_OF
 SEEDS = (801, 802, 803, 804, 805)
 COUNTS = {"free": 14, "holdout": 30, "stiff": 30, "soft": 30}
 TRIALS: tuple[Trial, Trial] = (1, 2)
-# Means of three seeds in the specification [ms], fastest first: the order that each seed has to show.
+# Means of three seeds in the specification [ms], fastest first: the order required on each seed.
 STIFF_1 = Cell("T1 stiff", "stiff", {"feekf": 12.0, "igm": 14.0, "gm": 28.33})
 SOFT_1 = Cell("T1 soft", "soft", {"feekf": 85.67, "igm": 103.67, "gm": 113.0})
 STIFF_2 = Cell("T2 stiff", "stiff", {"igm": 15.67, "gm": 68.33})
 SOFT_2 = Cell("T2 soft", "soft", {"igm": 349.0, "gm": 388.67})
-# Trial 2's stiff means hang on single late alarms: its order is that of the medians, and no mean is asked for.
+# Trial 2's stiff means depend on single late alarms: the medians set its order, and no mean is required.
 STIFF_2_MEDIAN = Cell("T2 stiff, median", "stiff", STIFF_2.reference, median)
 CELLS = {1: (STIFF_1, SOFT_1), 2: (STIFF_2, STIFF_2_MEDIAN, SOFT_2)}
 BLIND = "feekf"
@@ -62,7 +61,7 @@ BLIND = "feekf"
 
 @dataclass(frozen=True)
 class Blindness:
-    """What the friction EKF made of trial 2: the forearm does not move, so it must say that it cannot judge."""
+    """The friction EKF's results in trial 2: the forearm does not move, so it must not be assessable."""
 
     contacts: int
     not_assessable: int
@@ -71,18 +70,18 @@ class Blindness:
 
     @property
     def complete(self) -> bool:
-        """Not assessable in every contact, never missed, never an alarm."""
+        """Whether it is not assessable in every contact, never missed, and without an alarm."""
         return self.not_assessable == self.contacts and not self.missed and not self.alarms
 
 
 def simulate(trial: Trial, seed: int, group: str, number: int) -> Recording:
-    """One run, seeded as the command line seeds it."""
+    """Simulate one run with the seeds of the command line."""
     rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
     return as_recording(simulate_arm_run(ArmParameters(), rng, trial, IMPACT_OF[group]), f"{group}/{number:02d}")
 
 
 def blindness(scores: Scores) -> Blindness:
-    """Counts over all seeds of trial 2."""
+    """Return the counts over all seeds of trial 2."""
     of_seeds = [by_name[BLIND] for by_name in scores.values()]
     found = sum(len(score.latencies[group]) for score in of_seeds for group in IMPACTS)
     return Blindness(
@@ -94,7 +93,7 @@ def blindness(scores: Scores) -> Blindness:
 
 
 def main(seeds: tuple[int, ...]) -> int:
-    """Print everything; 0 if all of it held."""
+    """Print everything; return 0 if all requirements are met."""
     print(f"== latency on the simulated arm [ms], seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
     scores: dict[int, Scores] = {}
     for trial in TRIALS:
@@ -133,7 +132,7 @@ def main(seeds: tuple[int, ...]) -> int:
             blind.complete,
         ),
         (
-            f"at most {FALSE_ALARMS_ALLOWED} false alarm a detector over all seeds and both trials",
+            f"at most {FALSE_ALARMS_ALLOWED} false alarm per detector over all seeds and both trials",
             max(alarms) <= FALSE_ALARMS_ALLOWED,
         ),
     )

@@ -1,4 +1,4 @@
-"""The arrays that the kernels are timed on: an axis that goes to and fro, load side, as a drive would log it."""
+"""The arrays for timing kernels: an axis that moves back and forth, on the load side, as logged by a drive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdtool.tables import Table
 
 Array = npt.NDArray[np.float64]
 
-# To and fro at 0.2 m/s with ramps of 1 s and rests of 0.5 s: (time [s], speed [m/s]) of one period.
+# Back and forth at 0.2 m/s with ramps of 1 s and rests of 0.5 s: (time [s], speed [m/s]) of one period.
 _STROKES = ((0.0, 0.5, 1.5, 6.5, 7.5, 8.0, 9.0, 14.0, 15.0), (0.0, 0.0, 0.2, 0.2, 0.0, 0.0, -0.2, -0.2, 0.0))
 _PERIOD = _STROKES[0][-1]
 PERIOD = 1e-3  # of the log [s]

@@ -1,13 +1,13 @@
-"""Does `cdtool compare` find a planted regression, and does it keep quiet where there is none?
+"""Does `cdtool compare` find a planted regression, and does it report nothing for equal builds?
 
     python benchmarks/compare_builds.py           # seeds 901 902 903 904 905 for the planted one
     python benchmarks/compare_builds.py 911 912   # others
 
-Planted: the simulated gate with a debounce of 14 samples against 9, FEEKF and GM on the same 30 stiff and 30 soft
-impacts of each seed (paired). Quiet: two builds that are equal, signatures included, each on 30 + 30 impacts of its own
-(unpaired), 100 times. Those are drawn without replacement from a pool of 600 + 600, simulated and judged once: within a
-comparison no impact is used twice, between comparisons they recur. The same draws, the new build with a debounce of 14,
-tell how often a regression of 5 ms is found without pairs.
+Planted: the simulated gate with a debounce of 14 samples instead of 9, FEEKF and GM on the same 30 stiff and 30 soft
+impacts of each seed (paired). Equal: two identical builds, signatures included, each on its own 30 + 30 impacts
+(unpaired), 100 times. These are drawn without replacement from a pool of 600 + 600, simulated and scored once: within a
+comparison no impact is used twice, between comparisons they recur. The same draws, with a debounce of 14 for the new
+build, measure how often a regression of 5 ms is found without pairs.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def judged(seed: int, impacts: int) -> tuple[Results, Results]:
 
 
 def of_recordings(results: Results, names: Collection[str]) -> Results:
-    """The part of results that belongs to these recordings; each detector watched them for their share of the time."""
+    """Return the part of results of these recordings; exposure is divided in proportion."""
     kept = [item for item in results.recordings if item.recording in names]
     share = {group: sum(item.group == group for item in kept) for group in GROUPS}
     return replace(
@@ -70,7 +70,7 @@ def of_recordings(results: Results, names: Collection[str]) -> Results:
 
 
 def planted(seeds: tuple[int, ...]) -> bool:
-    """Print what is found on each seed; True if every latency is found to be worse on each."""
+    """Print the result on each seed; return whether every latency is found to be worse on each."""
     found = 0
     for seed in seeds:
         comparison = compare(*judged(seed, IMPACTS))
@@ -83,7 +83,7 @@ def planted(seeds: tuple[int, ...]) -> bool:
 
 
 def quiet() -> bool:
-    """Print how often two equal builds on other recordings show no change, and how often 5 ms are found there."""
+    """Print how often two equal builds on different recordings show no change, and how often 5 ms are found."""
     begin = perf_counter()
     old, new = judged(POOL_SEED, POOL)
     print(f"pool: {POOL} + {POOL} impacts simulated and judged twice in {perf_counter() - begin:.0f} s")
@@ -116,7 +116,7 @@ def said(text: str, good: bool) -> bool:
 
 
 def main(seeds: tuple[int, ...]) -> int:
-    """Print both; 0 if both held."""
+    """Print both; return 0 if both requirements are met."""
     print(
         f"== comparing builds: {IMPACTS} + {IMPACTS} impacts, debounce {OLD} against {NEW}\n{environment()}", flush=True
     )

@@ -1,7 +1,7 @@
-"""A CSV of 648 MB, 5 columns: cdtool's reader, detection and checks included, against a bare pandas.read_csv.
+"""A CSV of 648 MB, 5 columns: cdtool's reader, including detection and checks, compared with pandas.read_csv.
 
-Each reading runs in a process of its own, one after the other in turn: seconds are those of the reading alone, the peak
-of the memory is that of the whole process. Every column is compared bit for bit.
+Each reading runs in a separate process, alternating: seconds are those of the reading, the peak memory is that of the
+whole process. Every column is compared bit for bit.
 
 python benchmarks/csv_reading.py [megabytes]
 """
@@ -93,7 +93,7 @@ def _run(code: str, *arguments: object) -> tuple[float, float, list[str]]:
 
 
 def _write(path: Path, size: int) -> int:
-    """A table of about `size` bytes: some 9 MB of rows over and over."""
+    """Write a table of about `size` bytes: about 9 MB of rows, repeated."""
     rng = np.random.default_rng(648)
     count = max(1000, min(200_000, size // 45))
     values = [np.arange(count) * 0.5, *(rng.normal(0.0, scale, count) for scale in (30.0, 2.0, 100.0, 5.0))]

@@ -37,7 +37,7 @@ def random_faults(recording: Recording, number: int, rng: np.random.Generator, l
 
 
 def damaged(recording: Recording, faults: Sequence[Fault]) -> Recording:
-    """The recording with all these faults; ground truth is left whole."""
+    """Return the recording with all these faults; ground truth is unchanged."""
     channels: dict[str, Series] = dict(recording.channels)
     for fault in faults:
         channels = {name: _spoilt(series, fault) if _hit(name, fault) else series for name, series in channels.items()}
@@ -45,7 +45,7 @@ def damaged(recording: Recording, faults: Sequence[Fault]) -> Recording:
 
 
 def filled(recording: Recording, fault: Fault) -> tuple[Recording, ...]:
-    """The whole recording as if nothing had happened in the fault: with a straight line there, and with held values."""
+    """Return the recording with the fault filled by a straight line, and with held values."""
     return tuple(
         replace(
             recording,
@@ -59,7 +59,7 @@ def filled(recording: Recording, fault: Fault) -> tuple[Recording, ...]:
 
 
 def without(recording: Recording, prefix: str) -> Recording:
-    """The recording without the channels whose names begin with `prefix`."""
+    """Return the recording without the channels whose names begin with `prefix`."""
     kept: Mapping[str, Series] = {n: s for n, s in recording.channels.items() if not n.startswith(prefix)}
     return replace(recording, channels=kept)
 

@@ -1,12 +1,12 @@
 """The information-theoretic bound on the delay of a detector's signal, after Lorden (1971).
 
-Whoever has to tell a known change of unit Gaussian noise as early as possible, with gamma samples between two false
-alarms on average, needs on average at least the time in which the Kullback-Leibler divergence of the samples after the
-change from those before, summed, reaches log(gamma) (for large gamma, at the worst instant). A known mean m_k in
-standard deviations diverges by m_k^2 / 2 a sample; a steady one thus needs log(gamma) / (m^2 / 2) samples.
+A detector of a known change in unit Gaussian noise, with gamma samples between two false alarms on average, needs on
+average at least the time until the Kullback-Leibler divergence of the samples after the change from those before,
+summed, reaches log(gamma) (for large gamma, at the worst instant). A known mean m_k in standard deviations diverges by
+m_k^2 / 2 per sample; a steady one thus needs log(gamma) / (m^2 / 2) samples.
 
-It is a bound within one signal as it was whitened: shape and amplitude of the response known, the noise Gaussian and
-white. A signal that takes the same contact in otherwise, or a longer whitening, has another bound.
+The bound applies to one signal as whitened: shape and amplitude of the response known, the noise Gaussian and white.
+Another signal of the same contact, or a longer whitening, has another bound.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ QUOTED = {
 }
 # Page's sum overshoots its limit by this much on average [standard deviations] (Siegmund 1985).
 _OVERSHOOT = 1.166
-# How many innovations are summed to see whether they are white.
+# Number of summed innovations to check whether they are white.
 _SUMS = (8, 32, 128)
-# A sample counts while at least this share of the impacts can be judged there.
+# A sample counts if at least this share of the impacts is assessable there.
 _COVERAGE = 0.5
 
 
 def after_onset(innovations: Signal, onset: float, samples: int, side: int) -> FloatArray:
-    """The watched innovation (`samples`,) from the first sample at or after `onset` [s], positive towards the limit.
+    """Return the monitored innovation (`samples`,) from the first sample at `onset` [s] on, positive to the limit.
 
-    NaN where it cannot be judged, and behind the recording's end. `side` -1: the lower limit is watched.
+    NaN where it is not assessable, and after the recording's end. `side` -1: the lower limit is monitored.
     """
     result = np.full(samples, np.nan)
     first = int(np.searchsorted(innovations.time, onset, side="left"))
@@ -73,9 +73,9 @@ def summed_divergence(responses: FloatArray) -> FloatArray:
 
 
 def samples_to(divergence: FloatArray, wanted: float) -> float:
-    """How many samples (from 1; a part of one by a straight line) the summed divergence (K,) takes to reach `wanted`.
+    """Return the number of samples (fractional, by a straight line) until the summed divergence (K,) reaches `wanted`.
 
-    Infinite where it does not.
+    Infinite if it does not.
     """
     reached = np.flatnonzero(divergence >= wanted)
     if not len(reached):
@@ -125,12 +125,12 @@ class Limit:
     sums: Mapping[int, float]
 
     def bound(self, group: str, budget: float) -> float:
-        """Lorden's bound on the mean latency [ms] at `budget` false alarms an operation."""
+        """Return Lorden's bound on the mean latency [ms] at `budget` false alarms per operation."""
         return 1e3 * delay_bound(summed_divergence(self.responses[group]), self.samples / budget, self.period)
 
 
 def limit_of(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]], detector: Any, fitted: Any) -> Limit:
-    """Innovations of the hold-out runs and of the impacts, the latter from their onsets on for the matching window."""
+    """Return the innovations of the hold-out runs and of the impacts, the latter from the onset for the window."""
 
     def innovations(operation: Operation) -> Signal:
         signal = run_detector(operation, setup.machine_file.machine, detector, setup.watched)
@@ -149,7 +149,7 @@ def limit_of(setup: BenchmarkFile, operations: Mapping[str, Sequence[Operation]]
 
 
 def print_bounds(studies: Sequence[Any], budget: float, titles: Sequence[str]) -> None:
-    """Each study's bound, and the mean latencies of the thresholds `titles` with their multiples of it."""
+    """Return each study's bound, and the mean latencies of the thresholds `titles` with their multiples of it."""
     rows = []
     for item in studies:
         for group in item.limit.responses if item.limit else ():
@@ -166,7 +166,7 @@ def print_bounds(studies: Sequence[Any], budget: float, titles: Sequence[str]) -
 
 
 def print_whiteness(studies: Sequence[Any], budget: float, title: str) -> None:
-    """The limit that `title`, Page's sum with its default drift and without debounce, needs, and white noise would."""
+    """Return the limit that Page's sum `title` needs (default drift, no debounce), and that for white noise."""
     rows = []
     for item in studies:
         if item.limit:
@@ -174,4 +174,4 @@ def print_whiteness(studies: Sequence[Any], budget: float, title: str) -> None:
             sums = [f"{value:.2f}" for value in item.limit.sums.values()]
             rows.append((f"{item.machine} {item.detector}", f"{item.row(title).factor:.1f}", f"{white:.1f}", *sums))
     table((f"limit of {title}", "set", "white noise", *(f"sums of {length}" for length in _SUMS)), rows)
-    print("sums of n innovations: their spread over that of white ones; above 1 the sum gathers what is no contact\n")
+    print("sums of n innovations: their spread over that of white ones; above 1 the sum accumulates noise\n")

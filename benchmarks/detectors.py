@@ -1,7 +1,7 @@
 """Samples/s of every registered detector through its public path, on one joint, a planar arm and a robot of six joints.
 
-The robot needs pinocchio (extra cdtool[urdf]); without it that column is left out. No target: the figures say what a
-detector costs beside the others.
+The robot needs pinocchio (extra cdtool[urdf]); without it that column is left out. No target: the numbers show the
+cost of each detector compared with the others.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _robots() -> dict[str, Any]:
 
 
 def _swinging(machine: Any, samples: int) -> Recording:
-    """Every joint swings at a frequency of its own; torque as the motion needs it; some noise on what is measured."""
+    """Every joint oscillates at a different frequency; torque as required by the motion; noise on the measurements."""
     rng = np.random.default_rng(4)
     joints = len(machine.joints)
     time = np.arange(samples) * PERIOD

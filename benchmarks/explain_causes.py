@@ -4,20 +4,19 @@
     python benchmarks/explain_causes.py --seeds 11 12 --alarms 60
 
 Six causes in turn on five simulated machines (see `BENCHES`): a contact (stiff or soft), a step of friction, a glitch
-of the speed, a spike of the motor current, a knock on the accelerometer, lost samples. Places, speeds, heights and
-lengths are drawn; a disturbance is made stronger until the detector alarms because of it (lost samples, which need not
-raise an alarm at all: the safety factor is lowered until it does, and the same run with every sample does
-not). The alarms come from the pipeline as in `cdtool
-explain`: detector, signature, activation. Of each machine 14 impact-free runs are learned from. Load cell, labels and
-the simulator's truth are not in the recordings that are explained.
+of the speed, a spike of the motor current, a knock on the accelerometer, lost samples. Positions, speeds, heights and
+lengths are random; a disturbance is increased until the detector alarms because of it. (Lost samples need not cause an
+alarm: the safety factor is lowered until they do, while the same run with every sample does not.) The alarms come from
+the pipeline of `cdtool explain`: detector, signature, activation. 14 impact-free runs of each machine are learned from.
+Load cell, labels and the simulator's truth are not in the explained recordings.
 
-First mover: of a faulty sensor it is that sensor's channel; with lost samples no channel has moved. For a contact or a
-step of friction the same run is simulated a second time without it, with the same noise. A channel departs clearly
-where the two differ by six standard deviations of the impact-free runs, slightly where they do by three (`departures`).
-Right is any channel that departs, at least slightly, not later than the first that does so clearly; `TIE_SECONDS` apart
-is a tie. References are no sensors and do not count.
+First mover: for a faulty sensor it is that sensor's channel; with lost samples no channel has moved. For a contact or a
+step of friction the same run is simulated a second time without it, with the same noise. A channel departs clearly if
+the two differ by six standard deviations of the impact-free runs, slightly if by three (`departures`). Any channel is
+right that departs, at least slightly, not later than the first that does so clearly; within `TIE_SECONDS` is a tie.
+References are not sensors and do not count.
 
-Ends with 1 where, in any seed, fewer than 95 % of the causes or of the first movers are right.
+Exits with 1 if, in any seed, fewer than 95 % of the causes or of the first movers are right.
 """
 
 from __future__ import annotations
@@ -59,10 +58,10 @@ CAUSES = ("contact", "friction change", "speed glitch", "torque spike", "acceler
 RUNS = 14
 # A channel that departs this much later than the first counts as first too [s].
 TIE_SECONDS = 0.010
-# Normal spreads by which a channel has departed from the run without the disturbance: so that it must not come behind
-# another, and so that it may be told.
+# Normal spreads by which a channel has departed from the run without the disturbance: clearly, so that it must not be
+# named after another, and slightly, so that it may be named.
 CLEARLY, SLIGHTLY = 6.0, 3.0
-# An alarm belongs to a disturbance if it comes within this time of its beginning [s].
+# An alarm belongs to a disturbance if it is raised within this time of its beginning [s].
 BECAUSE = {"contact": 0.8, "friction change": 0.8}
 SHORTLY = 0.15
 GROWTH, TRIES = 1.35, 14
@@ -75,7 +74,7 @@ Change = Callable[[Recording, float], Recording]
 class Bench:
     """A simulated machine as it is logged: `simulate(seed, impact, added friction)`, and how its channels are logged.
 
-    `friction` [N or N m]: the step that is tried first. `start` [s]: from where on it runs steadily.
+    `friction` [N or N m]: the step tried first. `start` [s]: start of the steady motion.
     """
 
     name: str
@@ -98,7 +97,7 @@ class Bench:
         return self.setup.machine_file
 
     def logged(self, recording: Recording) -> Recording:
-        """As the machine logs it: on the load side, with or without references, on one clock or each on its own."""
+        """Return the recording as logged: on the load side, with or without references, on one or more clocks."""
         recording = self.machine_file.machine.referred_to_load(recording).without_ground_truth()
         if not self.references:
             kept = {name: series for name, series in recording.channels.items() if name in MEASURED}
@@ -108,7 +107,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Case:
-    """One alarm with its known cause; `first`: the channels any of which may be told as the first mover."""
+    """One alarm with its known cause; `first`: the channels that may be named as the first mover."""
 
     bench: Bench
     detector: str
@@ -122,7 +121,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Told:
-    """What the explanation said of a case."""
+    """The explanation of a case."""
 
     case: Case
     explanation: AlarmExplanation
@@ -133,7 +132,7 @@ class Told:
 
     @property
     def first(self) -> tuple[str, str] | None:
-        """The measured channel and its joint told first before the alarm; references are no sensors."""
+        """Return the measured channel and its joint named first before the alarm; references are not sensors."""
         moved = [item for item in self.explanation.moved if item.time <= self.explanation.alarm.time]
         moved = [item for item in moved if item.channel in MEASURED]
         return (moved[0].channel, moved[0].joint) if moved else None
@@ -158,7 +157,7 @@ def gate_bench(name: str, gate: GateParameters, **kept: Any) -> Bench:
 
 
 def arm_bench(name: str, trial: Any, arm: ArmParameters, **kept: Any) -> Bench:
-    """The simulated arm with other parameters; the obstacle stands where the arm has come after 0.6 to 1 of its way."""
+    """The simulated arm with other parameters; the obstacle is where the arm is after 0.6 to 1 of its travel."""
 
     def simulate(seed: Sequence[int], impact: str, friction: Any = None, place: float = 0.0) -> Recording:
         one = replace(arm, obstacle_angle=(place, place)) if place else arm
@@ -173,7 +172,7 @@ def arm_bench(name: str, trial: Any, arm: ArmParameters, **kept: Any) -> Bench:
 
 @dataclass(frozen=True)
 class CountedSpeed:
-    """A user's own detector that takes every sample for one period of its clock, as careless firmware does.
+    """A user's own detector that assumes one clock period per sample, as careless firmware does.
 
     Speed from the difference of two positions over that period, through a low-pass: a lost sample doubles it.
     """
@@ -264,7 +263,7 @@ def with_added(recording: Recording, channel: str, joint: int, added: Callable[[
 
 
 def without_rows(recording: Recording, begin: float, length: float, channels: Sequence[str], as_nan: bool) -> Recording:
-    """Samples of some channels lost from `begin` for `length` [s]: rows gone, or NaN in their place."""
+    """Lose samples of some channels from `begin` for `length` [s]: rows missing, or NaN in their place."""
     changed = dict(recording.channels)
     for name in channels:
         series = changed[name]
@@ -277,7 +276,7 @@ def without_rows(recording: Recording, begin: float, length: float, channels: Se
 
 
 def make_case(seed: int, number: int) -> Case:
-    """The alarm `number` of a seed: its cause in turn, all else drawn; drawn again where no alarm comes of it."""
+    """Return alarm `number` of a seed: its cause in turn, all else random; drawn again if no alarm results."""
     cause = CAUSES[number % len(CAUSES)]
     for attempt in range(40):
         case = _tried_case(np.random.default_rng([seed, number, attempt]), (seed, number, attempt), cause)
@@ -292,7 +291,7 @@ def _tried_case(rng: np.random.Generator, run: tuple[int, ...], cause: str) -> C
     try:
         threshold_of(bench.name, name)
     except CdtoolError:
-        return None  # a detector that can judge nothing of this motion
+        return None  # this motion is not assessable for the detector
     joint = bench.machine_file.machine.joints.index(bench.watched[0]) if bench.watched else 0
     if cause == "contact":
         return _contact(bench, name, rng, run)
@@ -327,7 +326,7 @@ def _tried_case(rng: np.random.Generator, run: tuple[int, ...], cause: str) -> C
 
 
 def _able(bench: Bench, cause: str) -> list[str]:
-    """The detectors of a bench that read what is disturbed."""
+    """Return the detectors of a bench that read the disturbed channel."""
     reads = {name: bench.detector(name).needs for name in bench.detectors}
     channel = {"speed glitch": "speed", "torque spike": "torque", "accelerometer knock": "acceleration"}.get(cause)
     if cause == "lost samples":
@@ -409,7 +408,7 @@ def _lost(bench: Bench, name: str, clean: Recording, begin: float, rng: np.rando
         if case is not None:
             at = case.detection.verdict.alarms[0].time
             whole = _detect(bench, name, clean, threshold.with_safety_factor(factor)).verdict.alarms
-            # With every sample in its place there is no such alarm: the loss alone made it.
+            # Without the loss there is no such alarm: only the loss caused it.
             return case if not any(abs(alarm.time - at) < SHORTLY + length for alarm in whole) else None
         factor *= 0.96
     return None
@@ -433,7 +432,7 @@ def _case(
     strength: float,
     before: float = 0.0,
 ) -> Case | None:
-    """The case, if the first alarm came because of the disturbance."""
+    """Return the case if the first alarm was caused by the disturbance."""
     if not detection.verdict.alarms:
         return None
     late = detection.verdict.alarms[0].time - begin
@@ -452,10 +451,10 @@ def _case(
 
 
 def departures(hit: Recording, clean: Recording, normal: NormalMotion, by: float) -> dict[tuple[str, str], float]:
-    """When each channel that departs begins to differ from the run without the disturbance [s].
+    """Return when each departing channel begins to differ from the run without the disturbance [s].
 
-    A channel departs if single samples differ by so many normal spreads, 3 in succession, or its level does by as many
-    of its own; it begins where it last was within one spread.
+    A channel departs if 3 consecutive samples differ by this many normal spreads, or its level by as many of its own;
+    it begins where it last was within one spread.
     """
     found = {}
     for channel in MEASURED:
@@ -475,7 +474,7 @@ def departures(hit: Recording, clean: Recording, normal: NormalMotion, by: float
 
 
 def first_movers(detection: Detection, clean: Recording, normal: NormalMotion) -> frozenset[tuple[str, str]]:
-    """The channels that may be told first: they depart, and not later than the first that departs clearly."""
+    """Return the channels that may be named first: they depart, not later than the first that departs clearly."""
     hit = detection.operation.recording
     clearly = departures(hit, clean, normal, CLEARLY)
     slightly = departures(hit, clean, normal, SLIGHTLY)
@@ -502,16 +501,16 @@ def score(seed: int, alarms: int) -> list[Told]:
 
 
 def right(told: Sequence[Told]) -> tuple[int, int]:
-    """How many causes, and how many first movers, are right."""
+    """Return how many causes, and how many first movers, are right."""
     causes = sum(item.cause == item.case.cause for item in told)
     return causes, sum(item.first_right for item in told)
 
 
 def report(seed: int, told: Sequence[Told]) -> bool:
-    """Print the confusion matrix, what was wrong, and the score of a seed; whether it suffices."""
+    """Print the confusion matrix, the errors, and the score of a seed; return whether it is sufficient."""
     counts = Counter((item.case.cause, item.cause) for item in told)
     columns = [*CAUSES, *sorted({cause for _, cause in counts} - set(CAUSES))]
-    print(f"== seed {seed}: the cause (rows) and what was told (columns)", flush=True)
+    print(f"== seed {seed}: true cause (rows) and named cause (columns)", flush=True)
     table(
         ("", *columns, "first mover right"),
         [
@@ -536,7 +535,7 @@ def report(seed: int, told: Sequence[Told]) -> bool:
 
 
 def main(seeds: Sequence[int], alarms: int) -> int:
-    """Print every seed's score; 0 if all of them suffice."""
+    """Print every seed's score; return 0 if all are sufficient."""
     print(f"{environment()}\n", flush=True)
     enough = [report(seed, score(seed, alarms)) for seed in seeds]
     print(f"at least {100 * WANTED:.0f} % in every seed: {'held' if all(enough) else 'NOT HELD'}")

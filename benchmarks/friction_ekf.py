@@ -1,6 +1,6 @@
-"""Friction EKF: cdtool's compiled loop against a C -O3 loop with the same masks, and against filterpy.
+"""Friction EKF: cdtool's compiled loop compared with a C -O3 loop with the same masks, and with filterpy.
 
-All three must give the same estimates, else the benchmark stops: a fast wrong filter is worth nothing.
+All three must produce the same estimates, otherwise the benchmark stops.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cdtool.machines.linear_axis import LinearAxis
 
 SAMPLES = 1_000_000
 FILTERPY_SAMPLES = 4_000
-# Where a stroke runs at constant speed: filterpy has neither masks nor a speed below which it is not applicable.
+# Section of a stroke at constant speed: filterpy has neither masks nor a minimum speed.
 FILTERPY_START = 2_000
 ROUNDS = 15
 FILTERPY_ROUNDS = 7
@@ -80,7 +80,7 @@ def _against_filterpy(
         theirs = _filterpy(detector, part, machine, joint)
         _require_equal(name, (theirs(), np.zeros(0)), (own, np.zeros(0)), TOLERANCE_FILTERPY)
         seconds = interleaved({"cdtool": _cdtool(detector, run, machine), name: theirs}, FILTERPY_ROUNDS)
-        # Samples/s over samples/s: cdtool runs the whole log, filterpy a stretch of it.
+        # Samples/s over samples/s: cdtool runs the whole log, filterpy a section of it.
         per_sample = [s / FILTERPY_SAMPLES for s in seconds[name]]
         times = ratio(per_sample, [s / SAMPLES for s in seconds["cdtool"]])
         rows.append((name, _speed(seconds["cdtool"], SAMPLES), _speed(seconds[name], FILTERPY_SAMPLES), times))
@@ -153,7 +153,7 @@ def _gains(detector: FrictionEkf, inertia: float, viscous: float) -> tuple[float
 
 
 def _filterpy(detector: FrictionEkf, run: Run, machine: LinearAxis, joint: bool) -> Callable[[], Array]:
-    """The same model stepped by filterpy: predict, then two scalar updates as cdtool does, or one of both values."""
+    """Run the same model with filterpy: predict, then two scalar updates as in cdtool, or one of both values."""
     from filterpy.kalman import ExtendedKalmanFilter
 
     inertia, known_friction, q_d, q_a, q_v, r_a, r_v, initial, *_ = _gains(

@@ -3,11 +3,11 @@
     python benchmarks/gate_accuracy.py            # seeds 401 402 403 404 405
     python benchmarks/gate_accuracy.py 501 502    # others
 
-Each seed: 14 free runs to learn from, 40 hold-out runs, 30 stiff and 30 soft impacts, simulated in memory: the runs
-that `cdtool simulate gate --seed` writes. Every gain is the detector's default, for all seeds and groups alike. The
-simulated gate is tuned so that the thesis's latencies come out (see docs/simulators.md): this checks how surely it
-reproduces them from seed to seed, and says nothing of a real gate. Asked are the thesis's detectors and IGM; the
-others stand beside them for comparison, and desired dynamics misses stiff impacts with its default gains.
+Each seed: 14 free runs to learn from, 40 hold-out runs, 30 stiff and 30 soft impacts, simulated in memory: the runs of
+`cdtool simulate gate --seed`. Every gain is the detector's default, for all seeds and groups. The simulated gate is
+tuned to reproduce the thesis's latencies (see docs/simulators.md): this measures how reliably it does so from seed to
+seed, and is no evidence about a real gate. Checked are the thesis's detectors and IGM; the others are shown for
+comparison, and desired dynamics misses stiff impacts with its default gains.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from cdtool.simulation.recording_folder import IMPACT_OF
 
 SEEDS = (401, 402, 403, 404, 405)
 COUNTS = {"free": 14, "holdout": 40, "stiff": 30, "soft": 30}
-# Means of three seeds in the specification [ms], fastest first: the order that each seed has to show.
+# Means of three seeds in the specification [ms], fastest first: the order required on each seed.
 CELLS = (
     Cell("stiff", "stiff", {"pi": 26.67, "feekf": 32.67, "gm": 63.67, "pt": 165.0}),
     Cell("soft", "soft", {"feekf": 82.0, "gm": 124.0, "pt": 213.0, "pi": 388.3}),
@@ -51,14 +51,14 @@ ASKED = (*CELLS[0].reference, "igm")
 
 
 def simulate(seed: int, group: str, number: int) -> Recording:
-    """One run, seeded as the command line seeds it."""
+    """Simulate one run with the seeds of the command line."""
     gate = GateParameters()
     run = simulate_gate_run(gate, np.random.default_rng([seed, GROUPS.index(group), number]), IMPACT_OF[group])
     return as_recording(run, f"{group}/{number:02d}", gate)
 
 
 def main(seeds: tuple[int, ...]) -> int:
-    """Print everything; 0 if all of it held."""
+    """Print everything; return 0 if all requirements are met."""
     print(f"== latency on the simulated gate [ms], seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
     known = [DETECTORS.load(name).short_name for name in DETECTORS.names()]
     detectors = [*ASKED, *(name for name in known if name not in ASKED)]
@@ -77,7 +77,7 @@ def main(seeds: tuple[int, ...]) -> int:
         (f"every mean within {100 * WITHIN:.0f} %", all(near(cell, scores) for cell in CELLS)),
         (f"missed: {missed}, wanted 0{asked}", missed == 0),
         (
-            f"at most {FALSE_ALARMS_ALLOWED} false alarm a detector over all seeds{asked}",
+            f"at most {FALSE_ALARMS_ALLOWED} false alarm per detector over all seeds{asked}",
             max(alarms) <= FALSE_ALARMS_ALLOWED,
         ),
     )

@@ -1,8 +1,8 @@
 """Hostile files and options to every command: tracebacks, undocumented exit statuses, long lines, hangs and crashes.
 
 Each attempt mutates one input file (its values or its bytes) or sets one option to a hostile value, and runs it.
-Attempts are run in a process that is watched: what ends it, or takes longer than --seconds, is counted too. Ends with
-status 1 where there is any. tests/fuzz/test_hostile_commands.py holds a short run of it.
+Attempts run in a monitored process: a crash, or more than --seconds, is counted too. Exits with status 1 if there is
+any. tests/fuzz/test_hostile_commands.py contains a short run.
 
 python benchmarks/hostile_input.py --attempts 3000 --seed 1
 """
@@ -67,7 +67,7 @@ def main() -> int:
 def watch(
     pipe: Connection, seconds: float, statuses: Counter[int], complaints: list[str], count: int
 ) -> tuple[int, str]:
-    """The number to go on with, and what ended the process before its time."""
+    """Return the number to continue with, and what ended the process early."""
     number, shown = -1, ""
     while True:
         try:

@@ -1,11 +1,11 @@
-"""How often do the intervals of the evaluation hold the true figure? Each should in 95 of 100 tests.
+"""How often do the intervals of the evaluation contain the true value? Each should in 95 of 100 tests.
 
 python benchmarks/interval_coverage.py [repetitions] [--few]
 
---few: only the exact intervals and those of 4 to 9 contacts. Ends with 1 where a bar is missed.
+--few: only the exact intervals and those of 4 to 9 contacts. Exits with 1 if a requirement is not met.
 
-The exact intervals (missed share, false-alarm rate) are enumerated: no chance in it. The others are simulated on
-latencies whose true figures are known. Seeded by row, so the figures do not depend on the number of cores.
+The exact intervals (missed share, false-alarm rate) are enumerated, without chance. The others are simulated on
+latencies with known true values. Seeded by row, so the numbers do not depend on the number of cores.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Latencies:
-    """Latencies [ms] whose figures are known: each share of them has one distribution."""
+    """Latencies [ms] with known statistics: each share of them has one distribution."""
 
     groups: tuple[tuple[float, Any], ...]
 
@@ -51,7 +51,7 @@ class Latencies:
         return np.choose(which, [group.rvs(n, random_state=rng) for _, group in self.groups])
 
     def later(self, latency: float | Floats) -> Any:
-        """The share above a latency."""
+        """Return the share above a latency."""
         return sum(share * group.sf(latency) for share, group in self.groups)
 
     def quantile(self, share: float) -> float:
@@ -77,7 +77,7 @@ LATENCIES = {
     "80 % at 38, 20 % at 80 ms": Latencies(((0.8, stats.norm(38, 4)), (0.2, stats.norm(80, 8)))),
     "50 % at 38, 50 % at 80 ms": Latencies(((0.5, stats.norm(38, 4)), (0.5, stats.norm(80, 8)))),
 }
-# So few contacts show median and range; the mixture with 15 % slow cases is the hardest one.
+# Few contacts show median and range; the mixture with 15 % slow cases is the hardest one.
 FEW = (4, 5, 6, 7, 8, 9)
 FEW_LATENCIES = {
     "normal, 40 +- 6 ms": LATENCIES["normal, 40 +- 6 ms"],
@@ -92,7 +92,7 @@ MISSED = (0.0, 0.1, 0.3)
 
 
 def main(repetitions: int, few_only: bool) -> int:
-    """Print every table; 0 if what is shown covers what it should: exact intervals, few contacts, n = 30."""
+    """Print every table; return 0 if the coverage is sufficient: exact intervals, few contacts, n = 30."""
     print(f"== coverage of 95 % intervals [%]\n{environment()}", flush=True)
     held = print_exact()
     error = 100 * math.sqrt(NOMINAL * (1 - NOMINAL) / repetitions)
@@ -128,7 +128,7 @@ class Row:
 
 
 def print_exact() -> bool:
-    """Enumerated: the least coverage over every true share or rate, for three ways to deal with a count of 0."""
+    """Return the least coverage over every true share or rate, enumerated, for three treatments of a count of 0."""
     found = {f"missed share of {n}": missed_coverage(n) for n in (5, 10, 30, 100, 300)}
     found["false alarms, up to 40 expected"] = false_alarm_coverage(40.0)
     print("\nexact intervals, least coverage over every true value")
@@ -158,14 +158,14 @@ def false_alarm_coverage(highest: float) -> list[float]:
 
 
 def least_coverage(bounds: Floats, probabilities: Callable[[float], Floats], highest: float) -> float:
-    """Least chance that the bounds hold the true value, up to the highest: it lies just beside a bound."""
+    """Return the least probability that the bounds contain the true value; it occurs next to a bound."""
     beside = (bounds.ravel()[:, np.newaxis] * (1.0 - 1e-9, 1.0 + 1e-9)).ravel()
     true = beside[(beside > 0.0) & (beside < highest)]
     return min(float(probabilities(value)[(bounds[:, 0] <= value) & (value <= bounds[:, 1])].sum()) for value in true)
 
 
 def bootstrap_hits(name: str, n: int, repetitions: int, seed: int) -> Floats:
-    """Share of the tests whose BCa interval holds the true mean, median and standard deviation."""
+    """Return the share of the tests whose BCa interval contains the true mean, median and standard deviation."""
     rng, latencies = np.random.default_rng((seed, n)), LATENCIES[name]
     true = [latencies.figure(statistic) for statistic in STATISTICS]
     hits = np.zeros(len(STATISTICS))
@@ -239,7 +239,7 @@ def print_bootstrap(samples: Sequence[tuple[str, int]], rows: Sequence[Row]) -> 
 
 
 def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: int) -> bool:
-    """What is shown of 4 to 9 contacts; whether each interval that is shown holds in 95 %, within three errors."""
+    """Print the intervals of 4 to 9 contacts; return whether each contains 95 %, within three errors."""
     lines, least, sound = [], 1.0, True
     for (name, n), row in zip(few, rows, strict=True):
         shares = row.shares()
@@ -251,9 +251,7 @@ def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: 
     print(f"\nbelow {FEWEST} contacts: what is shown (- no interval), and the bootstrap of the mean, which is not")
     table(("", "mean", "median", "P95", "mean, not shown"), lines)
     error = math.sqrt(NOMINAL * (1.0 - NOMINAL) / repetitions)
-    text = (
-        f"only the median has an interval, from 6 contacts on; it holds in {percent(NOMINAL)} (least {percent(least)})"
-    )
+    text = f"only the median has one, with 6 contacts or more; it holds in {percent(NOMINAL)} (least {percent(least)})"
     return said(text, sound and least >= NOMINAL - 3.0 * error)
 
 

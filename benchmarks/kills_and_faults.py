@@ -1,4 +1,4 @@
-"""Kills and failing calls at random points of every command that writes: what is left is old or new, and whole.
+"""Kills and failing calls at random points of every command that writes: each file is old or new, and complete.
 
 Kills: SIGKILL, SIGTERM and SIGINT, half of them after a random time, half at a random call on a file of the output
 folder. Faults: an open, write, fsync or rename there fails with ENOSPC, EIO, EACCES or EMFILE, by a library that is
@@ -52,12 +52,12 @@ FAULTS = {
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 _STATUS_OF = {signal.SIGTERM: 143, signal.SIGINT: 130}
-# Lines about what was read, which have nothing to do with writing.
+# Lines about the input, unrelated to writing.
 _OF_THE_WORK = ("warning: ", "note: ", "left out: ", "loss: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
 _OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "asammdf", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
 Snapshot = dict[str, tuple[int, bytes]]
-# A folder whose files are written one by one: each log has its own.
+# A folder whose files are written separately: one per log.
 _PLOTS = "plots"
 
 
@@ -71,7 +71,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Known:
-    """What a case does when nothing disturbs it."""
+    """The result of a case without a disturbance."""
 
     old: Path
     old_files: Snapshot
@@ -147,7 +147,7 @@ def _import_everything() -> None:
 
 
 def _run_once(inputs: Path) -> None:
-    """A convert and a plot in this process: what the first command of a process sets up, its children find done."""
+    """Run a convert and a plot in this process, so that its children find the set-up of a first command done."""
     for words in (
         ("convert", f"{inputs}/1.csv", f"{inputs}/first.csv", "--force"),
         ("signature", "show", f"{inputs}/a.json", "--plot", f"{inputs}/first.png"),
@@ -190,7 +190,7 @@ def _measure(folder: Path, calls: Any, options: argparse.Namespace) -> int:
                 strike = _kill(rng, of_case, calls) if what == "kills" else _fault(rng, of_case)
                 problem, struck = _try(case, of_case, strike, folder / "out", calls)
                 if not struck:
-                    continue  # the command had ended before
+                    continue  # the command had already ended
                 tried += 1
                 if tried % 25 == 0:
                     print(f"{tried} {what}, {len(wrong)} wrong", file=sys.stderr, flush=True)
@@ -235,13 +235,13 @@ def _undisturbed(case: Case, old: Path, out: Path, calls: Any) -> Known:
 
 
 def _differing(contents: list[bytes]) -> set[int]:
-    """Where runs differ (the time of writing), and the bytes around."""
+    """Return where runs differ (the time of writing), and the bytes around."""
     places = {at for at in range(min(map(len, contents))) if len({content[at] for content in contents}) > 1}
     return {at + shift for at in places for shift in range(-8, 9)}
 
 
 def masked(files: Snapshot, masks: dict[str, set[int]]) -> Snapshot:
-    """The files without what differs from run to run."""
+    """Return the files without the parts that differ from run to run."""
     return {
         name: (mode, bytes(0 if at in masks[name] else byte for at, byte in enumerate(content)))
         if masks.get(name)

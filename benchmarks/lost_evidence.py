@@ -1,7 +1,7 @@
-"""What a fault at a contact may cost: its own length and 20 ms, but for what of the contact lay within it.
+"""Limit the cost of a fault at a contact: its own length and 20 ms, unless part of the contact was in it.
 
-A method cannot see what was never logged. Three questions tell whether that is why a contact was found late; none asks
-what a detector or threshold made of the fault, so that none can excuse itself.
+A method cannot detect what was not logged. Three checks determine whether this is why a contact was found late; none
+uses the results of a detector or threshold on the damaged log.
 
 * The load cell: outside the fault, did the contact press as hard and as long (peak and impulse of the force) within the
   time allowed as it had within the whole log when that alarmed?
@@ -13,7 +13,7 @@ what a detector or threshold made of the fault, so that none can excuse itself.
   behind it (a pulse summed up, a rise that a filter followed). In such a log no sample is missing, yet it shows no more
   than the damaged one: where a method is late in it, what is left of the contact does not suffice for that method.
 
-Nor is a contact late that the whole log itself finds so late with limits 5 % wider: its alarm hung by a hair.
+A contact that the whole log itself finds as late with limits 5 % wider does not count either: its alarm was marginal.
 """
 
 from __future__ import annotations

@@ -3,18 +3,18 @@
     python benchmarks/lost_samples.py --machines gate      # 300 runs to learn from, 300 to judge; 40 minutes a machine
     python benchmarks/lost_samples.py --learn 30 --judge 30 --machines gate --detectors friction_ekf
 
-Simulated impact-free runs teach each threshold; its safety factor is that of one alarming operation in 100 (or one of
-those learned from, where they are fewer), set on each half of them by what the other half teaches. Other impact-free
-runs are judged twice: as they are, and with 10 faults each (lost rows, repeated stamps, NaN or lost samples of one
-channel, 1 to 50 samples long). Counted are the runs that alarm only with their faults, and only without: an exact test
-of one side says whether faults add alarms, Holm's method keeps all the tests of a call together at 5 %. Each cell is
-tried with the default debounce and with none.
+Each threshold is learned from simulated impact-free runs; its safety factor is that of one alarming operation in 100
+(or one of those learned from, if they are fewer), set on each half of them with the other half. Other impact-free
+runs are tested twice: unchanged, and with 10 faults each (lost rows, repeated stamps, NaN or lost samples of one
+channel, 1 to 50 samples long). Counted are the runs that alarm only with their faults, and only without: a one-sided
+exact test shows whether faults add alarms, and Holm's method keeps all tests of a call together at 5 %. Each cell is
+tested with the default debounce and without.
 
 Contacts: a fault within half a second of the onset, or at the onset (before, across and after it), may cost its own
-length and 20 ms of latency. Where the contact itself lay in the fault the evidence is lost, and where the whole log
-alarms by a hair there is nothing to compare: counted apart, by what lost_evidence.py says. The share of time that is
-judged in damaged runs is shown, too. Progress goes to stderr.
-Exit status 1 where a test fails, or where more than `--late` of all contacts take too long.
+length and 20 ms of latency. If the contact itself was in the fault, the evidence is lost, and if the whole log's alarm
+is marginal, there is nothing to compare: both are counted separately, see lost_evidence.py. The share of assessable
+time in damaged runs is shown, too. Progress goes to stderr. Exit status 1 if a test fails, or if more than `--late` of
+all contacts take too long.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ MACHINES: Mapping[str, tuple[Any, Any]] = {
 
 @dataclass(frozen=True)
 class RememberedActivation(Activation):
-    """An activation that keeps the debounce of each clock."""
+    """An activation that stores the debounce of each clock."""
 
     kept: dict[tuple[int, int], Any] = field(default_factory=dict, compare=False)
 
@@ -80,7 +80,7 @@ class RememberedActivation(Activation):
 
 @dataclass(frozen=True)
 class RememberedInnovations(Whitening):
-    """A whitening that keeps the innovations of each signal: three thresholds ask for the same, several times."""
+    """A whitening that stores the innovations of each signal: three thresholds use the same ones."""
 
     kept: dict[tuple[int, bytes], Signal] = field(default_factory=dict, compare=False)
 
@@ -137,7 +137,7 @@ class Cell:
 
     @property
     def late(self) -> int:
-        """Those that cost more than they may, missed ones included."""
+        """Return those that cost more than allowed, including missed ones."""
         return self.outcomes.get("late", 0) + self.outcomes.get("missed", 0)
 
     def __str__(self) -> str:
@@ -194,7 +194,7 @@ def bench_of(name: str, options: argparse.Namespace) -> Bench:
 
 
 def at_contact(raw: Recording, onset: float, close: bool, rng: np.random.Generator) -> Fault:
-    """A fault within half a second of the onset; `close`: ends just before it, holds it, or begins soon after it."""
+    """Return a fault within half a second of the onset; `close`: just before it, across it, or soon after it."""
     fault = random_faults(raw, 1, rng)[0]
     length = fault.count * raw["speed"].period
     first, last = (-length - 0.005, 0.02) if close else (-0.5, 0.5)
@@ -251,7 +251,7 @@ def judged_cells(
     activations: Sequence[Activation],
     runs: tuple[Sequence[Pair], Sequence[Pair], Sequence[Pair], Sequence[Any]],
 ) -> list[Cell]:
-    """One detector with one threshold: each log is judged once, whatever the debounce; limits follow by the factor."""
+    """Test one detector with one threshold: each log is evaluated once for all debounces; limits scale."""
     learned, whole, spoilt, contacts = runs
 
     def judged(fitted: Sequence[Any], pair: Pair) -> Detection:
@@ -287,7 +287,7 @@ def judged_cells(
 
 
 def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact, name: str) -> None:
-    """Add a contact to the cell's outcomes; what is late, or may be, is reported on stderr."""
+    """Add a contact to the cell's outcomes; late or possibly late ones are reported on stderr."""
     if cost is None:
         return
     cell.outcomes[cost.outcome] = cell.outcomes.get(cost.outcome, 0) + 1
@@ -304,7 +304,7 @@ def count_contact(cell: Cell, cost: Cost | None, fault: Fault, contact: Contact,
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print every cell as soon as it is through, then the tests."""
+    """Print every cell as soon as it is finished, then the tests."""
     print(f"== lost samples, seed {options.seed}, {options.learn} runs learned from, {options.judge} judged")
     print(f"{environment()}\n", flush=True)
     cells = []

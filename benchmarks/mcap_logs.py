@@ -1,4 +1,4 @@
-"""The files that reading MCAP is timed on: four topics at 1 kHz as a robot's log has them, in each encoding.
+"""The files for timing MCAP reading: four topics at 1 kHz like a robot's log, in each encoding.
 
 Written with the `mcap` package, its usual chunks of 1 MiB. CDR messages are a template of `mcap-ros2-support` with the
 numbers put into their places.
@@ -37,7 +37,7 @@ TOPICS: Mapping[str, tuple[str, Mapping[str, int]]] = {
     "/force": ("std_msgs/msg/Float64", {"data": 0}),
 }
 _FIELDS = dict(TOPICS.values())  # by type
-# What is asked for of each topic.
+# The fields read from each topic.
 WANTED = (
     *(("/joint_states", f"{name}[:]") for name in ("position", "velocity", "effort")),
     ("/imu", "linear_acceleration.x"),
@@ -83,7 +83,7 @@ def _signal(rng: np.random.Generator, count: int, size: int) -> Array:
 
 def _cdr(kind: str, values: Mapping[str, Array], count: int) -> tuple[tuple[str, bytes], Iterator[bytes]]:
     text = DEFINITIONS[kind].text
-    # Numbers that occur nowhere else show where each field lies.
+    # Unique numbers show the position of each field.
     places = {name: np.arange(array[0].size) + 1e6 * (k + 1) + 0.5 for k, (name, array) in enumerate(values.items())}
     message = _nested(
         {name: place.tolist() if values[name].ndim == 2 else float(place[0]) for name, place in places.items()}

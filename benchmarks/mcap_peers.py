@@ -1,4 +1,4 @@
-"""The packages that reading MCAP is timed against: each decodes message by message and picks the same numbers."""
+"""The packages that MCAP reading is compared with: each decodes message by message and reads the same numbers."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def by_protobuf(path: Path) -> Columns:
 
 
 def decompression(path: Path) -> Callable[[], None]:
-    """Decompressing every chunk, held in memory already, with its package and nothing else."""
+    """Decompress every chunk, already in memory, with only its package."""
     import lz4.frame
     import zstandard
 

@@ -39,7 +39,7 @@ _FIGURES = ("VmHWM", "RssAnon", "RssFile")
 
 @dataclass(frozen=True)
 class Peak:
-    """Most memory [MB] of a process: in all, its own, of files; and how long it ran [s]."""
+    """Peak memory [MB] of a process: total, its own, of files; and its run time [s]."""
 
     whole: float
     own: float
@@ -110,7 +110,7 @@ def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
 
 
 def _peak(arguments: Sequence[str]) -> Peak:
-    """A command in a fresh process; stops the benchmark where it fails."""
+    """Run a command in a new process; stop the benchmark if it fails."""
     package = str(Path(cdtool.__file__).parents[1])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, os.environ.get("PYTHONPATH"))))}
     begin = perf_counter()
@@ -131,7 +131,7 @@ def _peak(arguments: Sequence[str]) -> Peak:
 
 
 def _status(number: int) -> dict[str, int]:
-    """Kilobytes of a process; nothing of one that has just ended."""
+    """Return the kilobytes of a process; empty if it has just ended."""
     try:
         lines = Path(f"/proc/{number}/status").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,7 +1,7 @@
-"""The long logs that memory is measured on: a gate's joint and sensors at 1 kHz beside a camera, which fills the rest.
+"""The long logs for measuring memory: a gate's joint and sensors at 1 kHz with a camera, which fills the rest.
 
-The samples are those of a recording of the simulated gate, over and over; the images are noise, which no compression
-makes smaller. `mcap` writes them, its usual chunks of 1 MiB.
+The samples are those of a recording of the simulated gate, repeated; the images are noise, which cannot be compressed.
+`mcap` writes them in its usual chunks of 1 MiB.
 """
 
 from __future__ import annotations

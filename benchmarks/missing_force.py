@@ -1,17 +1,17 @@
-"""Load-cell samples that are missing: is a latency ever wrong without a mark, does a force ever pass that nobody saw?
+"""Missing load-cell samples: is a latency ever wrong without a mark, or does an unmeasured force ever pass?
 
     python benchmarks/missing_force.py                     # 100 contacts of each of two seeds, 40 faults each
     python benchmarks/missing_force.py --seeds 5 --contacts 20 --faults 10
 
-Contacts of the simulated gate, and drawn ones: half sines of 8 to 250 ms with rebounds and a push that stays, on cells
-of 60 Hz to 1 kHz with and without jitter of their clock, noise, drift and either sign. Each is read whole and with
-faults: one to three holes of 1 ms to 1.5 s at places drawn about the contact, as NaN or as samples that are not there,
-or single samples lost at random (2 %), never two consecutive ones.
+Contacts of the simulated gate, and random ones: half sines of 8 to 250 ms with rebounds and a continuing push, on cells
+of 60 Hz to 1 kHz with and without clock jitter, noise, drift and both signs. Each is read whole and with faults: one to
+three holes of 1 ms to 1.5 s at random positions about the contact, as NaN or as missing samples, or single samples lost
+at random (2 %), never two consecutive ones.
 
-Wrong is an onset that lies farther from that of the whole log than the contact says (its uncertainty before it, its
-resolution around it), unless the contact is not assessable; and a force verdict of pass where that of the whole log is
-none. The limits are drawn about the peak. Counted as well: how often single lost samples change an answer that stood.
-Ends with 1 where anything is wrong, or where single lost samples cost more than 2 % of the answers.
+An error is an onset farther from that of the whole log than the contact states (its uncertainty before it, its
+resolution around it), unless the contact is not assessable; and a pass of a force verdict that the whole log does not
+pass. The limits are random about the peak. Also counted: how often single lost samples change a valid result. Exits
+with 1 if there is an error, or if single lost samples change more than 2 % of the results.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from timing import environment, table
 
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
@@ -36,7 +36,7 @@ from cdtool.simulation.gate_recordings import IMPACT_OF
 SEEDS = (921, 922)
 CONTACTS, FAULTS = 100, 40
 WINDOW = 1.0
-# Single lost samples may cost so many of the answers.
+# Largest share of results that single lost samples may change.
 COST = 0.02
 KINDS = ("NaN", "no rows", "single samples")
 
@@ -53,7 +53,7 @@ class Cell:
 
 @dataclass
 class Count:
-    """What became of the faults of one kind."""
+    """The outcomes of the faults of one kind."""
 
     faults: int = 0
     seen: int = 0
@@ -128,7 +128,7 @@ def recording(series: Series, clock: FloatArray) -> Recording:
 
 
 def is_wrong(found: Contact, true: Contact) -> bool:
-    """Whether an onset is farther from the true one than it says."""
+    """Whether an onset is farther from the true one than it states."""
     slack = found.resolution + true.resolution
     return not found.start - found.uncertainty - slack <= true.start <= found.start + slack
 
@@ -181,11 +181,11 @@ def _compare(
 
 def _verdict(part: Recording, contacts: Sequence[Contact], number: int, profile: ForceProfile) -> str:
     until = contacts[number + 1].start if number + 1 < len(contacts) else float("inf")
-    return judge(force_course(part, contacts[number], 0.0, until), profile).outcome
+    return judge(force_time_curve(part, contacts[number], 0.0, until), profile).outcome
 
 
 def main() -> int:
-    """Print the table; 1 where something is wrong."""
+    """Print the table; return 1 if there is an error."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--contacts", type=int, default=CONTACTS, help="contacts of each seed")

@@ -1,6 +1,6 @@
 """Every benchmark but thresholds.py, signature_coverage.py and lost_samples.py (10 minutes to hours), a process each.
 
-Ends with status 1 where a target is not held.
+Exits with status 1 if a target is not met.
 
 python benchmarks/run_all.py
 """

@@ -1,13 +1,14 @@
-"""Does the chance of a false alarm that `cdtool signature check` predicts come true?
+"""Is the false-alarm probability predicted by `cdtool signature check` right?
 
     python benchmarks/signature_coverage.py            # seeds 701 702 703 704, about ten minutes
     python benchmarks/signature_coverage.py 705        # another
 
 Simulated gate and arm (trial 1), generalized momentum and friction EKF, each seed: signatures of 14 and of 40 runs from
-200 impact-free runs, none in two of them, and 200 others. Of each signature's runs alone, left out one by one, the
-safety factor is predicted that one operation in 10, 30, 100, 300 or 1000 exceeds; counted is how many of the 200
-others do. Three ways to take the critical factors: as normal (Student's prediction), as Gumbel, and as the sum of both
-with equal variances, which cdtool uses.
+Simulated gate and arm (trial 1), generalized momentum and friction EKF, each seed: signatures of 14 and of 40 runs from
+200 impact-free runs, no run used twice, and 200 others. From each signature's own runs, left out one by one, the safety
+factor is predicted that one operation in 10, 30, 100, 300 or 1000 exceeds; then the alarms among the 200 others are
+counted. Three distributions of the critical factors: normal (Student's prediction), Gumbel, and the sum of both with
+equal variances, which cdtool uses.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ SIZES = (14, 40)
 DETECTORS = ("gm", "feekf")
 TARGETS = (1 / 10, 1 / 30, 1 / 100, 1 / 300, 1 / 1000)
 SHARES = {"normal": 0.0, "sum": GUMBEL_SHARE, "gumbel": 1.0}
-# Asked: the sum keeps these targets over all cells together, and none of the cells is this much above them.
+# Requirement: the sum meets these targets over all cells together, and no cell exceeds them by this much.
 ASKED = (1 / 100, 1 / 300)
 ONE_CELL = 2.0
 
@@ -64,7 +65,7 @@ class Cell:
 
 
 def main(seeds: tuple[int, ...]) -> int:
-    """Print every cell; 0 if the sum of both keeps the targets asked."""
+    """Print every cell; return 0 if the sum of both meets the required targets."""
     print(f"== predicted chance of a false alarm, seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
     found = [cell for title in BENCHES for cell in cells_of(title, seeds)]
     for target in TARGETS:
@@ -121,7 +122,7 @@ def measured(setup: BenchmarkFile, pools: Sequence[Sequence[Pair]], size: int, t
 
 
 def kept(found: Sequence[Cell], target: float) -> bool:
-    """Print whether the sum keeps a target."""
+    """Print whether the sum meets a target."""
     shares = [cell.shares[target, "sum"] for cell in found]
     good = float(np.mean(shares)) <= target and max(shares) <= ONE_CELL * target
     worst = f"mean {1000 * np.mean(shares):.1f}, worst cell {1000 * max(shares):.1f} of 1000"

@@ -1,7 +1,7 @@
-"""Start-up: `cdtool --help` against a bare typer app, one `cdtool detect` with its plot, and cold compilation.
+"""Start-up: `cdtool --help` compared with a bare typer app, one `cdtool detect` with its plot, and cold compilation.
 
-Every figure is that of a fresh process. The bare app has as many commands and subcommands with as many options as
-cdtool has now, and is started in the same way.
+Every number is that of a new process. The bare app has as many commands, subcommands and options as cdtool has now, and
+is started in the same way.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _environment(folder: Path) -> dict[str, str]:
 
 
 def _run(arguments: Sequence[str], environment: dict[str, str]) -> str:
-    """Output of a fresh Python; stops the benchmark where it fails."""
+    """Return the output of a new Python process; stop the benchmark if it fails."""
     done = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"error: {' '.join(arguments[-4:])}: status {done.returncode}\n{done.stderr}")
@@ -138,7 +138,7 @@ def _bare_app() -> tuple[str, int, int]:
         "",
         "@app.callback()",
         f"def root({_parameters(2)}) -> None:",
-        '    """How fast, how surely and at which force does it notice that it has hit something?"""',
+        '    """Measure how quickly, how reliably and at which force a collision is detected."""',
     ]
     commands = options = 0
     for name, command in _members(typer.main.get_command(app)):

@@ -12,8 +12,8 @@
   the main thread is recorded.
 * **Import cycles.** Groups of modules that import one another, directly or through others; imports for the type checker
   count. Imports inside functions close further cycles, which are counted separately.
-* **Single callers.** Modules that only one module imports, where that module stands in the same folder. A module that a
-  table names in a string (`"cdtool.detectors.momentum:Momentum"`) is registered and does not count.
+* **Single callers.** Modules that only one module imports, if it is in the same folder. A module that a table names in
+  a string (`"cdtool.detectors.momentum:Momentum"`) is registered and does not count.
 * **Code lines.** Lines without docstrings, comments, blank lines and imports.
 * **Complexity.** Functions above ruff's C901 (10) or PLR0913 (7); compiled kernels are left out, `noqa` is ignored.
 """
@@ -184,7 +184,7 @@ def _reached(graph: Mapping[str, set[str]], start: str) -> set[str]:
 
 
 def single_callers(modules: Mapping[str, Module], imports: Iterable[Import]) -> list[tuple[str, str]]:
-    """Modules that only one other module imports, which stands in the same folder, as (caller, module)."""
+    """Return modules that only one other module imports, from the same folder, as (caller, module)."""
     callers: dict[str, set[str]] = defaultdict(set)
     registered = set()
     for item in imports:
@@ -217,7 +217,7 @@ def code_lines(module: Module) -> int:
 
 
 def _is_docstring(node: ast.AST) -> bool:
-    """A string that is a statement of its own documents what stands before it, and runs nothing."""
+    """Whether a string is a statement by itself, which documents the code before it and runs nothing."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 

@@ -1,4 +1,4 @@
-"""Every threshold with every detector of the gate and arm benchmarks, at one false-alarm budget, beside the bound.
+"""Every threshold with every detector of the gate and arm benchmarks, at one false-alarm budget, with the bound.
 
     python benchmarks/thresholds.py              # seed 901, all machines, about 40 minutes
     python benchmarks/thresholds.py 902 gate     # another seed, one machine: gate, T1, T2
@@ -52,7 +52,7 @@ BENCHES: Mapping[str, tuple[Any, Any]] = {
     "T1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
     "T2": (partial(write_arm_recordings, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
 }
-# Thresholds that whiten alike: the same signature, the same order.
+# Thresholds with the same whitening: the same signature, the same order.
 WHITENING = ("innovation", "cusum", "glr")
 DEBOUNCE_1 = "cusum, debounce 1"
 
@@ -115,7 +115,7 @@ class Row:
         return mean(self.latencies[group]) if self.latencies[group] else math.nan
 
     def late(self, group: str) -> float:
-        """The latency that 95 % of the contacts keep to [ms]; infinite where more are missed."""
+        """Return the latency met by 95 % of the contacts [ms]; infinite if more are missed."""
         every = [*self.latencies[group], *[math.inf] * self.missed[group]]
         return float(np.quantile(every, 0.95, method="inverted_cdf")) if every else math.nan
 
@@ -209,7 +209,7 @@ def print_rows(item: Study) -> None:
 
 
 def print_check(studies: Sequence[Study]) -> None:
-    """How many cells keep the budget on the hold-out runs, and how many would by chance alone."""
+    """Print how many cells meet the budget on the hold-out runs, and how many would by chance."""
     rows = [(f"{item.machine} {item.detector}", row) for item in studies if item.limit for row in item.rows]
     failing = [f"{who} {row.title} {row.alarming}" for who, row in rows if row.p <= LEAST_P]
     # Just above the c-th largest of n critical factors the true rate is distributed as Beta(c, n + 1 - c).

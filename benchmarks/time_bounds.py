@@ -1,9 +1,8 @@
-"""Do hostile and large inputs take less time than is promised?
+"""Do hostile and large inputs take less time than promised?
 
-The tests do the work and note what it took (tests/noted_times.py), but are not timed themselves; this script runs the
-files of these tests one after the other, on a machine that does nothing else, and ends with status 1 where a bound is
-broken or a test fails. Seconds are processor time, and in tests of archives that unpack to gigabytes those of the
-clock.
+The tests do the work and record the time (tests/noted_times.py), but have no time limits; this script runs the files of
+these tests one by one, on an otherwise idle machine, and exits with status 1 if a bound is violated or a test fails.
+Seconds are processor time, and in tests of archives that unpack to gigabytes wall-clock time.
 
 python benchmarks/time_bounds.py
 """
@@ -28,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def files_that_note() -> list[str]:
-    """The test files that note times."""
+    """Return the test files that record times."""
     found = (path for path in sorted((ROOT / "tests").rglob("*.py")) if path.name.startswith("test_"))
     return [str(path.relative_to(ROOT)) for path in found if "tests.noted_times" in path.read_text(encoding="utf-8")]
 
@@ -44,7 +43,7 @@ def longest(noted: Iterable[dict[str, Any]]) -> list[tuple[str, float, float]]:
 
 
 def main() -> int:
-    """Run the tests and print what each took; 1 where a bound is broken or a test fails."""
+    """Run the tests and print their times; return 1 if a bound is violated or a test fails."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "times.jsonl"

@@ -1,6 +1,6 @@
-"""Interleaved timing: A B A B ..., so that whatever else the machine does falls on both alike.
+"""Interleaved timing: A B A B ..., so that other load on the machine affects both equally.
 
-Only ratios of one run count. A ratio is taken pair by pair (each B beside the A of the same round) and shown as the
+Only ratios of one run count. A ratio is taken pair by pair (each B with the A of the same round) and shown as the
 median with the smallest and the largest pair.
 """
 
@@ -20,7 +20,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, smallest and largest of several figures."""
+    """Return median, smallest and largest of several numbers."""
 
     median: float
     low: float
@@ -57,7 +57,7 @@ def ratio(over: Sequence[float], under: Sequence[float]) -> Spread:
 
 
 def environment() -> str:
-    """Processor, cores, load, Python and the libraries that matter: without it no ratio says anything."""
+    """Return processor, cores, load, Python and the relevant libraries, without which a ratio is meaningless."""
     machine = [_processor(), f"{os.cpu_count()} cores"]
     if hasattr(os, "getloadavg"):
         machine.append(f"load {os.getloadavg()[0]:.1f}")
@@ -80,7 +80,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
 
 
 def verdict(name: str, spread: Spread, target: float, at_most: bool = False) -> bool:
-    """Print whether the median of a ratio holds its target; returns it."""
+    """Print whether the median of a ratio meets its target; return it."""
     held = spread.median <= target if at_most else spread.median >= target
     wanted = f"{'at most' if at_most else 'at least'} {target:g}"
     print(f"{'ok  ' if held else 'FAIL'}  {name}: {spread} wanted {wanted}")
@@ -88,7 +88,7 @@ def verdict(name: str, spread: Spread, target: float, at_most: bool = False) -> 
 
 
 def main(title: str, measure: Callable[[], bool]) -> None:
-    """Print title and environment, run the question, leave with status 1 where a target is not held."""
+    """Print title and environment, run the benchmark, exit with status 1 if a target is not met."""
     print(f"== {title}\n{environment()}", flush=True)
     sys.exit(0 if measure() else 1)
 

@@ -3,11 +3,11 @@
     python benchmarks/without_reference.py                 # seeds 601 602 603 604 605
     python benchmarks/without_reference.py --impacts 2 701
 
-The simulated gate and both trials of the simulated arm are learned from and hit twice with the same seeds: once as they
-log their references, once with the four measured channels alone. Every detector but desired dynamics, which needs a
+The simulated gate and both trials of the simulated arm are learned from and hit twice with the same seeds: once with
+logged references, once with only the four measured channels. Every detector except desired dynamics, which needs a
 reference, must show the same order and means within 5 % or one sample, and no contact may be not assessable because of
-the class of motion. Then the gate is hit at 0.05 to 0.3 m of travel, while it still accelerates or just has. Ends with
-1 where one of these is not so.
+the class of motion. Then the gate is hit at 0.05 to 0.3 m of travel, during or just after its acceleration. Exits with
+1 if a requirement is not met.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every command that writes, as it is killed and made to fail: its arguments, and what was there before."""
+"""Every command that writes, for kills and failing calls: its arguments, and the previous files."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""cdtool: how fast, how surely and at which force does a machine notice that it has hit something?
+"""cdtool: measure how quickly, how reliably and at which contact force a machine detects a collision.
 
-What a command does, a notebook does in one line:
+Every command is available as a function:
 
     cdtool.read("run.csv", "machine.toml")                              -> Recording
-    cdtool.init("run.csv")                                              -> a draft of machine.toml
-    cdtool.convert("run.csv", "run.parquet", "machine.toml")            -> what was written
-    cdtool.recover("damaged.mcap", "clean.mcap")                        -> what was left and what was lost
+        cdtool.init("run.csv")                                              -> Drafted: a draft of machine.toml
+        cdtool.convert("run.csv", "run.parquet", "machine.toml")            -> Converted
+        cdtool.recover("damaged.mcap", "clean.mcap")                        -> Recovered
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused

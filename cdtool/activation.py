@@ -1,4 +1,4 @@
-"""Statistic x band -> alarms: debounce and re-arming. The same logic for every detector and threshold."""
+"""Derive alarms from a statistic and its band by debounce and re-arming, identically for all detectors."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
-# Without a number of samples, an alarm needs this long outside the band [s]: 9 samples at 1 kHz.
+# Default time outside the band before an alarm [s]: 9 samples at 1 kHz.
 DEBOUNCE_TIME = 9e-3
-# Samples that are looked at first for when an alarm is armed again.
+# Number of samples searched first for the re-arming of an alarm.
 _LOOKED_AT = 4096
 _MOST_DEBOUNCE = 1_000_000_000
 
 
 class ActivationSettings(TypedDict, total=False):
-    """Settings of an Activation that are to differ; None leaves one as it is."""
+    """Settings that differ from those of an Activation; None leaves a setting unchanged."""
 
     debounce: int | None
     rearm: float | None
@@ -34,12 +34,13 @@ class ActivationSettings(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Activation:
-    """`debounce` consecutive samples outside the band raise an alarm; `rearm` seconds inside arm it again.
+    """Settings: `debounce` consecutive samples outside the band raise an alarm; `rearm` seconds inside re-arm it.
 
-    A missing sample is skipped: it neither counts nor breaks the succession, so that a flaky sensor cannot hide a
-    contact. A sample where the method does not apply breaks it. The alarm's time is that of the last sample counted.
-    `hysteresis` h: inside counts only within the band of (1 - h) times the safety factor, so that a signal that dwells
-    at its limit is one alarm. `latch`: a joint's alarm stands until the operation ends and is its only one.
+    A missing sample is skipped: it neither counts nor interrupts the sequence, so that a flaky sensor cannot hide a
+    contact. A sample to which the method does not apply interrupts it. The alarm's time is that of the last sample
+    counted. `hysteresis` h: only samples within the band of (1 - h) times the safety factor count as inside, so that a
+    signal at its limit raises a single alarm. `latch`: a joint's alarm remains until the operation ends and is its only
+    one.
     """
 
     debounce: int | None = None
@@ -49,20 +50,26 @@ class Activation:
 
     def __post_init__(self) -> None:
         if self.debounce is not None and not 1 <= self.debounce <= _MOST_DEBOUNCE:
-            raise UsageError(f"debounce is {self.debounce}", f"a whole number of samples, from 1 to {_MOST_DEBOUNCE}")
+            raise UsageError(
+                f"debounce is {self.debounce}", f"give a whole number of samples from 1 to {_MOST_DEBOUNCE}"
+            )
         if not 0.0 <= self.rearm < math.inf:
-            raise UsageError(f"rearm is {self.rearm:g}", "seconds, at least 0; latch: an alarm is never armed again")
+            raise UsageError(
+                f"rearm is {self.rearm:g}", "give seconds, at least 0; with latch an alarm is never re-armed"
+            )
         if not 0.0 <= self.hysteresis < 1.0:
-            raise UsageError(f"hysteresis is {self.hysteresis:g}", "a share of the safety factor, from 0 to below 1")
+            raise UsageError(
+                f"hysteresis is {self.hysteresis:g}", "give a share of the safety factor, from 0 to below 1"
+            )
 
     @property
     def wait(self) -> float:
-        """Seconds inside after which an alarm is armed again; infinite where it latches."""
+        """Return the seconds inside the band after which an alarm is re-armed; infinite if it latches."""
         return math.inf if self.latch else self.rearm
 
     @property
     def described(self) -> dict[str, int | float | bool | None]:
-        """The settings as they stand in results: the default debounce is None."""
+        """Return the settings as stored in results; None for the default debounce."""
         return {
             "debounce_samples": self.debounce,
             "rearm_s": self.rearm,
@@ -71,12 +78,12 @@ class Activation:
         }
 
     def changed(self, settings: ActivationSettings) -> Activation:
-        """The same with what is given in `settings`."""
+        """Return the activation changed by `settings`."""
         given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
         return replace(self, **given)
 
     def samples(self, period: float) -> int:
-        """Return the debounce in samples for a signal of that period [s]: to name it, see `needed` for what counts."""
+        """Return the nominal debounce in samples for a signal of that period [s]; `needed` has the actual one."""
         if self.debounce is not None:
             return self.debounce
         return max(1, round(DEBOUNCE_TIME / period)) if period > 0.0 else 1
@@ -84,7 +91,7 @@ class Activation:
     def needed(self, time: FloatArray) -> npt.NDArray[np.int64]:
         """Return the debounce in samples (n,) at each time [s] of a signal, from the sample period so far.
 
-        At the first sample, before which there is no period, one more than a single sample is needed.
+        The first sample, before which no period is known, never suffices.
         """
         if self.debounce is not None:
             return np.full(len(time), self.debounce, dtype=np.int64)
@@ -97,10 +104,10 @@ class Activation:
     def alarms(
         self, statistic: Signal, band: Band, inner: Band | None = None, begins: Sequence[float] = ()
     ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Alarms, and all crossings (debounced exits from the band, armed or not), in order of time over all joints.
+        """Return alarms and all crossings (debounced exits from the band, armed or not) of all joints, in time order.
 
-        `inner`: the band within which an alarm is armed again, where there is hysteresis; `begins` [s]: where an
-        operation begins, armed whatever was before.
+        `inner`: the band within which an alarm is re-armed, with hysteresis; `begins` [s]: start of operations, at
+        which every alarm is re-armed.
         """
         needed = self.needed(statistic.time)
         fresh = begins_at(statistic.time, begins)
@@ -134,7 +141,7 @@ class Activation:
         inner: Band | None = None,
         begins: Sequence[float] = (),
     ) -> tuple[float, ...]:
-        """When each of its alarms was armed again [s], by the rule of `alarms`; infinite where it never was."""
+        """Return when each of its alarms was re-armed [s], by the rule of `alarms`; infinite if it was not."""
         fresh = statistic.time[begins_at(statistic.time, begins)].tolist()
         again = []
         for alarm in alarms:
@@ -143,7 +150,7 @@ class Activation:
         return tuple(again)
 
     def _calm_again(self, statistic: Signal, band: Band, alarm: Alarm, inner: Band | None) -> float:
-        """When the value had been inside for long enough after an alarm [s]; most are calm again soon."""
+        """Return when the value had been inside for long enough after an alarm [s]; usually soon after it."""
         first, count, length = int(np.searchsorted(statistic.time, alarm.time)), len(statistic.time), _LOOKED_AT
         while math.isfinite(self.wait):
             rows = slice(first, min(first + length, count))
@@ -160,7 +167,7 @@ class Activation:
         if inner is not None:
             outside |= (value > inner.upper[known, joint]) | (value < inner.lower[known, joint])
         outside &= statistic.status[known, joint] == Status.VALID
-        # Of each sample inside, the first one since the value was last outside.
+        # For each sample inside, the first one since the value was last outside.
         places = np.arange(len(known))
         since = np.minimum(np.maximum.accumulate(np.where(outside, places, -1)) + 1, len(known) - 1)
         armed = np.flatnonzero(~outside & (places > since) & (time - time[since] >= self.wait))
@@ -188,7 +195,7 @@ def crossings_of(
     rearm: float,
     fresh: BoolArray,
 ) -> tuple[npt.NDArray[np.int64], BoolArray]:
-    """The samples at which one joint's debounced exits from the band are raised, and whether each was armed.
+    """Return the samples at which a joint's debounced exits from the band are raised, and whether each was armed.
 
     `calm`: where the value is far enough inside to count towards the `rearm` seconds; `needed` (n,): the debounce in
     samples; `fresh`: where an operation begins.
@@ -201,7 +208,7 @@ def crossings_of(
 
 
 @kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64[::1], float64, b1[::1], int64[::1], b1[::1])")
-def _activate(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
+def _activate(  # noqa: PLR0913  kernels take arrays and scalars separately
     time: FloatArray,
     outside: BoolArray,
     calm: BoolArray,
@@ -235,7 +242,7 @@ def _activate(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
             continue
         count = 0
         raised = False
-        # Where the value cannot be judged it is not known to be outside: that time counts as before.
+        # A value that is not assessable is not known to be outside: that time counts as before.
         if status[k] == Status.VALID and not calm[k]:
             inside = False
         elif not inside:

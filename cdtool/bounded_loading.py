@@ -1,8 +1,9 @@
-"""The one way in which cdtool reads TOML, JSON, gzip and small text files: bounded in size, depth, memory and numbers.
+"""Read TOML, JSON, gzip and small text files with bounds on size, depth, memory and numbers.
 
-Conventions: a fault of the file itself (missing, no regular file, too large) is raised as the caller's own error, with
-the path. A fault of its contents is a ContentError: its text is the reason, and the caller names the file and the next
-step. No bound is reached by a file that cdtool or a person writes; a hostile one is refused before it takes the memory.
+Conventions: an error of the file itself (missing, not a regular file, too large) is raised as the caller's error class,
+with the path. An error of its contents is a ContentError: its text is the reason, and the caller adds the file and the
+next step. Files written by cdtool or by a person stay within all bounds; a hostile file is refused before it uses the
+memory.
 """
 
 from __future__ import annotations
@@ -23,21 +24,21 @@ import numpy as np
 from cdtool.errors import CdtoolError
 
 MIB = 2**20
-# Text that a person writes: a machine, benchmark, label or trigger file, a URDF.
+# Text written by a person: a machine, benchmark, label or trigger file, a URDF.
 MOST_TEXT = 16 * MIB
 MOST_TOML = 4 * MIB
-# Results, signatures and traces, as they are on disk and unpacked.
+# Results, signatures and traces, on disk and unpacked.
 MOST_JSON = 512 * MIB
 MOST_DEPTH = 64
 MOST_KEY_PARTS = 32
 _MOST_TOML_WORDS = 200_000
 _MOST_TOML_ENTRIES = 50_000
 _MOST_WORD = 1000
-# What JSON needs as Python values, from above: bytes a character (as bytes and as text), an element, a list, an object.
+# Upper bound of the memory for JSON as Python values: bytes per character (as bytes and text), element, list, object.
 _PER_CHARACTER, _PER_ELEMENT, _PER_LIST, _PER_OBJECT = 2, 40, 60, 200
-# A file may need this much, and so many times its size on disk; what needs more was made to need more.
+# A file may need this much memory, and this multiple of its size on disk; only hostile files need more.
 _FREE, _RATIO = 160 * MIB, 16
-# A file of traces is some 8 times larger unpacked, and its numbers need 9 times as much as their digits.
+# Traces are about 8 times larger unpacked, and their numbers need 9 times the memory of their digits.
 _PACKED_RATIO = 100
 _PIECE = MIB
 _MOST_DIGITS = 19
@@ -53,28 +54,28 @@ _TOML_TOKEN = re.compile(
     r"|(?P<mark>.)",
     re.DOTALL,
 )
-# The end is optional: of a text that does not end, the rest is looked at once, and not again from each of its quotes.
+# The end is optional: the rest of an unterminated text is searched only once, not from each of its quotes.
 _JSON_TEXT = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
 _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 
 
 class ContentError(ValueError):
-    """What a file holds is not what it should be; the text is the reason, on one line, without the file's name."""
+    """The contents of a file are not as required; the text is the reason, on one line, without the file's name."""
 
 
 def read_bytes(
     path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT, hint: str = "check the path", missing: str = ""
 ) -> bytes:
-    """The bytes of a regular file of at most `most` bytes; else raises `error` with the path, and `hint`.
+    """Return the bytes of a regular file of at most `most` bytes; otherwise raise `error` with the path and `hint`.
 
-    A FIFO, device or folder is refused without being read. `missing`: the hint where there is no such file.
+    A FIFO, device or folder is refused without being read. `missing`: the hint for a missing file.
     """
     try:
-        # Without O_NONBLOCK a FIFO would wait for a writer.
+        # Without O_NONBLOCK, opening a FIFO would wait for a writer.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileNotFoundError:
         raise error(f"{path}: no such file", missing or hint) from None
-    except ValueError as fault:  # a NUL, which no file's name can hold
+    except ValueError as fault:  # a NUL, which is not allowed in file names
         raise error(f"{str(path)!r}: is not a file name", hint) from fault
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
@@ -82,35 +83,36 @@ def read_bytes(
     if not stat.S_ISREG(state.st_mode):
         os.close(handle)
         if stat.S_ISDIR(state.st_mode):
-            raise error(f"{path}: cannot be read: is a folder", "name a file in it")
+            raise error(f"{path}: cannot be read: is a folder", "give a file in it")
         raise error(f"{path}: is not a regular file", "save the stream to a file first")
     with os.fdopen(handle, "rb") as file:
         if state.st_size > most:
             raise error(
-                f"{path}: has {state.st_size / MIB:.0f} MiB, at most {most / MIB:.0f} are read", "is it the right file?"
+                f"{path}: has {state.st_size / MIB:.0f} MiB; at most {most / MIB:.0f} are read",
+                "check that it is the right file",
             )
         try:
-            content = file.read(most + 1)  # a file of /proc has more bytes than it says
+            content = file.read(most + 1)  # a file in /proc has more bytes than stated
         except OSError as fault:
             raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
     if len(content) > most:
-        raise error(f"{path}: has more than {most / MIB:.0f} MiB", "is it the right file?")
+        raise error(f"{path}: has more than {most / MIB:.0f} MiB", "check that it is the right file")
     return content
 
 
 def read_text(
-    path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT, hint: str = "a UTF-8 text file is needed"
+    path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT, hint: str = "give a UTF-8 text file"
 ) -> str:
-    """The UTF-8 text of a regular file; raises `error` with the path."""
+    """Return the UTF-8 text of a regular file; raises `error` with the path."""
     try:
         text = read_bytes(path, error, most=most, hint=hint, missing="check the path").decode("utf-8")
     except UnicodeDecodeError as fault:
-        raise error(f"{path}: no UTF-8 text", hint) from fault
+        raise error(f"{path}: is not UTF-8 text", hint) from fault
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The tables of a TOML text; raises ContentError with the line, or with the key whose number is out of range."""
+    """Return the tables of a TOML text; raises ContentError with the line, or with the key of a number out of range."""
     _check_toml(text)
     try:
         values = tomllib.loads(text)
@@ -120,14 +122,14 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ContentError(f"{fault}") from fault
     for key, number in _integers(values, ""):
         if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
-            raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: beyond 64 bits")
+            raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: more than 64 bits")
     return values
 
 
 def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
-    """The values of strict JSON in UTF-8: finite numbers, whole numbers of at most 64 bits; raises ContentError.
+    """Return the values of strict JSON in UTF-8: finite numbers, integers of at most 64 bits; raises ContentError.
 
-    `size_on_disk` [bytes]: of the file that it was unpacked from.
+    `size_on_disk` [bytes]: of the file from which it was unpacked.
     """
     if size_on_disk is None:
         _check_memory(_memory(content), _FREE + _RATIO * len(content))
@@ -136,21 +138,21 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as fault:
-        raise ContentError("no UTF-8 text") from fault
+        raise ContentError("not UTF-8 text") from fault
     if not text.strip():
         raise ContentError("it is empty")
     try:
         return json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer)
     except json.JSONDecodeError as fault:
-        raise ContentError(f"cut off or damaged at line {fault.lineno}") from fault
+        raise ContentError(f"truncated or damaged at line {fault.lineno}") from fault
     except RecursionError as fault:
         raise ContentError("nested too deeply") from fault
 
 
 def unpack_json(content: bytes) -> Any:
-    """The values of gzipped strict JSON; raises ContentError, before it is unpacked where that takes far more memory.
+    """Return the values of gzipped strict JSON; ContentError before unpacking that takes far too much memory.
 
-    As `parse_json` beyond that.
+    Otherwise as `parse_json`.
     """
     bound = _FREE + _PACKED_RATIO * len(content)
     pieces: list[bytes] = []
@@ -170,16 +172,16 @@ def _unpacked(content: bytes) -> Iterator[bytes]:
             piece = stream.decompress(packed, _PIECE)
             packed = stream.unconsumed_tail
             if not piece and not packed and not stream.eof:
-                raise ContentError("cut off")
+                raise ContentError("truncated")
             yield piece
     except zlib.error as fault:
-        raise ContentError("no whole gzip file") from fault
+        raise ContentError("not a complete gzip file") from fault
     if stream.unused_data:
         raise ContentError(f"{len(stream.unused_data)} bytes after its end")
 
 
 def _check_toml(text: str) -> None:
-    """Raise ContentError for what tomllib would need far more memory, time or stack for than a person's file."""
+    """Raise ContentError for a text that takes tomllib far more memory, time or stack than a person's file."""
     depth = dots = entries = escapes = 0
     for number, token in enumerate(_TOML_TOKEN.finditer(text)):
         found, kind = token[0], token.lastgroup
@@ -188,7 +190,7 @@ def _check_toml(text: str) -> None:
         if number + escapes > _MOST_TOML_WORDS or entries > _MOST_TOML_ENTRIES:
             raise ContentError(f"more than {_MOST_TOML_ENTRIES} keys or {_MOST_TOML_WORDS} words")
         if kind == "unclosed":
-            raise ContentError(f"a text begins {_line(text, token)} and does not end")
+            raise ContentError(f"a text that begins {_line(text, token)} is not terminated")
         if kind == "word" and len(found) > _MOST_WORD:
             raise ContentError(f"a number or key of {len(found)} characters {_line(text, token)}")
         if kind in (None, "text", "lines", "word"):
@@ -211,7 +213,7 @@ def _line(text: str, token: re.Match[str]) -> str:
 
 
 def _integers(value: Any, key: str) -> Iterator[tuple[str, int]]:
-    """All whole numbers below a value, with their keys."""
+    """Yield all integers below a value, with their keys."""
     if isinstance(value, Mapping):
         for name, item in value.items():
             yield from _integers(item, f"{key}.{name}" if key else name)
@@ -223,7 +225,7 @@ def _integers(value: Any, key: str) -> Iterator[tuple[str, int]]:
 
 
 def _memory(content: bytes) -> int:
-    """What JSON needs as Python values, from above [bytes]."""
+    """Return an upper bound of the memory for JSON as Python values [bytes]."""
     elements = content.count(b",")
     lists, objects = content.count(b"["), content.count(b"{")
     return _PER_CHARACTER * len(content) + _PER_ELEMENT * elements + _PER_LIST * lists + _PER_OBJECT * objects
@@ -235,7 +237,7 @@ def _check_memory(memory: int, bound: int) -> None:
 
 
 def _depth(content: bytes) -> int:
-    """How deep lists and objects are nested, texts left aside."""
+    """Return the nesting depth of lists and objects, ignoring texts."""
     brackets = np.frombuffer(_JSON_TEXT.sub(b"", content).translate(None, _NO_BRACKETS), dtype=np.uint8)
     if not len(brackets):
         return 0
@@ -244,13 +246,13 @@ def _depth(content: bytes) -> int:
 
 
 def _refuse(constant: str) -> float:
-    raise ContentError(f"{constant} is no number of JSON")
+    raise ContentError(f"{constant} is not a JSON number")
 
 
 def _finite(text: str) -> float:
     value = float(text)
     if math.isinf(value):
-        raise ContentError(f"{text[:40]} is beyond the largest number")
+        raise ContentError(f"{text[:40]} exceeds the largest number")
     return value
 
 
@@ -258,5 +260,5 @@ def _integer(text: str) -> int:
     if len(text) > _MOST_DIGITS:
         digits = len(text.removeprefix("-"))
         if digits > _MOST_DIGITS:
-            raise ContentError(f"a whole number of {digits} digits: beyond 64 bits")
+            raise ContentError(f"a whole number of {digits} digits: more than 64 bits")
     return int(text)

@@ -1,4 +1,4 @@
-"""Which column or topic of a log is which channel, in which unit: the machine file's [channels]."""
+"""Map the columns or topics of a log to channels and units: [channels] of the machine file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AcceptedUnits = Callable[[str], tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Duty:
-    """Motor torque from the applied voltage where no current is measured (thesis 6.2.2, a DC equivalent circuit).
+    """Motor torque from the applied voltage if the current is not measured (thesis 6.2.2, DC equivalent circuit).
 
     tau = k_t (u - k_e omega) / R with u = duty * supply voltage (or the voltage itself); units V, ohm, V s/rad, N m/A.
     """
@@ -33,10 +33,10 @@ class Duty:
 
 @dataclass(frozen=True)
 class ChannelSource:
-    """Where one channel comes from, and how its numbers become SI: value * factor [unit]; `stated`: the log's unit.
+    """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
-    In the log's unit: at the ends of `valid_range` the sensor saturates, below `least` and above `most` it gives none.
-    `keys` are the columns under the names that a file has for them, once its names are known (resolve_columns).
+    In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
+    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
     """
 
     channel: str
@@ -55,7 +55,7 @@ class ChannelSource:
 
     @property
     def described(self) -> str:
-        """How the machine file names it, for messages."""
+        """Return its name in the machine file, for messages."""
         if self.topic:
             return f"{self.topic} {self.field}"
         return ", ".join(str(column) for column in self.columns)
@@ -65,8 +65,8 @@ class ChannelSource:
 class TimeSource:
     """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
 
-    With both a column and a rate the column counts samples: a gap in it is a gap in time. `unit` is the column's.
-    `key` is the column under the name that a file has for it, once its names are known (resolve_columns).
+    With both a column and a rate, the column counts samples: a gap in it is a gap in time. `unit` is the column's.
+    `key` is the column by its name in the file, once this is known (resolve_columns).
     """
 
     column: str | int | None = None
@@ -79,9 +79,9 @@ class TimeSource:
 
 @dataclass(frozen=True)
 class TablePins:
-    """What `[csv]` says of how a table is written; what it does not say is found in the file.
+    """Settings of a table's format in `[csv]`; the others are found in the file.
 
-    A mark that is None, an empty text or a line that is None are not pinned; `header` and `units` False: there is none.
+    None, for a mark, text or line, means not set; `header` and `units` False: the table has none.
     """
 
     separator: str = ""
@@ -98,9 +98,9 @@ class TablePins:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """All channels of a log; `topics` tells the MCAP map from the map of columns, `pins` is for tables of text.
+    """All channels of a log; `topics` distinguishes the MCAP map from the map of columns, `pins` is for text tables.
 
-    `named`: the machine file says what its joints are called. Else its only one is called like the machine.
+    `named`: the machine file names its joints. Otherwise a single joint has the machine's name.
     """
 
     time: TimeSource
@@ -113,7 +113,7 @@ class ChannelMap:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """What the messages of a log call the joints; empty where nobody said."""
+        """Return the names of the joints in the messages of a log; empty if none are given."""
         return self.joints if self.named else ()
 
     def __contains__(self, channel: str) -> bool:
@@ -121,7 +121,7 @@ class ChannelMap:
 
 
 def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUnits, topics: bool) -> ChannelMap:
-    """The map in `[channels]` (columns) or `[channels.mcap]` (topics); `accepted` gives a channel's SI units."""
+    """Return the map in `[channels]` (columns) or `[channels.mcap]` (topics); `accepted`: SI units per channel."""
     time = _time_source(table, topics)
     low_pass = table.number("speed_low_pass_hz", 50.0, above=0.0)
     sources = []
@@ -154,10 +154,10 @@ def _time_source(table: Table, topics: bool) -> TimeSource:
     column = _column(part, part.raw("column"), "column")
     name = part.text("unit", "")
     if not name:
-        raise part.fault("unit", "is missing", "s, ms, us, ns or min")
+        raise part.fault("unit", "is missing", "give s, ms, us, ns or min")
     found = unit(name, part.key("unit"))
     if found.si != "s":
-        raise part.fault("unit", f"'{name}' is not a unit of time", "s, ms, us, ns or min")
+        raise part.fault("unit", f"'{name}' is not a unit of time", "give s, ms, us, ns or min")
     part.finish()
     return TimeSource(column=column, factor=found.factor, unit=name)
 
@@ -173,11 +173,11 @@ def _source(
     else:
         given = table.raw("columns")
         if given is not None and "column" in table:
-            raise table.fault("columns", "stands beside 'column'", "keep one of the two")
+            raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
         listed = given if isinstance(given, list) else [table.raw("column")]
         columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
         if len(columns) != count:
-            raise table.fault("columns", f"names {len(columns)} columns", f"{count} are needed: one a joint")
+            raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
     kind = table.choice("kind", ("measured", "duty"), "measured")
     duty = _duty(table, channel) if kind == "duty" else None
     stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
@@ -203,16 +203,16 @@ def _source(
 def _unit_factor(
     table: Table, channel: str, accepted: tuple[str, ...], count: int, topics: bool, duty: Duty | None
 ) -> tuple[str, str, tuple[float, ...]]:
-    """The unit as it is stated, the channel's own, and the factors that lead there."""
+    """Return the unit as stated, the channel's own unit, and the factors between them."""
     scale = table.numbers("scale", count, 1.0)
     if any(item == 0.0 for item in scale):
-        raise table.fault("scale", "is 0", "a factor other than 0, e.g. N m per A")
-    if channel in UNITLESS:  # a unit would mean nothing, and is refused as an unknown key
+        raise table.fault("scale", "is 0", "give a factor other than 0, e.g. N m per A")
+    if channel in UNITLESS:  # a unit is meaningless and refused as an unknown key
         return "", "1", scale
     name = table.text("unit", "")
     if not name:
         if not topics or duty is not None:
-            raise table.fault("unit", "is missing", f"the unit that the log holds, e.g. {accepted[0]}")
+            raise table.fault("unit", "is missing", f"give the unit of the log, e.g. {accepted[0]}")
         name = accepted[0]
     found = unit(name, table.key("unit"))
     factor = tuple(found.factor * item for item in scale)
@@ -229,13 +229,13 @@ def _unit_factor(
     raise table.fault(
         "unit",
         f"'{name}' does not measure {channel} here",
-        f"units of {' or '.join(accepted)}, or {', '.join(RAW_UNITS)} with a scale",
+        f"use units of {' or '.join(accepted)}, or {', '.join(RAW_UNITS)} with a scale",
     )
 
 
 def _duty(table: Table, channel: str) -> Duty:
     if channel != "torque":
-        raise table.fault("kind", "'duty' serves the torque channel only", "remove it")
+        raise table.fault("kind", "'duty' is only for the torque channel", "remove it")
     return Duty(
         supply_voltage=table.number("supply_voltage", 1.0, above=0.0),
         resistance=table.number("resistance", above=0.0),
@@ -253,7 +253,7 @@ def _valid_range(table: Table) -> tuple[float, float] | None:
         if math.isfinite(low) and math.isfinite(high) and low < high:
             return low, high
     raise table.fault(
-        "saturation", f"is {value_in_words(value)}", "[lowest, highest] reading of the sensor, in the log's unit"
+        "saturation", f"is {value_in_words(value)}", "give [lowest, highest] reading of the sensor, in the log's unit"
     )
 
 
@@ -261,7 +261,7 @@ def _possible_range(table: Table) -> tuple[float, float]:
     least = table.number("min") if "min" in table else -math.inf
     most = table.number("max") if "max" in table else math.inf
     if least >= most:
-        raise table.fault("min", f"is {least:g}, max is {most:g}", "the least and the most that the sensor can give")
+        raise table.fault("min", f"is {least:g}, max is {most:g}", "give the sensor's smallest and largest value")
     return least, most
 
 
@@ -271,4 +271,4 @@ def _column(table: Table, value: object, key: str) -> str | int:
     if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
     problem = "is missing" if value is None else f"is {value_in_words(value)}"
-    raise table.fault(key, problem, "a column's name, or its number counted from 0")
+    raise table.fault(key, problem, "give a column's name, or its number counted from 0")

@@ -1,4 +1,4 @@
-"""What a file holds before it has channels: columns of numbers with their times, whole or in pieces."""
+"""The content of a file before channels are mapped: columns of numbers with times, whole or in pieces."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from cdtool.recording import FloatArray
 
 @dataclass(frozen=True)
 class Column:
-    """One stream of numbers: `values` (n,) or (n, k) as the file has them.
+    """One stream of numbers: `values` (n,) or (n, k) as in the file.
 
-    `time` (n,) in seconds where the format carries a time for each message, else None (a table: the clock is a column).
+    `time` (n,) [s] if the format has a time per message, else None (in a table the clock is a column).
     """
 
     name: str
@@ -23,11 +23,11 @@ class Column:
 
 @dataclass(frozen=True)
 class Piece:
-    """Some rows (`rows` = n) of the columns that share one clock, in the file's order.
+    """Rows (`rows` = n) of the columns that share one clock, in the file's order.
 
-    `time` (n,) [s] counts from the source's `origin` [s]; None where the columns are a table, whose clock is one of
-    them or not known. `values` are (n,) or (n, k) by column; a column of this clock that is not among them has no
-    value in these rows. Messages of a topic (`clock` is its name) are in the order of their times within a piece.
+    `time` (n,) [s] counts from the source's `origin` [s]; None for the columns of a table, whose clock is a column or
+    unknown. `values` are (n,) or (n, k) by column; a column of this clock that is not among them has no value in these
+    rows. Messages of a topic (`clock` is its name) are in order of time within a piece.
     """
 
     clock: str

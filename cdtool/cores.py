@@ -1,4 +1,4 @@
-"""How many processor cores this process may use."""
+"""The number of processor cores available to this process."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 
 def usable_cores() -> int:
-    """Those that it is allowed to run on, where the platform tells; otherwise all."""
+    """Return the number of cores that the process may use, if the platform states it; otherwise of all cores."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

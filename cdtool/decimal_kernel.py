@@ -1,7 +1,7 @@
-"""Decimal number -> nearest float64, exactly as Python's float() does it.
+"""Convert a decimal number to the nearest float64, exactly as Python's float().
 
 Lemire, "Number parsing at a gigabyte per second", Software: Practice and Experience 51 (2021), algorithm 2: w 10^q with
-w < 2^64 is w times the upper 128 bits of 5^q, rounded to even. What it cannot tell (subnormal, infinite) is left to
+w < 2^64 is w times the upper 128 bits of 5^q, rounded to even. Undecidable cases (subnormal, infinite) are left to
 Python.
 """
 
@@ -20,7 +20,7 @@ SMALLEST, LARGEST = -342, 308
 UNDECIDED = np.uint64(0xFFFFFFFFFFFFFFFF)  # the bits of a NaN
 POWERS = "Array(uint64, 2, 'C', readonly=True)"
 
-# Unsigned constants: a signed one beside an unsigned number would make a float of both.
+# Unsigned constants: numba converts a signed and an unsigned operand to float.
 _0, _1, _3, _9, _32, _52, _63, _64 = map(np.uint64, (0, 1, 3, 9, 32, 52, 63, 64))
 _LOW_WORD, _MASK = np.uint64(0xFFFFFFFF), np.uint64(0x1FF)
 _HIDDEN, _TWICE_HIDDEN = np.uint64(2**52), np.uint64(2**53)
@@ -28,7 +28,7 @@ _HIDDEN, _TWICE_HIDDEN = np.uint64(2**52), np.uint64(2**53)
 
 @cache
 def powers_of_five() -> npt.NDArray[np.uint64]:
-    """(651, 2): the upper and lower 64 bits of 5^q, q from -342 to 308, with their highest bit set; 5^-q rounded up."""
+    """Return (651, 2): the upper and lower 64 bits of 5^q, q from -342 to 308, highest bit set; 5^-q rounded up."""
     rows = []
     for q in range(SMALLEST, LARGEST + 1):
         five = 5 ** abs(q)
@@ -43,7 +43,7 @@ def powers_of_five() -> npt.NDArray[np.uint64]:
 
 @kernel("UniTuple(uint64, 2)(uint64, uint64)")
 def product(a: np.uint64, b: np.uint64) -> tuple[np.uint64, np.uint64]:
-    """The upper and lower 64 bits of a b."""
+    """Return the upper and lower 64 bits of a b."""
     a1, a0, b1, b0 = a >> _32, a & _LOW_WORD, b >> _32, b & _LOW_WORD
     middle = a1 * b0 + (a0 * b0 >> _32)
     other = a0 * b1 + (middle & _LOW_WORD)
@@ -52,7 +52,7 @@ def product(a: np.uint64, b: np.uint64) -> tuple[np.uint64, np.uint64]:
 
 @kernel(f"uint64(uint64, int64, {POWERS})")
 def float_bits(w: np.uint64, q: int, powers: npt.NDArray[np.uint64]) -> np.uint64:
-    """The bits of the float64 nearest to w 10^q; UNDECIDED where that is subnormal, infinite or too close to call."""
+    """Return the bits of the float64 nearest to w 10^q; UNDECIDED if subnormal, infinite or too close to decide."""
     if w == _0:
         return w
     if q < SMALLEST or q > LARGEST:
@@ -90,7 +90,7 @@ def float_bits(w: np.uint64, q: int, powers: npt.NDArray[np.uint64]) -> np.uint6
 
 @kernel("float64(uint64)")
 def as_float(bits: np.uint64) -> float:
-    """The normal, positive float64 with these bits."""
+    """Return the normal, positive float64 with these bits."""
     digits: Any = (bits & (_HIDDEN - _1)) | _HIDDEN
     power: Any = np.int64(bits >> _52)
     return math.ldexp(np.float64(digits), power - 1075)

@@ -1,4 +1,4 @@
-"""What a detector says of a recording: Signal, Band, Alarm, Verdict."""
+"""The results of a detector on a recording: Signal, Band, Alarm, Verdict."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from cdtool.recording import BoolArray, FloatArray
 
 StatusArray = npt.NDArray[np.uint8]
 
-# The one column of a signal that belongs to no single joint (an energy, say).
+# The only column of a signal that does not belong to a single joint (an energy, for example).
 WHOLE_MACHINE = ("whole machine",)
 
 
 class Status(IntEnum):
-    """Why a sample of a collision detection signal can or cannot be judged."""
+    """Whether a sample of a collision detection signal is assessable, or why not."""
 
     VALID = 0
     START_UP = 1
@@ -46,11 +46,11 @@ REASONS: Mapping[int, str] = {
 class Signal:
     """Collision detection signal: `time` (n,) s, `values` and `status` (n, J), `unit`.
 
-    `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive
-    always opposes the motion. `joints` names the columns: the machine's joints, those of them that are watched, or one
-    name for a signal of the whole machine. A detector may leave it empty: then they are the recording's joints.
-    `notes`: what a user should know of how the signal came about. `lost` (n, J): where an input of the detector had
-    no sample, so that the value rests on a held one, or on what was guessed of a gap; None where no input lost one.
+    `signed`: the value's sign follows the axis (a force against positive travel is positive); otherwise positive always
+    opposes the motion. `joints` names the columns: the monitored joints, or one name for a signal of the whole machine.
+    A detector may leave it empty: then the columns are the recording's joints. `notes`: information on how the signal
+    was computed. `lost` (n, J): where an input of the detector had no sample, so that the value is based on a held one,
+    or on an estimate within a gap; None if no input had gaps.
     """
 
     time: FloatArray
@@ -64,19 +64,19 @@ class Signal:
 
     @property
     def valid(self) -> BoolArray:
-        """(n, J), True where the value may be judged."""
+        """Return (n, J) True where the value is assessable."""
         valid: BoolArray = self.status == Status.VALID
         return valid
 
     @cached_property
     def period(self) -> float:
-        """Median sample period [s]; 0 below two samples."""
+        """Return the median sample period [s]; 0 below two samples."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     def watching(self, joints: Sequence[str]) -> Signal:
-        """Only the columns of these joints, in their order here; all of them where none is named.
+        """Return only the columns of these joints, in their order here; all columns if `joints` is empty.
 
-        A signal of the whole machine stays as it is. Raises ConfigurationError for an unknown joint.
+        A signal of the whole machine is returned unchanged. Raises ConfigurationError for an unknown joint.
         """
         if not joints or self.joints == WHOLE_MACHINE:
             return self
@@ -103,13 +103,13 @@ class Signal:
         return replace(self, time=self.time[rows], values=self.values[rows], status=self.status[rows], lost=lost)
 
     def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
-        """Share of the samples for each reason not to judge, over all joints, from `start` to `end` [s]."""
+        """Return the share of samples not assessable for each reason, over all joints, from `start` to `end` [s]."""
         status = self.status[(self.time >= start) & (self.time <= end)]
         counts = {text: int(np.count_nonzero(status == code)) for code, text in REASONS.items()}
         return {text: count / status.size for text, count in counts.items() if count}
 
     def why_not(self, start: float = -np.inf, end: float = np.inf) -> str:
-        """The reasons not to judge in words, the most frequent first, with their shares, from `start` to `end` [s]."""
+        """Return these reasons in words, the most frequent first, with their shares, from `start` to `end` [s]."""
         shares = dict(sorted(self.shares(start, end).items(), key=lambda item: -item[1]))
         return ", ".join(f"{text} {100.0 * share:.0f} %" for text, share in shares.items()) or "no samples"
 
@@ -128,9 +128,9 @@ class Band:
 
 @dataclass(frozen=True)
 class Alarm:
-    """The statistic left its band: time [s] of the sample whose processing raised the alarm, debounce included.
+    """An exit of the statistic from its band: time [s] of the sample that raised the alarm, debounce included.
 
-    `joint` is the column of the signal; the signal's `joints` have its name.
+    `joint` is the column of the signal; the signal's `joints` has its name.
     """
 
     time: float
@@ -142,12 +142,12 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Three answers: alarm, no alarm, or not assessable with the reason.
+    """One of three outcomes: alarm, no alarm, or not assessable with the reason.
 
-    `alarms` are what an operator would hear: raised, then armed again only after a while inside the band. `crossings`
-    are all debounced exits from the band, the alarms among them: an alarm that is still latched hides no contact.
-    `rearmed`: for each alarm when it was armed again [s], infinite where it never was; for figures alone, since it
-    follows from what came after the alarm.
+    `alarms` are those an operator would receive: raised, then re-armed only after a while inside the band. `crossings`
+    are all debounced exits from the band, including the alarms: a latched alarm must not hide a contact. `rearmed`:
+    when each alarm was re-armed [s], infinite if it was not; for plots only, since it depends on samples after the
+    alarm.
     """
 
     outcome: Literal["alarm", "no alarm", "not_assessable"]

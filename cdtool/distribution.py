@@ -1,4 +1,4 @@
-"""How often each value occurred: the median and other quantiles of more values than memory holds."""
+"""The frequency of each value: the median and other quantiles of more values than memory can hold."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import numpy.typing as npt
 
 from cdtool.recording import FloatArray
 
-# Distinct values that are told apart (1 MiB); values wait until there are as many, since to sort them is what costs.
+# Number of distinct values (1 MiB); values are collected up to this number, since sorting is the main cost.
 _MOST = 1 << 16
 _MANTISSA = 52  # bits of a float64
 
 
 class Distribution:
-    """Finite values by how often each occurred, in memory that does not grow with them.
+    """Finite values by frequency, in memory that does not grow with their number.
 
-    Exact up to 65,536 distinct ones. Beyond, the last bits of all are dropped until no more are left: any quantile is
-    then right to `resolution`, relative. Steps between stamps that vary by a factor of two keep 5 digits.
+    Exact up to 65,536 distinct values. Beyond that, the last bits of all values are dropped until that number is met;
+    any quantile is then accurate to `resolution`, relative. Steps between stamps that vary by a factor of two keep 5
+    digits.
     """
 
     def __init__(self, most: int = _MOST) -> None:
@@ -28,7 +29,7 @@ class Distribution:
         self._dropped = 0  # bits
 
     def add(self, values: FloatArray) -> None:
-        """Take values, all of them finite."""
+        """Add values, all of them finite."""
         if len(values):
             self._waiting.append(values)
             self._waiting_count += len(values)
@@ -37,24 +38,24 @@ class Distribution:
 
     @property
     def count(self) -> int:
-        """How many values there were."""
+        """Return the number of values."""
         self._sort()
         return int(self._counts.sum())
 
     @property
     def resolution(self) -> float:
-        """By how much a quantile may be off, relative to it; 0: exact."""
+        """Return the largest relative error of a quantile; 0: exact."""
         self._sort()
         return 2.0 ** (self._dropped - _MANTISSA - 1) if self._dropped else 0.0
 
     @property
     def median(self) -> float:
-        """The middle value, or the mean of the two in the middle; NaN where there is none."""
+        """Return the median; NaN without values."""
         count = self.count
         return 0.5 * (self._at((count - 1) // 2) + self._at(count // 2)) if count else float("nan")
 
     def percentile(self, percent: float) -> float:
-        """Linear between neighbouring values, as numpy.percentile has it; NaN where there is none."""
+        """Return a percentile, interpolated linearly as numpy.percentile; NaN without values."""
         count = self.count
         if not count:
             return float("nan")
@@ -64,19 +65,19 @@ class Distribution:
         return low + (place - before) * (high - low)
 
     def share(self, low: float, high: float) -> float:
-        """How much of the values lies between two, both included; NaN where there is none."""
+        """Return the share of the values between two bounds, both included; NaN without values."""
         self._sort()
         values = self._shown(self._values)
         inside = (values >= low) & (values <= high)
         return float(self._counts[inside].sum() / self._counts.sum()) if len(self._counts) else float("nan")
 
     def _at(self, rank: int) -> float:
-        """The value of that rank, from 0."""
+        """Return the value of that rank, from 0."""
         place = int(np.searchsorted(np.cumsum(self._counts), rank, side="right"))
         return float(self._shown(self._values[place : place + 1])[0])
 
     def _shown(self, values: FloatArray) -> FloatArray:
-        """In the middle of the bits that were dropped."""
+        """Return the values with the dropped bits at their centre."""
         if not self._dropped:
             return values
         middle = (values.view(np.int64) | (1 << (self._dropped - 1))).view(np.float64)
@@ -100,7 +101,7 @@ class Distribution:
 
 
 def _merged(values: FloatArray, counts: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Each value once, in ascending order, with how often it occurred."""
+    """Return each value once, in ascending order, with its frequency."""
     order = np.argsort(values, kind="stable")
     values, counts = values[order], counts[order]
     first = np.concatenate(([True], values[1:] != values[:-1]))

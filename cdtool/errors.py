@@ -1,6 +1,6 @@
-"""Errors that a user can act on.
+"""Errors with a next step for the user.
 
-Conventions: one line that names the file, the row or key and the value, then a hint that names the next step.
+Conventions: one line with the file, the row or key and the value, then a hint with the next step.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class CdtoolError(Exception):
-    """A known fault: `message` says what is wrong and where, `hint` what to do next."""
+    """A known error: `message` states what is wrong and where, `hint` what to do next."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -25,7 +25,7 @@ class CdtoolError(Exception):
 
 
 class UsageError(CdtoolError):
-    """A command or function was called with arguments that do not fit."""
+    """A command or function was called with invalid arguments."""
 
 
 class ConfigurationError(CdtoolError):
@@ -33,23 +33,23 @@ class ConfigurationError(CdtoolError):
 
 
 class RecordingError(CdtoolError):
-    """A recording cannot be read, or lacks what is needed."""
+    """A recording cannot be read, or something it needs is missing."""
 
 
 class OutputError(CdtoolError):
-    """A file or folder cannot be written: what was there before is still there."""
+    """A file or folder cannot be written; its previous content is unchanged."""
 
 
 class SignatureError(CdtoolError):
-    """A signature cannot be learned, read, or does not belong to what it is applied to."""
+    """A signature cannot be learned or read, or does not belong to the machine, detector or log."""
 
 
 class NothingValidError(SignatureError):
-    """The runs to learn from hold nothing that the detector could judge: that lies in detector and motion."""
+    """The detector cannot assess any sample of the runs to learn from, because of detector and motion."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Words that help after a wrong name: the nearest known ones first, then all of them."""
+    """Return a hint for a wrong name: the nearest known names first, then all of them."""
     names = sorted(known)
     close = get_close_matches(name, names, n=2, cutoff=0.5)
     listed = ", ".join(names) if names else "none"

@@ -1,7 +1,7 @@
-"""The exit status of every command, decided in one place from facts that the command has found.
+"""The exit status of every command, derived in one place from the facts that the command reports.
 
-Conventions: a command collects facts and calls `status_of`; it never chooses a number itself. Where several facts
-apply, 2 comes before 1, 1 before 3 and 3 before 4. `STATUSES` is the table of docs/ci.md and of `cdtool --help`.
+Conventions: a command collects facts and calls `status_of`; it never chooses a number itself. If several facts apply, 2
+comes before 1, 1 before 3 and 3 before 4. `STATUSES` is the table of docs/ci.md and of `cdtool --help`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from enum import Enum, IntEnum
 
 
 class ExitStatus(IntEnum):
-    """What a command's exit status tells a pipeline."""
+    """The meaning of a command's exit status for a pipeline."""
 
     OK = 0
     VIOLATED = 1
@@ -19,15 +19,15 @@ class ExitStatus(IntEnum):
     LOST = 3
     INCONCLUSIVE = 4
     INTERRUPTED = 130
-    """128 and the number of the signal that Ctrl-C sends, as a shell counts it; so are the next two."""
+    """128 plus the number of the signal that Ctrl-C sends, as in a shell; the next two likewise."""
     TERMINATED = 143
     HUNG_UP = 129
 
 
 class Fact(Enum):
-    """Something about a command's work that its exit status has to show."""
+    """A fact about a command's work that determines its exit status."""
 
-    LIMIT_VIOLATED = "a limit is violated, or could not be assessed and so is not met"
+    LIMIT_VIOLATED = "a limit is violated, or is not assessable and therefore not met"
     FORCE_VIOLATED = "a contact violates its force profile, or is missed where one is set"
     WORSE = "a change for the worse is shown"
     WRONG_USAGE = "wrong usage, or a wrong file"
@@ -37,7 +37,7 @@ class Fact(Enum):
     LEFT_OUT = "something was left out"
     NOTHING_ASSESSABLE = "nothing could be assessed"
     INCONCLUSIVE = "the sample is too small for a conclusion, and one was required"
-    INCOMPLETE = "part of what was asked for could not be decided"
+    INCOMPLETE = "part of the request could not be decided"
     INTERRUPTED = "interrupted"
 
 
@@ -55,7 +55,7 @@ _STATUS_OF: Mapping[Fact, ExitStatus] = {
     Fact.INCOMPLETE: ExitStatus.INCONCLUSIVE,
     Fact.INTERRUPTED: ExitStatus.INTERRUPTED,
 }
-# Where several apply; an interrupted command has found out nothing else.
+# Priority if several apply; an interrupted command has no other result.
 _FIRST_TO_LAST = (
     ExitStatus.INTERRUPTED,
     ExitStatus.UNUSABLE,
@@ -66,17 +66,17 @@ _FIRST_TO_LAST = (
 
 STATUSES: Mapping[ExitStatus, str] = {
     ExitStatus.OK: "all good: done, every limit and force profile met; without --require-power also: inconclusive",
-    ExitStatus.VIOLATED: "a limit or force profile is violated or a limit not assessable; a change for the worse",
+    ExitStatus.VIOLATED: "a limit or force profile is violated, a limit is not assessable, or a build is worse",
     ExitStatus.UNUSABLE: "wrong usage, a wrong file, or nothing usable",
     ExitStatus.LOST: "done, but something was lost or left out, or nothing could be assessed",
-    ExitStatus.INCONCLUSIVE: "inconclusive or incomplete: the recordings do not suffice for what was asked",
-    ExitStatus.INTERRUPTED: "interrupted with Ctrl-C: a file that was being written is left as it was",
-    ExitStatus.TERMINATED: "terminated by SIGTERM, in the same way",
-    ExitStatus.HUNG_UP: "the terminal was closed (SIGHUP), in the same way",
+    ExitStatus.INCONCLUSIVE: "inconclusive or incomplete: the recordings are not sufficient",
+    ExitStatus.INTERRUPTED: "interrupted with Ctrl-C: files being written are unchanged",
+    ExitStatus.TERMINATED: "terminated by SIGTERM: files being written are unchanged",
+    ExitStatus.HUNG_UP: "terminal closed (SIGHUP): files being written are unchanged",
 }
-"""What each status means, in one line."""
+"""The meaning of each status, in one line."""
 
-ORDER = "Where several apply: 2 before 1 before 3 before 4."
+ORDER = "If several apply: 2 before 1 before 3 before 4."
 
 _ALWAYS = frozenset({ExitStatus.OK, ExitStatus.UNUSABLE})
 _CAN_LOSE = _ALWAYS | {ExitStatus.LOST}
@@ -104,7 +104,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "study figures": _ALWAYS,
     "list": _CAN_LOSE,
 }
-"""The statuses that each command can end with, apart from an interruption; its --help shows them."""
+"""The statuses with which each command can exit, apart from an interruption; shown in its --help."""
 
 
 def status_of(facts: Iterable[Fact]) -> ExitStatus:
@@ -118,6 +118,6 @@ def status_of(facts: Iterable[Fact]) -> ExitStatus:
 
 
 def statuses_words(command: str) -> str:
-    """Return the line of a command's --help that names the statuses it can end with."""
+    """Return the line of a command's --help that lists its statuses."""
     numbers = ", ".join(str(int(status)) for status in sorted(STATUSES_OF[command]))
     return f"Exit status: {numbers}; `cdtool --help` explains them."

@@ -1,4 +1,4 @@
-"""What a file is that was given where another kind is needed: files of cdtool are known by what they hold."""
+"""Recognise the kind of a file by its content, for messages about a file of the wrong kind."""
 
 from __future__ import annotations
 
@@ -22,6 +22,6 @@ _LOOKED_AT = 1 << 13
 
 
 def kind_of(content: bytes) -> str:
-    """Return what the beginning of a file shows it to be, with its article; empty where nothing does."""
+    """Return the kind of a file by its beginning, with its article; empty if unknown."""
     head = content[:_LOOKED_AT]
     return next((words for mark, words in _MARKS if mark.match(head)), "")

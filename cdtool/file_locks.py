@@ -1,8 +1,8 @@
-"""One writer of a target at a time: a lock that dies with its process, and what dead writers left behind.
+"""One writer per target: a lock that ends with its process, and the removal of files left by killed writers.
 
-Why not the package filelock: on Unix it leaves the lock file in the folder for good, and where the file system has no
-flock it changes to a lock that outlives its process. Here the file is removed while it is locked, and whoever has
-waited for it checks that the file it has locked still bears the name. A folder of logs keeps nothing of cdtool's.
+Why not the package filelock: on Unix it leaves the lock file in the folder permanently, and on a file system without
+flock it uses a lock that outlives its process. Here the file is removed while it is locked, and a process that waited
+for it checks that the locked file still has this name. No file of cdtool remains in a folder of logs.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ LOCK_SECONDS = 60.0
 _PAUSE_SECONDS = 0.01
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 _NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.tmp|\.lock)")
-# The locks of this process: lock file -> its handle. Before it is open the handle is None.
+# The locks of this process: lock file -> its handle, which is None before the file is open.
 _handles: dict[tuple[Path, int], int | None] = {}
 
 
 def temporary_name(target: Path, folder: Path) -> Path:
-    """A name in `folder` that nothing bears yet, for what will become `target`."""
+    """Return an unused name in `folder` for a file that will become `target`."""
     return folder / f".cdtool-{_key(target)}-{secrets.token_hex(8)}.tmp"
 
 
 def is_temporary(name: str) -> bool:
-    """A name that only a temporary file or a lock of cdtool bears."""
+    """Whether a name is that of a temporary file or lock of cdtool."""
     return _NAME.fullmatch(name) is not None
 
 
 @contextmanager
 def holding(target: Path, folder: Path, shown: Path, *, needed: bool = False) -> Iterator[None]:
-    """Hold the lock of `target`, whose file is in `folder`; a thread that holds it already goes on.
+    """Hold the lock of `target`, whose lock file is in `folder`; a thread that already holds it continues.
 
-    Raises OutputError where another process keeps it for a minute, OSError where its file cannot be made. On a file
-    system without locks it goes on without one, unless it is `needed`.
+    Raises OutputError if another process holds it for a minute, OSError if its file cannot be created. On a file system
+    without locks it continues without one, unless it is `needed`.
     """
     lock = folder / f".cdtool-{_key(target)}.lock"
     mine = (lock, threading.get_ident())
@@ -62,7 +62,7 @@ def holding(target: Path, folder: Path, shown: Path, *, needed: bool = False) ->
 
 
 def release_all() -> None:
-    """Give up the locks of this process, for its end: an exception can come between any two steps."""
+    """Release all locks of this process, at its end: an exception can occur between any two steps."""
     for mine in list(_handles):
         _release(mine)
 
@@ -72,12 +72,14 @@ def _key(target: Path) -> str:
 
 
 def _acquire(mine: tuple[Path, int], shown: Path, needed: bool) -> bool:
-    """Wait for a lock; False where there are none on this file system."""
+    """Wait for a lock; return False if the file system has no locks."""
     end = time.monotonic() + LOCK_SECONDS
     try:
         while not _try(mine):
             if time.monotonic() > end:
-                raise OutputError(f"{plain(shown)}: another process is writing it", "try again once it has ended")
+                raise OutputError(
+                    f"{plain(shown)}: is being written by another process", "try again after it has ended"
+                )
             time.sleep(_PAUSE_SECONDS)
     except OSError as fault:
         if fault.errno not in _NO_LOCKS or needed:
@@ -88,7 +90,7 @@ def _acquire(mine: tuple[Path, int], shown: Path, needed: bool) -> bool:
 
 
 def _try(mine: tuple[Path, int], *, create: bool = True) -> bool:
-    """Take a lock if it is free. Its file is removed with it: what was locked must still be what bears the name."""
+    """Take a lock if it is free. Its file is removed with it, so the locked file must still have that name."""
     lock = mine[0]
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
     handle = os.open(lock, flags | (os.O_CREAT if create else 0), 0o666)
@@ -105,7 +107,7 @@ def _try(mine: tuple[Path, int], *, create: bool = True) -> bool:
 
 
 def _lock(handle: int) -> bool:
-    """Take the lock of an open file; False where another one has it."""
+    """Take the lock of an open file; return False if another process holds it."""
     try:
         import fcntl
     except ImportError:
@@ -132,7 +134,7 @@ def _lock_on_windows(handle: int) -> bool:
 def _release(mine: tuple[Path, int]) -> None:
     with suppress(OSError):
         if _handles.get(mine) is not None or _try(mine, create=False):
-            mine[0].unlink(missing_ok=True)  # while it is locked: nobody else can hold it
+            mine[0].unlink(missing_ok=True)  # while locked: no other process can hold it
     handle = _handles.pop(mine, None)
     if handle is not None:
         with suppress(OSError):
@@ -140,7 +142,7 @@ def _release(mine: tuple[Path, int]) -> None:
 
 
 def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:
-    """Remove temporaries and locks whose writers are dead: those whose lock is free, and those of the lock held."""
+    """Remove temporary files and locks of dead writers: those whose lock is free, and those of the lock held."""
     found: dict[Path, list[Path]] = {}
     for path in folder.iterdir():
         if match := _NAME.fullmatch(path.name):
@@ -154,7 +156,7 @@ def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:
             if _try(other):
                 _remove(path for path in paths if path != lock)
         except OSError:
-            continue  # not ours to judge
+            continue  # unknown: leave it
         finally:
             _release(other)
 

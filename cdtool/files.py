@@ -1,10 +1,10 @@
-"""The one way in which cdtool writes: whole or not at all, flushed to the disk, by one writer of a target at a time.
+"""Write files: completely or not at all, flushed to disk, with one writer per target.
 
-Conventions: links are followed before anything is locked or written. What is not whole yet is called
-`.cdtool-<target>-<random>.tmp`, the lock `.cdtool-<target>.lock`, where <target> is a hash of the name: dotfiles, which
-no pattern for logs matches. They are there while a command writes; what a killed one leaves behind is removed by the
-next command that writes into the folder, once no living process holds the lock. An existing file keeps its mode (and
-owner, where that is allowed), a new one gets the mode that the umask leaves.
+Conventions: links are followed before anything is locked or written. An incomplete file is named
+`.cdtool-<target>-<random>.tmp` and its lock `.cdtool-<target>.lock`, where <target> is a hash of the name. Both are
+dotfiles, which patterns for logs do not match, and exist only while a command writes. Files left by a killed command
+are removed by the next command that writes to the folder, once no living process holds the lock. An existing file keeps
+its mode (and owner, if permitted); a new one gets the mode set by the umask.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.EXDEV, errno.EBUSY, errno.EOPNOTSUP
 
 @contextmanager
 def locked(path: Path) -> Iterator[Path]:
-    """Hold the right to write `path` from reading it to writing it; gives the place where it really is.
+    """Lock `path` for reading, changing and writing it; yield its real path.
 
-    What is written with this module within the block is written under the same lock. Raises OutputError where another
-    process keeps the lock for a minute, or the file system has no locks.
+    Files written with this module inside the block use the same lock. Raises OutputError if another process holds the
+    lock for a minute, or the file system has no locks.
     """
     target = resolved(path)
     with _explained(path, []), holding(target, target.parent, path, needed=True):
@@ -42,7 +42,7 @@ def locked(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a whole file; a device or pipe is written to directly. Raises OutputError, UsageError."""
+    """Write a complete file; write to a device or pipe directly. Raises OutputError, UsageError."""
     if _is_special(path):
         with _explained(path, []), path.open("wb") as stream:
             stream.write(content)
@@ -52,16 +52,16 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a whole file of UTF-8 text with the line ends that it has. Raises OutputError, UsageError."""
+    """Write a complete file of UTF-8 text without changing its line ends. Raises OutputError, UsageError."""
     write_bytes(path, text.encode("utf-8", "replace"))
 
 
 @contextmanager
 def replaced(*paths: Path) -> Iterator[list[Path]]:
-    """An empty temporary file for each of `paths`; all take their places where the block ends without error, or none.
+    """Yield an empty temporary file for each of `paths`; if the block ends without error, all replace their targets.
 
-    Raises UsageError where a path is a folder, a device, a link that leads nowhere, or its folder is missing;
-    OutputError where writing fails, in the block or behind it.
+    Otherwise none does. Raises UsageError if a path is a folder, a device, a link to a missing file, or its folder is
+    missing; OutputError if writing fails, in the block or after it.
     """
     targets = [_checked(path) for path in paths]
     parts = [temporary_name(target, target.parent) for target in targets]
@@ -85,11 +85,12 @@ def replaced(*paths: Path) -> Iterator[list[Path]]:
 
 @contextmanager
 def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = None) -> Iterator[Path]:
-    """A temporary folder that becomes `path` as a whole where the block ends without an error; makes missing parents.
+    """Yield a temporary folder that becomes `path` if the block ends without error; creates missing parents.
 
-    `may_replace(folder)` says whether everything in an existing folder may go; it raises where nothing may be written
-    there. Where not everything may go, and where a folder cannot be exchanged (a mount point, the current folder, a
-    file system without exchange), each file takes the place of its namesake and the others stay. Raises as `replaced`.
+    `may_replace(folder)` returns whether all content of an existing folder may be removed; it raises if nothing may be
+    written there. If some content must stay, or the folder cannot be exchanged (a mount point, the current folder, a
+    file system without exchange), each file replaces the one of the same name and the others stay. Raises as
+    `replaced`.
     """
     target = resolved(path)
     if target.exists() and not target.is_dir():
@@ -105,7 +106,7 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
             part.mkdir()
             yield part
             _flush_tree(part)
-            if target.exists() and may_replace is not None:  # as it is now, not as it was a while ago
+            if target.exists() and may_replace is not None:  # its content may have changed meanwhile
                 whole = may_replace(target) and whole
             if not (whole and _put_whole(part, target)):
                 _put_in_place([(item, target / item.name) for item in sorted(part.iterdir())])
@@ -117,7 +118,7 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
 
 @contextmanager
 def made_folder(path: Path) -> Iterator[Path]:
-    """A folder, made with its missing parents; what was made and is empty in the end is removed again."""
+    """Create a folder with its missing parents; on exit remove those that are still empty."""
     target = resolved(path)
     made = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
@@ -131,14 +132,14 @@ def made_folder(path: Path) -> Iterator[Path]:
 
 
 def resolved(path: Path) -> Path:
-    """Where a path really is; raises UsageError for a link that leads nowhere."""
+    """Return the real path; raises UsageError for a link to a missing file."""
     if path.is_symlink() and not path.exists():
         raise UsageError(f"{plain(path)}: is a link to a missing file", "remove or repair the link")
     return Path(os.path.realpath(path))
 
 
 def clean_up() -> None:
-    """Remove the temporary files and locks of this process: a signal's exception can come between any two steps."""
+    """Remove the temporary files and locks of this process: a signal can raise an exception between any two steps."""
     _discard(list(_temporaries))
     release_all()
 
@@ -150,20 +151,20 @@ def _checked(path: Path) -> Path:
         raise UsageError(f"{plain(path)}: is not a regular file", "give the name of a file")
     target = resolved(path)
     if not target.parent.is_dir():
-        raise UsageError(f"{plain(path)}: no folder {plain(path.parent)}", "make it first")
+        raise UsageError(f"{plain(path)}: no folder {plain(path.parent)}", "create the folder first")
     if target.exists() and not os.access(target, os.W_OK):
         raise OutputError(f"{plain(path)}: cannot be written: {os.strerror(errno.EACCES)}", "check its permissions")
     return target
 
 
 def _is_special(path: Path) -> bool:
-    """A device or a pipe: nothing can be renamed over it."""
+    """Whether a path is a device or a pipe, which cannot be replaced by renaming."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
 @contextmanager
 def _explained(path: Path, names: Sequence[tuple[Path, Path]]) -> Iterator[None]:
-    """An OSError as one line about `path`; nobody knows a temporary file by its name."""
+    """Convert an OSError to one line about `path` that does not name temporary files."""
     try:
         yield
     except CdtoolError as fault:
@@ -185,7 +186,7 @@ def _mode(target: Path) -> int:
 
 
 def _finish(part: Path, target: Path) -> None:
-    """Flush a file, and give it mode and owner of the one that it replaces."""
+    """Flush a file, and give it the mode and owner of the file that it replaces."""
     _flush(part)
     if target.exists():
         kept = target.stat()
@@ -196,7 +197,7 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
-    """Rename each to its target; where one cannot be, those before it are taken back."""
+    """Rename each file to its target; if one fails, undo the others."""
     done: list[tuple[Path, Path, bool, Path]] = []
     try:
         for part, target in pairs:
@@ -221,7 +222,7 @@ def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
 
 
 def _put_whole(part: Path, target: Path) -> bool:
-    """Let a folder take its place; False where the file system cannot exchange it for the one that is there."""
+    """Rename a folder to its target; return False if the file system cannot exchange it for the existing one."""
     if not target.exists():
         part.rename(target)
         return True
@@ -230,7 +231,7 @@ def _put_whole(part: Path, target: Path) -> bool:
 
 
 def _flush(path: Path) -> None:
-    """Have the disk keep a file's content, or a folder's names."""
+    """Flush a file's content, or a folder's names, to disk."""
     if path.is_dir() and not hasattr(os, "O_DIRECTORY"):
         return  # Windows: a folder cannot be flushed
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | _BINARY)
@@ -262,11 +263,11 @@ def _remove(path: Path) -> None:
 
 atexit.register(clean_up)
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_temporaries.clear)  # they are the parent's
+    os.register_at_fork(after_in_child=_temporaries.clear)  # these belong to the parent
 
 
 def _exchange(first: Path, second: Path) -> bool:
-    """Exchange two folders by one call (Linux: renameat2); False where system or file system cannot; raises OSError."""
+    """Exchange two folders in one call (Linux: renameat2); return False if not supported; raises OSError."""
     import ctypes
 
     try:
@@ -282,7 +283,7 @@ def _exchange(first: Path, second: Path) -> bool:
 
 
 def _has_to_stay(folder: Path) -> bool:
-    """An existing folder that must not be renamed: a mount point, the current folder, or one in a read-only folder."""
+    """Whether an existing folder must not be renamed: a mount point, the current folder, or in a read-only folder."""
     if not folder.is_dir():
         return False
     try:

@@ -1,7 +1,7 @@
-"""What a command may replace: a file that cdtool wrote, known by what it holds and not by its name; no other unasked.
+"""Which files a command may replace: files written by cdtool, recognised by content and not by name.
 
-Every kind of file that cdtool writes over has a mark in its first or last 8 KB. `--force` lifts this for a command that
-has it, and never for a file that the command reads.
+Every kind of file that cdtool replaces has a mark in its first or last 8 KB. `--force`, in commands that have it,
+allows other files too, but never a file that the command reads.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ _LOOKED_AT = 1 << 13
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that cdtool writes: what all of them hold, and what they are called in a message."""
+    """A kind of file that cdtool writes: the mark in all of them, and their name in a message."""
 
     mark: bytes
     words: str
 
     def is_kind_of(self, path: Path) -> bool:
-        """Whether a file is of this kind; an empty one is of every kind. Raises UsageError where it cannot be read."""
+        """Whether a file is of this kind; an empty one is of every kind. Raises UsageError if it cannot be read."""
         try:
             with path.open("rb") as file:
                 head = file.read(_LOOKED_AT)
@@ -46,32 +46,34 @@ FIGURES = {
 
 
 def refuse_other_kind(target: Path, kind: Kind, *, force: bool | None = None) -> None:
-    """Raise UsageError where something other than `kind` would be replaced. `force` is None where there is no --force.
+    """Raise UsageError if a file of another kind would be replaced. `force` is None for a command without --force.
 
-    Links are followed. Where there is nothing, an empty file, or a device or pipe, nothing can be lost.
+    Links are followed. A missing or empty file, a device or a pipe may always be written.
     """
     if force or not target.is_file() or kind.is_kind_of(target):
         return
     way_out = "remove it first" if force is None else "overwrite it with --force"
-    raise UsageError(f"{plain(target)}: already exists and holds no {kind.words}", f"choose another name, or {way_out}")
+    raise UsageError(
+        f"{plain(target)}: already exists and contains no {kind.words}", f"choose another name, or {way_out}"
+    )
 
 
 def refuse_foreign_figure(target: Path, *, force: bool) -> None:
-    """Raise UsageError where a figure would replace what cdtool did not draw."""
+    """Raise UsageError if a figure would replace a file that cdtool did not draw."""
     if target.suffix.lower() in FIGURES:
         refuse_other_kind(target, FIGURES[target.suffix.lower()], force=force)
 
 
 def refuse_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise UsageError where a file to write is one that the command reads, under whatever name or link."""
+    """Raise UsageError if a file to write is also read by the command, under any name or link."""
     read = [path for path in inputs if path.exists()]
     for target in targets:
         if target.exists() and any(target.samefile(path) for path in read):
-            raise UsageError(f"{plain(target)}: is read by this command", "choose another name to write to")
+            raise UsageError(f"{plain(target)}: is read by this command", "choose another name for the output")
 
 
 def _unpacked(head: bytes) -> bytes:
-    """The beginning of what a gzip file holds; nothing of another file."""
+    """Return the beginning of the content of a gzip file; empty for another file."""
     if not head.startswith(b"\x1f\x8b"):
         return b""
     try:

@@ -1,4 +1,4 @@
-"""Instructions of the processor that kernels need and numba has no word for: `prefetch` and `store`."""
+"""Processor instructions for kernels that numba does not provide: `prefetch` and `store`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cdtool.kernels import Kernel
 
 
 class _Instruction(Kernel):
-    """Stands in kernels like another kernel; there is nothing to compile, and numba is loaded only where it is used."""
+    """Used in kernels like another kernel; there is nothing to compile, and numba is loaded only on use."""
 
     def __init__(self, function: Callable[..., Any], made: Callable[[], Callable[..., Any]]) -> None:
         super().__init__(function, "")
@@ -17,18 +17,18 @@ class _Instruction(Kernel):
 
     @property
     def compiled(self) -> Callable[..., Any]:
-        """What numba makes of it in a kernel."""
+        """Return the numba function for use in a kernel."""
         if self._compiled is None:
             self._compiled = self._made()
         return self._compiled
 
 
 def _prefetch(data: Any, at: int) -> None:
-    """Fetch the cache line of byte `at` after the first one of the array `data`; it need not exist. Changes nothing.
+    """Fetch the cache line of byte `at` after the first one of the array `data`; any address is allowed.
 
-    A kernel that picks a few bytes here and there out of much memory waits for memory most of its time. Told some
-    elements ahead which places come next, the processor fetches them meanwhile: picking numbers out of messages takes
-    less than half as long.
+    A kernel that reads a few bytes here and there from much memory mostly waits for memory. If it announces the next
+    addresses some elements ahead, the processor fetches them meanwhile: reading numbers from messages takes less than
+    half the time.
     """
 
 
@@ -44,7 +44,7 @@ def _emit_prefetch() -> Callable[..., Any]:
             kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
             instruction = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
             place = builder.gep(builder.bitcast(array.data, byte), [arguments[1]])
-            # To be read (0), with as much locality as there is (3), data (1).
+            # Parameters: read (0), highest locality (3), data (1).
             builder.call(instruction, [place, number(0), number(3), number(1)])
             return context.get_dummy_value()
 
@@ -55,9 +55,9 @@ def _emit_prefetch() -> Callable[..., Any]:
 
 
 def _store(address: int, value: Any) -> None:
-    """Write a number to an address, which must be that of such a number in an array that is kept meanwhile.
+    """Write a number to an address, which must be that of such a number in an array that is kept alive.
 
-    A kernel takes a fixed number of arrays, and columns are as many as are asked for.
+    A kernel takes a fixed number of arrays, but the number of columns varies.
     """
 
 

@@ -1,6 +1,6 @@
-"""Thresholds held against a detector's signal over a whole log: statistic, band and what would widen it.
+"""Compare a detector's signal with thresholds over a whole log: statistic, band and activation.
 
-Which class of motion a threshold of several judges is decided sample by sample, from what came before.
+With several classes of motion, the threshold that applies is selected sample by sample, from earlier samples only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, c
 
 @dataclass(frozen=True)
 class _Share:
-    """The rows of a log that a threshold is evaluated on, and those among them that it judges, (rows,)."""
+    """The rows of a log on which a threshold is evaluated, and those to which it applies, (rows,)."""
 
     threshold: FittedThreshold
     recording: Recording
@@ -33,10 +33,10 @@ class _Share:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A signal against its thresholds over a whole log; `recording` is without ground truth.
+    """A signal with its thresholds over a whole log; `recording` has no ground truth.
 
-    Where several classes of motion judge, a sample is outside only where it is outside all of their bands. `strokes`
-    are those of a log that is cut, as they showed while it ran.
+    If several classes of motion apply, a sample is outside only if it is outside all of their bands. `strokes` are
+    those of a log that is cut, as they were known while it ran.
     """
 
     recording: Recording
@@ -47,12 +47,12 @@ class Judgement:
 
     @property
     def classes(self) -> tuple[MotionClass, ...]:
-        """The classes of motion that were learned."""
+        """Return the classes of motion that were learned."""
         return classes_of(self.thresholds)
 
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
-        """The statistic and its band; raises RecordingError where a threshold fails."""
+        """Return the statistic and its band; raises RecordingError if a threshold fails."""
         return self._with(lambda threshold: threshold)
 
     def narrower(self, share: float) -> Band:
@@ -61,7 +61,7 @@ class Judgement:
 
     @cached_property
     def met_at(self) -> FloatArray:
-        """(n, J) the safety factor at which each sample's limit would be met; -inf where nothing is limited."""
+        """Return (n, J) the safety factor at which each sample's limit would be met; -inf without a limit."""
         met = np.full(self.signal.values.shape, np.inf)
         judged = np.zeros(met.shape, dtype=bool)
         for share in self._shares:
@@ -82,7 +82,7 @@ class Judgement:
         return tuple(self._share(learned[item.motion], item.stroke, item.where) for item in judging)
 
     def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
-        """A class in a stroke: its signal is that of no other motion, so that a filter starts again behind such."""
+        """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""
         stroke = self.strokes[number]
         after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
         whole = len(self.strokes) == 1
@@ -94,7 +94,7 @@ class Judgement:
         return _Share(threshold, recording, replace(part, status=status), rows, judges[rows])
 
     def _with(self, changed: Callable[[FittedThreshold], FittedThreshold]) -> tuple[Signal, Band]:
-        """Of several classes the one whose band a sample is least outside, so that it is outside where it is of all."""
+        """Merge several classes: the band that a sample exceeds least applies, so it is outside only if outside all."""
         shares = self._shares
         if len(shares) == 1 and shares[0].judges.all():
             return checked_evaluation(changed(shares[0].threshold), shares[0].recording, shares[0].signal)
@@ -119,7 +119,7 @@ class Judgement:
             open_below[rows] |= valid & np.isneginf(band.lower)
             open_above[rows] |= valid & np.isposinf(band.upper)
             limited[rows] |= valid & (np.isfinite(band.lower) | np.isfinite(band.upper))
-        # Where each class watches a side of its own, together they watch none.
+        # If each class monitors a different side, together they monitor none.
         status[open_below & open_above & limited] = Status.NO_LIMIT
         return replace(self.signal, values=values, status=status, unit=unit), Band(lower, upper)
 
@@ -138,12 +138,12 @@ def judged(
 
 
 def classes_of(thresholds: Sequence[FittedThreshold]) -> tuple[MotionClass, ...]:
-    """Return the classes of motion that thresholds were learned for; a threshold without one serves any motion."""
+    """Return the classes of motion that thresholds were learned for; a threshold without one applies to any motion."""
     classes = (class_of(item) for item in thresholds)
     return tuple(item for item in classes if item is not None)
 
 
 def class_of(threshold: FittedThreshold) -> MotionClass | None:
-    """Return the class of motion that a threshold was learned for; None where it serves any motion."""
+    """Return the class of motion that a threshold was learned for; None if it applies to any motion."""
     motion: MotionClass | None = getattr(threshold, "motion", None)
     return motion

@@ -1,7 +1,7 @@
-"""Compiling kernels before work begins, side by side: other processes compile a share each into numba's cache.
+"""Compile kernels in parallel before work begins: other processes each compile a share into numba's cache.
 
-Kernels that call the same ones stay together, so that no two processes compile these. No process is started where that
-would gain nothing (all in the cache, one core, little to compile) or lead nowhere (no cache folder can be written).
+Kernels that call the same kernels stay together, so that no two processes compile these. No process is started if it
+would save nothing (all in the cache, one core, little to compile) or cannot help (no writable cache folder).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import Any
 from cdtool.cores import usable_cores
 from cdtool.kernels import Kernel, entries, loaded, named
 
-# Time to compile, as bytes of byte code: what every kernel takes, whatever its size; what the start of a process
-# takes; and how much there must be for each process.
+# Compile time, in bytes of byte code: fixed cost of a kernel; cost of starting a process; and the minimum work per
+# process.
 _ANY_KERNEL = 150
 _START = 1000
 _WORTH_A_PROCESS = 4000
@@ -33,9 +33,9 @@ compile_named(kernels)
 
 
 def compile_loaded() -> int:
-    """Compile every kernel of the modules imported so far (before workers start); returns how many there are.
+    """Compile every kernel of the modules imported so far (before workers start); return their number.
 
-    What another process could not compile this one does.
+    Kernels that another process failed to compile are compiled by this one.
     """
     wanted = entries()
     own, *others = shares(_not_cached(wanted), usable_cores())
@@ -55,7 +55,7 @@ def compile_loaded() -> int:
 
 
 def compile_named(names: Iterable[tuple[str, str]]) -> None:
-    """Compile kernels by their modules, which are imported, and names."""
+    """Import the modules of kernels and compile the kernels by name."""
     for module, name in names:
         import_module(module)
         for item in loaded():
@@ -64,14 +64,14 @@ def compile_named(names: Iterable[tuple[str, str]]) -> None:
 
 
 def shares(items: Sequence[Kernel], cores: int) -> list[list[Kernel]]:
-    """The kernels that each of at most so many processes compiles, this one's first; evenly, the longest spread first.
+    """Return the kernels for each of at most `cores` processes, this one's first; balanced, the longest first.
 
-    Kernels of plug-ins stay with this process: another one may not be able to import them, or not without side effects.
+    Kernels of plug-ins stay with this process: another one may be unable to import them, or only with side effects.
     """
     own, groups = _groups(items)
     weights = [_weight(group) for group in groups]
     count = 1 + min(cores - 1, int(sum(weights) // _WORTH_A_PROCESS))
-    if getattr(sys, "frozen", False) or not sys.executable:  # there is no Python to start
+    if getattr(sys, "frozen", False) or not sys.executable:  # no Python executable to start
         count = 1
     made = [own, *([] for _ in range(count - 1))]
     loads = [_weight(own), *(_START for _ in range(count - 1))]
@@ -83,7 +83,7 @@ def shares(items: Sequence[Kernel], cores: int) -> list[list[Kernel]]:
 
 
 def _groups(items: Sequence[Kernel]) -> tuple[list[Kernel], list[list[Kernel]]]:
-    """Those of plug-ins, with what calls the same kernels; and the others, those that call the same ones together."""
+    """Return the kernels of plug-ins and of those that share kernels with them; and groups of the others that do."""
     groups: list[tuple[set[Kernel], list[Kernel]]] = []
     for item in items:
         parts, members, apart = _parts(item), [item], []
@@ -100,7 +100,7 @@ def _groups(items: Sequence[Kernel]) -> tuple[list[Kernel], list[list[Kernel]]]:
 
 
 def _parts(item: Kernel) -> set[Kernel]:
-    """A kernel and all that it calls."""
+    """Return a kernel and all kernels that it calls."""
     called = [other for other in item.called.values() if not other.is_instruction]
     return {item}.union(*map(_parts, called))
 
@@ -111,12 +111,12 @@ def _weight(items: Iterable[Kernel]) -> int:
 
 
 def _not_cached(items: Iterable[Kernel]) -> list[Kernel]:
-    """Return the kernels that are not in numba's cache; none where there is no cache.
+    """Return the kernels that are not in numba's cache; empty without a cache.
 
-    numba has no call that looks into its cache without compiling. What it documents is used instead: the folder
-    (`stats.cache_path` of a function that was not compiled yet), and that each function has one index file there,
-    `.nbi`, by its name. An index older than the kernel's file or than numba is out of date. A wrong answer costs time,
-    never a result: what was taken for cached is compiled by this process.
+    numba cannot query its cache without compiling. This uses documented facts instead: the folder (`stats.cache_path`
+    of a function that is not compiled yet), and one index file `.nbi` per function, named after it. An index older than
+    the kernel's file or than numba is outdated. A wrong answer costs only time: a kernel mistaken for cached is
+    compiled by this process.
     """
     import numba
 
@@ -125,7 +125,7 @@ def _not_cached(items: Iterable[Kernel]) -> list[Kernel]:
         return []
     try:
         return [item for item in items if not _is_cached(item)]
-    except (RuntimeError, OSError):  # no folder can be written
+    except (RuntimeError, OSError):  # no writable folder
         return []
 
 
@@ -135,14 +135,14 @@ def _is_cached(item: Kernel) -> bool:
     function = named(item)
     lazy: Any = numba.njit(cache=True)(function)
     changed = max(Path(file).stat().st_mtime for file in (item.function.__code__.co_filename, numba.__file__))
-    # numba leaves the signs < and > out of file names.
+    # numba removes the signs < and > from file names.
     name = function.__qualname__.translate({ord("<"): None, ord(">"): None})
     indices = Path(lazy.stats.cache_path).glob(f"*.{name}-*.nbi")
     return any(index.stat().st_mtime >= changed for index in indices)
 
 
 def _start(share: Iterable[Kernel]) -> subprocess.Popen[bytes] | None:
-    """A process that compiles these kernels; None where none can be started. What it says is of no concern."""
+    """Start a process that compiles these kernels; return None if none can be started. Its output is ignored."""
     names = [(item.function.__module__, item.__name__) for item in share]
     task = json.dumps([list(map(str, sys.path)), names])
     silent = subprocess.DEVNULL

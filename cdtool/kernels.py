@@ -1,7 +1,7 @@
 """Compiled loops: numba, cached on disk, without the interpreter lock, compiled at the first call.
 
-A module with kernels can be imported without numba being loaded. Where no cache folder can be written (a read-only
-installation and a read-only home), the kernel is recompiled in each process, and a warning says so once.
+A module with kernels can be imported without loading numba. Without a writable cache folder (a read-only installation
+and a read-only home), kernels are recompiled in each process, and a warning is shown once.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from typing import Any, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-# The signature of an array (n,) of float64 that a kernel only reads; writable arrays fit it too.
+# The signature of a read-only array (n,) of float64; writable arrays fit it too.
 READ_ONLY = "Array(float64, 1, 'C', readonly=True)"
 
-# The signature of a field of a named tuple by its annotation. Arrays come from `read_only`: inside a tuple numba fits
-# no writable array to a type that is read-only.
+# The signature of a named tuple's field, by its annotation. Arrays come from `read_only`: in a tuple, numba does not
+# accept a writable array for a read-only type.
 _FIELDS: dict[Any, str] = {
     float: "float64",
     npt.NDArray[np.float64]: READ_ONLY,
@@ -37,14 +37,14 @@ _told = False
 
 
 class Kernel:
-    """A function that numba compiles when it is first called; `signature` fixes its one specialisation.
+    """A function that numba compiles on its first call; `signature` fixes its only specialisation.
 
-    The signature may name a `NamedTuple` of the kernel's module, whose fields are numbers (`float`) or arrays (n,) that
-    the kernel only reads (`FloatArray`, `StatusArray`, made by `read_only`): arguments then have names.
+    The signature may name a `NamedTuple` of the kernel's module, with numbers (`float`) or read-only arrays (n,) as
+    fields (`FloatArray`, `StatusArray`, from `read_only`), so that arguments have names.
 
-    A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. What
-    kernels call is compiled for them without an entry from Python, which alone takes as long as a small kernel; called
-    from Python all the same it is compiled once more, unless `entry` says from the start that it has one.
+    A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. Kernels
+    called only by kernels are compiled without an entry from Python, which takes as long to compile as a small kernel.
+    If such a kernel is also called from Python, it is compiled again, unless `entry` is set.
     """
 
     def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False) -> None:
@@ -59,7 +59,7 @@ class Kernel:
 
     @property
     def compiled(self) -> Callable[..., Any]:
-        """The compiled function, compiled or taken from the cache if it was not yet."""
+        """Return the compiled function; compile it or load it from the cache on first use."""
         if self._compiled is None:
             with _lock:
                 if self._compiled is None:
@@ -68,7 +68,7 @@ class Kernel:
 
     @property
     def linked(self) -> Callable[..., Any]:
-        """What other kernels call: as `compiled`, only kernels can call it."""
+        """Return the function for other kernels: as `compiled`, but callable only from kernels."""
         if self.entry or self.is_instruction:
             return self.compiled
         with _lock:
@@ -78,18 +78,18 @@ class Kernel:
 
     @property
     def is_instruction(self) -> bool:
-        """Whether it stands for an instruction of the processor: it has no signature, and nothing of it is compiled."""
+        """Whether it stands for a processor instruction, without a signature and without anything to compile."""
         return not self.signature
 
     @property
     def tuples(self) -> dict[str, type]:
-        """The named tuples that its signature names, by their names in its module."""
+        """Return the named tuples in its signature, by their names in its module."""
         known = ((name, self.function.__globals__.get(name)) for name in re.findall(r"\w+", self.signature))
         return {name: value for name, value in known if isinstance(value, type) and hasattr(value, "_fields")}
 
     @property
     def called(self) -> dict[str, Kernel]:
-        """The kernels that it calls, by their names in its module."""
+        """Return the kernels that it calls, by their names in its module."""
         names = self.function.__globals__
         return {name: names[name] for name in self.function.__code__.co_names if isinstance(names.get(name), Kernel)}
 
@@ -104,32 +104,32 @@ def kernel(signature: str, *, entry: bool = False) -> Callable[[Callable[..., An
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return the array as a named tuple of a kernel's arguments holds it: contiguous, not to be written to."""
+    """Return the array as required for a named tuple of a kernel's arguments: contiguous and read-only."""
     view = np.ascontiguousarray(array).view()
     view.flags.writeable = False
     return view
 
 
 def entries() -> list[Kernel]:
-    """The kernels of the modules imported so far that Python calls: all but those that only kernels call."""
+    """Return the kernels of the modules imported so far that Python calls, without those that only kernels call."""
     inner = {item for caller in _all for item in caller.called.values() if not item.entry}
     return [item for item in _all if item not in inner]
 
 
 def loaded() -> list[Kernel]:
-    """All kernels of the modules imported so far."""
+    """Return all kernels of the modules imported so far."""
     return list(_all)
 
 
 class _Names(dict[str, Any]):
-    """The names that a kernel knows; those of kernels stand for compiled functions.
+    """The names that a kernel can use; the names of kernels stand for compiled functions.
 
-    They are compiled when the compiler asks for them: never where the caller is in the cache, with all that it calls.
+    They are compiled only when the compiler needs them: not if the caller, with all that it calls, is in the cache.
     """
 
     def __init__(self, names: dict[str, Any], called: dict[str, Kernel]) -> None:
         super().__init__((name, value) for name, value in names.items() if name not in called)
-        # An instruction has to be there when its caller begins to be compiled.
+        # An instruction must exist before its caller is compiled.
         self.update((name, item.compiled) for name, item in called.items() if item.is_instruction)
         self._called = called
 
@@ -138,7 +138,7 @@ class _Names(dict[str, Any]):
 
 
 def named(item: Kernel, suffix: str = "") -> Callable[..., Any]:
-    """The function that numba compiles: it knows the compiled kernels, and bears the name of its cache file."""
+    """Return the function that numba compiles, with the compiled kernels in scope and the name of its cache file."""
     function, called = item.function, item.called
     made = types.FunctionType(function.__code__, _Names(function.__globals__, called), function.__name__)
     made.__module__, made.__qualname__ = function.__module__, function.__qualname__ + suffix + _stamp(item)
@@ -167,9 +167,9 @@ def _constants(item: Kernel) -> dict[str, object]:
 
 
 def _stamp(item: Kernel) -> str:
-    """Return what changes in the name of the cache file with what the kernel takes from other modules.
+    """Return the part of the cache file's name that depends on what the kernel takes from other modules.
 
-    numba recompiles a cached function when its own file has changed, but not when one that it imports from has.
+    numba recompiles a cached function if its own file has changed, but not if an imported one has.
     """
     import hashlib
 
@@ -183,7 +183,7 @@ def _stamp(item: Kernel) -> str:
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without garbage collection: looking again and again at all that the compiler made takes an eighth of its time."""
+    """Disable garbage collection, which takes an eighth of the compile time."""
     if not gc.isenabled():
         yield
         return
@@ -195,7 +195,7 @@ def _no_collection() -> Iterator[None]:
 
 
 def _signature(item: Kernel) -> Any:
-    """Return the signature for numba, which knows the names of its own types alone."""
+    """Return the signature for numba, with numba's own type names only."""
     from numba import types
 
     if not item.tuples:
@@ -222,7 +222,7 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
             if not _told:
                 _told = True
                 warnings.warn(
-                    f"no folder for compiled kernels can be written ({fault}); compiling in every process instead. "
+                    f"no writable folder for compiled kernels ({fault}); they are compiled in every process. "
                     "Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
                     RuntimeWarning,
                     stacklevel=4,

@@ -1,4 +1,4 @@
-"""Integers of more digits than float64 holds: counted, so that no digit is lost in silence."""
+"""Count integers with more digits than float64 can hold, so that no digit is lost silently."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from cdtool.plain_text import counted
 from cdtool.recording import Finding, FloatArray
 
-# Up to here float64 holds every integer; from there on 64 bits hold none.
+# float64 represents every integer up to the first value; 64-bit integers are below the second.
 _EXACT, _WIDEST = 2.0**53, 2.0**64
 
 
 def rounded_integers(values: FloatArray) -> int:
-    """How many values may be integers that float64 has rounded: those from 2^53 on, as far as 64 bits reach."""
-    if not ((values > _EXACT).any() or (values < -_EXACT).any()):  # nearly always: a pass without a copy
+    """Return how many values may be integers rounded by float64: from 2^53 up to the largest 64-bit integer."""
+    if not ((values > _EXACT).any() or (values < -_EXACT).any()):  # the usual case, without a copy
         return 0
     size = np.abs(values)
     return int(np.count_nonzero((size > _EXACT) & (size <= _WIDEST)))
 
 
 def rounding_finding(column: str, count: int, severity: Literal["note", "warning"] = "warning") -> list[Finding]:
-    """What is said of a column with so many of them; nothing of none."""
+    """Return the finding on a column with that many rounded values; empty for none."""
     text = f"{counted(count, 'value')} beyond 2^53: of integers that large the last digits are rounded to float64"
     return [Finding(text, column, severity)] if count else []

@@ -1,4 +1,4 @@
-"""A log's channels before they are referred to the load side: what plausible ranges are learned from."""
+"""A log's channels before conversion to the load side, from which plausible ranges are learned."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class LoggedRecording:
     def on_load_side(
         self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
     ) -> Recording:
-        """The recording on the load side, made without the values that are outside of the plausible ranges."""
+        """Return the recording on the load side, without values outside the plausible ranges."""
         plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
         recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
         return recording

@@ -1,4 +1,4 @@
-"""machine.toml -> a machine, a channel map for columns and one for topics, and gains.
+"""Read machine.toml: the machine, the channel maps for columns and topics, and gains.
 
 Every error names the file, the key, the value and what is allowed. See docs/machine-file.md.
 """
@@ -22,7 +22,7 @@ from cdtool.tables import Table, read_toml
 
 @dataclass(frozen=True)
 class MachineFile:
-    """A validated machine file: the machine, where its channels are, and gains that differ from the defaults."""
+    """A validated machine file: the machine, its channels, and gains that differ from the defaults."""
 
     path: Path
     machine: Machine
@@ -32,7 +32,7 @@ class MachineFile:
     digest: str
 
     def detector(self, name: str) -> Any:
-        """The detector of that (full or short) name with this file's gains."""
+        """Return the detector of that (full or short) name with this file's gains."""
         registry = _registry("cdtool.detectors", "DETECTORS")
         full = registry.canonical(name)
         return registry.load(full)(**self.gains.get(full, {}))
@@ -49,7 +49,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     for part in (root, table):
         if "operations" in part.values:
             raise part.fault(
-                "operations", "is a key of the benchmark file", "write it there, or give --operations motion"
+                "operations", "is a key of the benchmark file", "set it there, or give --operations motion"
             )
     machines = _registry("cdtool.machines", "MACHINES")
     kind = table.choice("type", machines.names(plugins=True))
@@ -68,7 +68,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
 
 
 def fingerprint(machine: Machine) -> str:
-    """A hash of a machine's parameters: a signature belongs to exactly these."""
+    """Return a hash of a machine's parameters, to which a signature belongs."""
     text = json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -95,7 +95,7 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
         except ConfigurationError as fault:
             raise ConfigurationError(f"{table.key(name)}: {fault.message}", fault.hint) from fault
         if full in gains:
-            raise table.fault(name, f"is {full} again", "give a detector's gains once, under one of its names")
+            raise table.fault(name, f"repeats {full}", "give a detector's gains once, under one of its names")
         gains[full] = given
     return gains
 
@@ -108,6 +108,6 @@ def _read_pins(table: Table) -> TablePins:
 
 
 def _registry(module: str, name: str) -> Registry:
-    # By name: this file lies below the folders whose classes it builds.
+    # By name: this module is in a lower layer than the classes.
     registry: Registry = getattr(import_module(module), name)
     return registry

@@ -1,8 +1,8 @@
-"""Cutting a recording into operations (strokes), by motion or by a trigger, classed by direction and speed.
+"""Divide a recording into operations (strokes), by motion or by a trigger, with class of direction and speed.
 
-An operation keeps the recording's own time. Cutting and classing look at the whole recording: they serve to learn, to
-score and to name. No verdict depends on them: a detector runs over the whole log, and where a stroke begins for its
-thresholds is decided by what was logged so far (`motion.strokes`).
+An operation keeps the recording's time. This analysis uses the whole recording, for learning, scoring and naming. No
+verdict depends on it: a detector runs over the whole log, and for its thresholds the start of a stroke is determined
+from earlier samples only (`motion.strokes`).
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from cdtool.recording import BoolArray, Recording
 
 HOW_TO_CUT = ("whole", "motion", "trigger")
 
-# Share of the peak speed below which the axis counts as resting.
+# Share of the peak speed below which the axis counts as at rest.
 _REST_SHARE = 0.05
-# A rest or a motion shorter than this [s] is a pause in a stroke, or no stroke.
+# A rest shorter than this [s] is a pause in a stroke; a motion shorter than this is not a stroke.
 _SHORTEST_REST = 0.2
 _SHORTEST_MOTION = 0.2
-# How much of the rest before and after a stroke belongs to it [s]: detectors start up there.
+# Length of the rest before and after a stroke that belongs to it [s]: detectors start up there.
 _MARGIN = 0.5
 
 
 @dataclass(frozen=True)
 class Operation:
-    """One stroke: its part of the recording (named recording#n where cut), its class and n (0: the whole recording).
+    """One stroke: its part of the recording (named recording#n if cut), its class and n (0: the whole recording).
 
     `log` is the recording that it was cut from, by `cut`; None: it is the whole one.
     """
@@ -41,22 +41,22 @@ class Operation:
 
     @property
     def whole(self) -> Recording:
-        """The recording that it was cut from."""
+        """Return the recording that it was cut from."""
         return self.log or self.recording
 
     @property
     def name(self) -> str:
-        """The operation's name."""
+        """Return the operation's name."""
         return self.recording.name
 
 
 def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
-    """The operations of a recording: the whole of it, its motions, or its trigger's high phases.
+    """Return the operations of a recording: the whole recording, its motions, or its trigger's high phases.
 
-    Raises UsageError for an unknown way to cut, RecordingError where the recording lacks what it needs or holds none.
+    Raises UsageError for an unknown method, RecordingError if a required channel is missing or no operation is found.
     """
     if how not in HOW_TO_CUT:
-        raise UsageError(f"unknown way to cut operations '{how}'", nearest(how, HOW_TO_CUT))
+        raise UsageError(f"unknown operations '{how}'", nearest(how, HOW_TO_CUT))
     if how == "whole":
         return [Operation(recording, motion_class(recording))]
     spans = _motion_spans(recording) if how == "motion" else _trigger_spans(recording)

@@ -1,4 +1,4 @@
-"""One log through detector, threshold and activation, and what that says of each of its operations."""
+"""Run one log through detector, threshold and activation, with the results for each of its operations."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from cdtool.operations import Operation
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 
-# From this share of its samples at another speed on, an operation without an alarm is one of another motion.
+# With at least this share of samples at another speed, an operation without an alarm counts as another motion.
 _ANOTHER_MOTION = 0.5
-# Below this share of the slowest learned speed an axis is said to be at rest.
+# Below this share of the slowest learned speed, an axis is described as at rest.
 _AT_REST = 0.01
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A part of an operation that cannot be judged: why, from when to when [s], from where to where [load unit]."""
+class Section:
+    """A section of an operation that is not assessable: reason, start and end [s], and positions [load unit]."""
 
     reason: str
     start: float
@@ -41,9 +41,9 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Detection:
-    """What a detector and its threshold say of one operation, with all that led there.
+    """The result of a detector and its threshold for one operation, with its derivation.
 
-    `threshold` is None where none applies. `judgement` is that of the whole log, of which the operation is `rows`.
+    `threshold` is None if none applies. `judgement` is that of the whole log; the operation is its `rows`.
     """
 
     operation: Operation
@@ -57,19 +57,19 @@ class Detection:
     rows: slice = field(default_factory=lambda: slice(None))
 
     def exceedance(self) -> FloatArray:
-        """For each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""
+        """Return for each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""
         if self.judgement is None:
             return np.full(self.statistic.values.shape, -np.inf)
         return self.judgement.met_at[self.rows]
 
     @property
     def begins(self) -> tuple[float, ...]:
-        """Where strokes of the log begin for thresholds and activation [s], the first one apart."""
+        """Return the start of the log's later strokes for thresholds and activation [s], without the first one."""
         return tuple(item.applies for item in self.judgement.strokes[1:]) if self.judgement else ()
 
     @property
     def other_speed(self) -> str:
-        """What was measured where no learned class fitted, and what was learned, in words; empty where one always did.
+        """Return in words the measured and learned motion where no learned class matched; empty if one always did.
 
         The speed is the median of the leading joint over the samples at another speed.
         """
@@ -83,26 +83,26 @@ class Detection:
         classes = [replace(item, unit=item.unit or unit) for item in self.judgement.classes]
         moves = abs(speed) >= _AT_REST * min(item.nominal_speed for item in classes)
         measured = MotionClass(int(np.sign(speed)) if moves else 0, abs(speed), joint, unit=unit)
-        # A speed of the right size may come at the wrong place: a start where the stroke should run, say.
+        # A matching speed may occur at the wrong position: a start in the middle of the stroke, for example.
         where = " in another part of the stroke" if any(measured.matches(item, TOLERANCE) for item in classes) else ""
         return f"measured {measured.described}{where}, learned {' and '.join(item.described for item in classes)}"
 
     @property
     def leading(self) -> int:
-        """The statistic's column of the joint that leads the motion; the first where that one is not watched."""
+        """Return the statistic's column of the joint that leads the motion; the first one if it is not monitored."""
         recording = self.operation.recording
         name = recording.joints[self.operation.motion.joint]
         return self.statistic.joints.index(name) if name in self.statistic.joints else 0
 
     @property
     def assessed_seconds(self) -> float:
-        """For how long the operation was watched [s]: the time of the valid samples of its best-watched joint."""
+        """Return how long the operation was monitored [s]: the valid samples of the joint with most of them."""
         if not len(self.statistic.time):
             return 0.0
         return self.statistic.period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
 
-    def not_judged(self) -> list[Stretch]:
-        """The stretches in which the leading joint's signal could not be judged, in order of time."""
+    def not_assessable_sections(self) -> list[Section]:
+        """Return the sections in which the leading joint's signal is not assessable, in order of time."""
         joint = self.operation.motion.joint
         status, time = self.statistic.status[:, self.leading], self.statistic.time
         edges = np.flatnonzero(np.diff(status)) + 1
@@ -115,16 +115,16 @@ class Detection:
             else np.full(len(time), np.nan)
         )
         return [
-            Stretch(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
+            Section(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
             for a, b in found
         ]
 
 
 def run_detector(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str] = ()) -> Signal:
-    """The detector's signal of an operation, of the watched joints (none named: all of them).
+    """Return the detector's signal of an operation, for the watched joints (empty: all).
 
-    It runs over the whole log that the operation was cut from, and ground truth is taken away before it looks. Raises
-    RecordingError, or ConfigurationError for an unknown joint.
+    It runs over the whole log of the operation, without ground truth. Raises RecordingError, or ConfigurationError for
+    an unknown joint.
     """
     signal = _signal_of_log(operation, machine, detector, watched)
     return signal if operation.log is None else signal.part(_rows(signal, operation))
@@ -133,7 +133,7 @@ def run_detector(operation: Operation, machine: Machine, detector: Detector, wat
 def run_detector_on_each(
     operations: Sequence[Operation], machine: Machine, detector: Detector, watched: Sequence[str] = ()
 ) -> list[Signal]:
-    """The detector's signal of each operation of one log, over which it runs once; raises as `run_detector` does."""
+    """Return the detector's signal of each operation of one log in one run; raises as `run_detector`."""
     if not operations:
         return []
     whole = _signal_of_log(operations[0], machine, detector, watched)
@@ -149,10 +149,10 @@ def detect_operations(
     watched: Sequence[str] = (),
     hold: float = HOLD,
 ) -> list[Detection]:
-    """Run the detector over a log and hold it against thresholds, for each of the log's operations.
+    """Run the detector over a log and compare its signal with thresholds, for each of the log's operations.
 
-    Of several signatures those of the motion so far serve, see `motion.applicable`; where none does, a sample is not
-    assessable. Raises RecordingError where the recording lacks a channel that the detector needs.
+    With several signatures, those for the motion so far apply, see `motion.applicable`; if none does, a sample is not
+    assessable. Raises RecordingError if a channel that the detector needs is missing.
     """
     if not operations:
         return []
@@ -161,10 +161,10 @@ def detect_operations(
 
 
 def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
-    """Where the detector's inputs lost samples, for the columns of its signal; None where none was lost."""
+    """Return where the detector's inputs lost samples, for the columns of its signal; None without losses."""
     channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
     lost = lost_samples(recording, channels, signal.time)
-    # Each of several coupled joints feels the others, and a signal of the whole machine rests on all of them.
+    # Coupled joints affect each other, and a signal of the whole machine depends on all of them.
     if lost is not None and (machine.coupled or lost.shape != signal.values.shape):
         lost = np.repeat(lost.any(axis=1, keepdims=True), signal.values.shape[1], axis=1)
     return lost
@@ -178,7 +178,7 @@ def detect_operation(
     activation: Activation,
     watched: Sequence[str] = (),
 ) -> Detection:
-    """What `detect_operations` says of one operation of a log."""
+    """Return the result of `detect_operations` for one operation of a log."""
     return detect_operations([operation], machine, detector, thresholds, activation, watched)[0]
 
 
@@ -189,7 +189,7 @@ def judge(
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
 ) -> Detection:
-    """Hold a detector's signal of an operation against thresholds; what is around the operation plays no part."""
+    """Compare a detector's signal of an operation with thresholds; the log around the operation is ignored."""
     alone = replace(operation, log=None, cut="whole")
     (detection,) = _judge_log([alone], detector, signal, thresholds, activation, HOLD)
     return replace(detection, operation=operation)

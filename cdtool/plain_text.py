@@ -1,4 +1,4 @@
-"""Text that came from files or users, made harmless for terminals, figures and reports."""
+"""Make text from files or users safe for terminals, figures and reports."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from decimal import Decimal
 
 # Control, format (direction marks), surrogate and private characters, line and paragraph separators.
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
-# What is printed about one fault, warning or note, with all that comes from files [characters].
+# Length of one printed error, warning or note, including text from files [characters].
 LINE_LENGTH = 300
 _SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
 
 def plain(text: object) -> str:
-    """Text without control characters or direction marks that a terminal or a page would obey; "?" in their place."""
+    """Return text with "?" instead of control characters or direction marks that a terminal or page would interpret."""
     given = str(text)
-    if given.isprintable():  # nothing in it is active: the common case, and much faster
+    if given.isprintable():  # the common case, and much faster
         return given
     return "".join("?" if _is_active(character) else character for character in given)
 
 
 def one_line(text: object, length: int = LINE_LENGTH) -> str:
-    """Plain text on one line of at most `length` characters; an ellipsis marks where it was cut."""
+    """Return plain text on one line of at most `length` characters; an ellipsis marks omitted text."""
     return shorten(plain(text), length)
 
 
 def shorten(text: str, length: int) -> str:
-    """The text, or its beginning and end with an ellipsis between them where it is longer than `length`."""
+    """Return the text, or its beginning and end with an ellipsis between them if it is longer than `length`."""
     if len(text) <= length:
         return text
     tail = (length - 1) // 2
@@ -37,7 +37,7 @@ def shorten(text: str, length: int) -> str:
 
 
 def shorten_names(text: str, length: int) -> str:
-    """As `shorten`, but of a list behind "known: " as many whole names as fit stay, with how many more there are.
+    """Shorten like `shorten`, but keep whole names of a list after "known: ", with the number of omitted names.
 
     >>> shorten_names("did you mean two? known: one, two, three, four", 42)
     'did you mean two? known: one and 3 more'
@@ -52,7 +52,7 @@ def shorten_names(text: str, length: int) -> str:
 
 
 def digits(value: float, least: int = 6) -> str:
-    """A number with `least` significant digits, a whole one with all of them; never an exponent."""
+    """Return a number with `least` significant digits, an integer with all digits; never an exponent."""
     if not math.isfinite(value) or value == 0.0:
         return f"{value:g}"
     before_point = math.floor(math.log10(abs(value))) + 1
@@ -60,7 +60,7 @@ def digits(value: float, least: int = 6) -> str:
 
 
 def counted(count: float, thing: str, verb: str = "") -> str:
-    """Return a number with its noun, and with a verb that is given in the plural.
+    """Return a number with its noun and, if given in the plural, its verb.
 
     >>> counted(1, "hour"), counted(2.5, "hour"), counted(2, "entry")
     ('1 hour', '2.5 hours', '2 entries')

@@ -1,8 +1,8 @@
-"""Values that no sensor of a machine gives: fill values, wraps of integers, spikes. Masked, counted, and a loss.
+"""Values that no sensor of a machine measures: fill values, integer overflow, spikes. Masked, counted, and a loss.
 
-`IMPOSSIBLE` holds for every channel. What else is plausible is learned from impact-free runs and kept with what was
-learned of them; a log is compared with that, sample by sample, and never against its own later samples. Ranges are of
-channels as they are logged, in SI, before anything is derived from them.
+`IMPOSSIBLE` applies to every channel. Other plausible ranges are learned from impact-free runs and stored with them; a
+log is compared with these, sample by sample, and never with its own later samples. Ranges are of channels as logged, in
+SI, before anything is derived from them.
 """
 
 from __future__ import annotations
@@ -18,40 +18,40 @@ import numpy as np
 from cdtool.plain_text import counted
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
 
-# No channel of a machine reaches this in SI: 1e9 N m, rad/s or rad.
+# No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.
 IMPOSSIBLE = 1e9
-# Beyond so many reaches (the distance from the median that 99 % of the samples keep) a value is no measurement. Stiff
-# impacts come to 13 of them in this project's logs; accelerometers feel shocks, and encoders may start elsewhere.
+# Above this multiple of the reach (the distance from the median of 99 % of the samples) a value is not a measurement.
+# Stiff impacts reach 13 in this project's logs; accelerometers measure shocks, and encoders may start elsewhere.
 FAR = {"acceleration": 1e4, "position": 1e4, "reference_position": 1e4}
 _FAR_ELSE = 1e3
-# ... and beyond so many times what runs come to at most.
+# ... and above this multiple of the largest distance in the runs.
 _BEYOND_EXTREME = 10.0
-# Where integers end, as a log has them before scaling: beyond so many reaches such a value fills a gap.
+# Ends of integer ranges, as logged before scaling: above this multiple of the reach such a value fills a gap.
 _ENDS = np.array([-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1, 2.0**32 - 1])
 _FAR_ENDS = 20.0
 # A step of 16-bit integers this large is a wrap.
 _WRAP = 0.9 * 2**16
-# A position that steps further than its whole reach, and so many times as fast as it usually moves, has not moved so.
+# A position step larger than its whole reach, and this many times faster than usual, is not a motion.
 _FASTER = 10.0
-# Of runs to learn from, a value beyond so many times what runs come to at most, for so few samples, is a spike. In a
-# log to be judged it may be a contact.
+# In runs to learn from, a value above this multiple of the runs' largest distance, for so few samples, is a spike. In a
+# log to be assessed it may be a contact.
 _SPIKE, _SPIKE_SAMPLES = {"acceleration": 20.0}, 3
 _SPIKE_ELSE = 5.0
-# The share of samples and of runs that may be broken without moving a range.
+# The share of samples and of runs that may be wrong without affecting a range.
 _SHARE, _RUNS = 0.99, 0.8
-# Within so many samples from its begin a log may begin with what is wrong.
+# A log may begin with wrong values for at most this many samples.
 _EDGE = 3
-# From a new zero a position moves on once it has kept within so many reaches of the usual ones for so long [s], and has
-# moved by this share of the reach.
+# After a leap to a new zero, a position counts again once it has stayed within this multiple of the usual reach for
+# this long [s], and has moved by this share of the reach.
 _AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
 
 
 @dataclass(frozen=True)
 class ChannelRange:
-    """A channel's median for each joint, its reach about it (that of the joint that reaches furthest), and its rate.
+    """A channel's median for each joint, its reach about it (that of the joint with the largest), and its rate.
 
-    `rate` [unit/s] is how fast it changes at most, 0 where that is not looked at. `extreme` is how far from the median
-    a run comes at most, 0 where that is not known: a log that rests most of the time reaches little and comes far.
+    `rate` [unit/s] is the largest rate of change, 0 if not checked. `extreme` is a run's largest distance from the
+    median, 0 if unknown: a log mostly at rest has a small reach and a large distance.
     """
 
     unit: str
@@ -63,13 +63,13 @@ class ChannelRange:
 
 @dataclass(frozen=True)
 class PlausibleRanges:
-    """What was learned of each channel's values."""
+    """The plausible values of each channel."""
 
     channels: Mapping[str, ChannelRange]
 
     @classmethod
     def learned(cls, recordings: Sequence[Recording]) -> Self:
-        """The ranges of impact-free runs as logged: up to a fifth of the runs may be wrong without moving them."""
+        """Learn the ranges of impact-free runs as logged; up to a fifth of the runs may be wrong without effect."""
         found: dict[str, ChannelRange] = {}
         for name in (*MEASURED, *REFERENCES):
             series = [item[name] for item in recordings if name in item]
@@ -84,10 +84,10 @@ class PlausibleRanges:
     def masked(
         self, recording: Recording, factors: Mapping[str, Sequence[float]], *, to_learn: bool = False
     ) -> Recording:
-        """The recording with what is not plausible missing, and a loss for each joint that had such values.
+        """Return the recording without implausible values, and a loss for each joint with such values.
 
-        `factors` lead from a channel's numbers in the log to SI, joint by joint. A run `to_learn` from has no contact:
-        its spikes are masked too.
+        `factors` convert a channel's logged numbers to SI, per joint. A run `to_learn` from has no contact, so its
+        spikes are masked too.
         """
         channels, findings = dict(recording.channels), list(recording.findings)
         for name, known in self.channels.items():
@@ -118,12 +118,12 @@ class PlausibleRanges:
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the ranges as JSON values."""
         return {name: asdict(item) for name, item in self.channels.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`; raises KeyError, TypeError or ValueError for anything else."""
+        """Return the ranges from JSON values; raises KeyError, TypeError or ValueError for anything else."""
         channels = {
             str(name): ChannelRange(
                 str(item["unit"]),
@@ -142,7 +142,7 @@ class PlausibleRanges:
 
 
 def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
-    """One channel's range; None where no run holds a value, or all hold the same one."""
+    """Return one channel's range; None if no run has a value, or all values are equal."""
     medians = [np.array([_quantile(column, 0.5) for column in item.values.T]) for item in series]
     medians = [median for median in medians if np.isfinite(median).all()]
     if not medians:
@@ -155,7 +155,7 @@ def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
 
 
 def _extreme(off: FloatArray) -> float:
-    """How far a run comes: the largest distance of its furthest joint, but for as many samples as a spike has."""
+    """Return a run's largest distance, over joints, ignoring as many samples as a spike has."""
     furthest = 0.0
     for column in np.abs(off).T:
         known = np.sort(column[np.isfinite(column)])
@@ -172,7 +172,7 @@ def _rate(series: Series) -> float:
 
 
 def _usual(figures: Sequence[float]) -> float:
-    """The largest of the lowest four fifths of the runs; 0 where there is none."""
+    """Return the largest of the lowest four fifths of the runs; 0 without runs."""
     known = sorted(figure for figure in figures if np.isfinite(figure))
     return known[int(_RUNS * (len(known) - 1))] if known else 0.0
 
@@ -186,7 +186,7 @@ def _quantile(values: FloatArray, share: float) -> float:
 
 
 def _implausible(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> BoolArray:
-    """True (n, J) where a value is far from all that was learned, or the end of an integer."""
+    """Return True (n, J) where a value is far from all learned values, or an end of an integer range."""
     with np.errstate(invalid="ignore"):
         distance = np.abs(series.values - np.array(known.centre))
         wrong: BoolArray = distance > max(far * known.reach, _BEYOND_EXTREME * known.extreme)
@@ -197,7 +197,7 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
 
 
 def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:
-    """True (n, J) where values go beyond `far` times what runs come to, for few samples."""
+    """Return True (n, J) where values exceed `far` times the runs' largest distance, for few samples."""
     spikes = np.zeros(values.shape, dtype=bool)
     if known.extreme <= 0.0:
         return spikes
@@ -213,7 +213,7 @@ def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:
 def _leapt(
     time: FloatArray, values: FloatArray, known: ChannelRange, centre: float, factor: float
 ) -> tuple[BoolArray, list[Leap]]:
-    """True (n,) for the values of a joint behind a leap, and its leaps: steps that are none of the machine's."""
+    """Return True (n,) for the values of a joint after a leap, and its leaps: steps impossible for the machine."""
     index = np.flatnonzero(np.isfinite(values))
     step = np.abs(np.diff(values[index]))
     if known.rate > 0.0:
@@ -253,7 +253,7 @@ def _leap_words(leaps: Sequence[Leap], masked: int, unit: str, joint: str) -> st
 
 @dataclass(frozen=True)
 class Leap:
-    """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values count as they are, NaN if never."""
+    """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values are valid again, NaN if never."""
 
     time: float
     before: float
@@ -264,11 +264,11 @@ class Leap:
 def _behind_leaps(
     time: FloatArray, values: FloatArray, is_leap: BoolArray, near: float, usual: tuple[float, float] | None
 ) -> tuple[BoolArray, list[Leap]]:
-    """Return True (n,) for the values behind a leap, and the leaps; `is_leap` (n - 1,): the steps that are one.
+    """Return True (n,) for the values after a leap, and the leaps; `is_leap` (n - 1,): the steps that are leaps.
 
-    A value is back where it is within `near` of the one before the leap. With `usual` (centre and reach) a position may
-    have been set to a new zero too: one that is reset stands among the usual positions and moves on there,
-    which one that reads nothing does not. Causal, but for a log that begins with what is wrong.
+    A value is back if it is within `near` of the one before the leap. With `usual` (centre and reach) a position may
+    also have been set to a new zero: a reset encoder stays among the usual positions and moves on, a failed one does
+    not. Causal, except for a log that begins with wrong values.
     """
     wrong = np.zeros(len(values), dtype=bool)
     leaps = []
@@ -292,7 +292,7 @@ def _behind_leaps(
 def _end(
     time: FloatArray, values: FloatArray, leaps: Sequence[int], near: float, usual: tuple[float, float] | None
 ) -> tuple[int, bool]:
-    """The first value behind `leaps[0]` that counts again, and whether from a new zero; the last row ends `leaps`."""
+    """Return the first valid value after `leaps[0]`, and whether from a new zero; the last row ends `leaps`."""
     before = values[leaps[0]]
     for first, last in pairwise(leaps):
         part = slice(first + 1, last + 1)
@@ -305,7 +305,7 @@ def _end(
 
 
 def _moves_on(time: FloatArray, values: FloatArray, centre: float, reach: float) -> BoolArray:
-    """True (n,) where the values behind a leap have kept among the usual ones so far, and have moved."""
+    """Return True (n,) where the values after a leap have stayed among the usual ones so far, and have moved."""
     among = np.logical_and.accumulate(np.abs(values - centre) <= _AMONG * reach)
     moved = np.abs(values - values[0]) >= _MOVED * reach
     on: BoolArray = among & moved & (time - time[0] >= _SETTLED)

@@ -1,4 +1,4 @@
-"""What was measured: Series, Recording, Contact. Frozen, SI, every channel with its own time."""
+"""Measured data: Series, Recording, Contact. Frozen, SI, with separate times for each channel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MEASURED = ("torque", "speed", "position", "acceleration")
 REFERENCES = ("reference_position", "reference_speed", "reference_torque")
 GROUND_TRUTH = ("force", "label", "event")
 TRIGGER = ("trigger",)
-# High or low, or one sample an event: without a unit.
+# High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
 
@@ -41,7 +41,7 @@ class Finding:
 
 
 def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Losses, then warnings, then notes, each in the order that they are in."""
+    """Return losses, then warnings, then notes, each in the given order."""
     return tuple(sorted(findings, key=lambda item: ("loss", "warning", "note").index(item.severity)))
 
 
@@ -49,7 +49,7 @@ def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 class Series:
     """One channel: `time` (n,) s strictly increasing, `values` (n, J) float64 in `unit`; NaN = no sample.
 
-    Raises RecordingError where the shapes do not fit or the time does not increase.
+    Raises RecordingError if the shapes do not match or the time does not increase.
     """
 
     time: FloatArray
@@ -62,7 +62,7 @@ class Series:
         if values.ndim == 1:
             values = values[:, np.newaxis]
         if time.ndim != 1 or values.ndim != 2 or len(values) != len(time):
-            raise RecordingError(f"time has shape {time.shape}, values {values.shape}: (n,) and (n, J) are needed")
+            raise RecordingError(f"time has shape {time.shape}, values {values.shape}; expected (n,) and (n, J)")
         if not np.all(np.isfinite(time)) or (len(time) > 1 and not np.all(time[1:] > time[:-1])):
             raise RecordingError("time does not strictly increase", "clean it with cdtool.clock.clean_time")
         object.__setattr__(self, "time", time)
@@ -73,16 +73,16 @@ class Series:
 
     @property
     def joint_count(self) -> int:
-        """J, the number of joints."""
+        """Return J, the number of joints."""
         return int(self.values.shape[1])
 
     @cached_property
     def period(self) -> float:
-        """Median sample period [s]; NaN below two samples."""
+        """Return the median sample period [s]; NaN below two samples."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else float("nan")
 
     def between(self, start: float, end: float) -> Series:
-        """The samples with start <= time <= end [s]."""
+        """Return the samples with start <= time <= end [s]."""
         first = int(np.searchsorted(self.time, start, side="left"))
         last = int(np.searchsorted(self.time, end, side="right"))
         return replace(self, time=self.time[first:last], values=self.values[first:last])
@@ -90,10 +90,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Recording:
-    """One log: its channels as Series, referred to the load side, each at its own rate.
+    """One log: its channels as Series, on the load side, each at its own rate.
 
-    `origin` is what has to be added to every time to get the source's own clock [s] (0 unless that is an epoch).
-    A channel that is absent is absent, never zeros.
+    `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
+    is missing, never zeros.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Recording:
             if series.joint_count not in expected:
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
-                    "give one column a joint in [channels], in the order of machine.joints",
+                    "give one column per joint in [channels], in the order of machine.joints",
                 )
 
     def __contains__(self, channel: str) -> bool:
@@ -129,30 +129,30 @@ class Recording:
 
     @property
     def start(self) -> float:
-        """Time of the first sample of any channel [s]."""
+        """Return the time of the first sample of any channel [s]."""
         return min((float(s.time[0]) for s in self.channels.values() if len(s)), default=float("nan"))
 
     @property
     def end(self) -> float:
-        """Time of the last sample of any channel [s]."""
+        """Return the time of the last sample of any channel [s]."""
         return max((float(s.time[-1]) for s in self.channels.values() if len(s)), default=float("nan"))
 
     @property
     def duration(self) -> float:
-        """Seconds from the first sample to the last."""
+        """Return the time from the first sample to the last [s]."""
         return self.end - self.start
 
     def between(self, start: float, end: float) -> Recording:
-        """The same recording, cut to start <= time <= end [s]; channels left without a sample are absent."""
+        """Return the recording cut to start <= time <= end [s], without channels that have no sample there."""
         parts = {name: series.between(start, end) for name, series in self.channels.items()}
         return replace(self, channels={name: series for name, series in parts.items() if len(series)})
 
     def section(self, start: float, end: float) -> Recording:
-        """Return the recording cut to start <= time <= end [s] with all its channels, those without a sample too."""
+        """Return the recording cut to start <= time <= end [s] with all its channels, even those without a sample."""
         return replace(self, channels={name: series.between(start, end) for name, series in self.channels.items()})
 
     def without_ground_truth(self) -> Recording:
-        """What a detector or threshold may see: no load cell, no label."""
+        """Return the data available to a detector or threshold: no load cell, no label."""
         seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}
         return replace(self, channels=seen)
 
@@ -161,11 +161,11 @@ class Recording:
 class Contact:
     """A true impact: onset and end [s], the onset's uncertainty [s], its peak force [N] and how it was found.
 
-    `kind` is what a label file calls it. Of a load cell: `rest`, what it read at rest just before the onset [N],
-    `drift` of that level [N/s], by how much it had shifted since the log began [N], and how finely the onset is known,
-    `resolution` [s]: clock, noise, drift and slope. `hole` [s]: for how long load-cell samples are missing where the
-    contact may have begun; 0: nowhere for longer than a force meter would allow. A contact that is `in_progress` when
-    the recording begins has no onset: `start` is the first sample.
+    `kind` is its name in a label file. From a load cell: `rest`, the reading at rest just before the onset [N], `drift`
+    of that level [N/s], its shift since the log began [N], and the resolution of the onset, `resolution` [s]: from
+    clock, noise, drift and slope. `hole` [s]: how long load-cell samples are missing where the contact may have begun;
+    0: never longer than a force meter would allow. A contact that is `in_progress` at the start of the recording has no
+    onset: `start` is the first sample.
     """
 
     start: float

@@ -1,8 +1,8 @@
-"""Names -> classes, loaded only when asked for.
+"""Classes by name, loaded on first use.
 
-A folder of the method (formats, machines, detectors, thresholds, report writers) has one literal table
-`name -> "module:Class"`. Plug-ins come by entry points of the group `cdtool.<kind>s`; they are looked at only when an
-unknown name is asked for or everything is listed, and checked against the contract when they are loaded.
+Each folder of the method (formats, machines, detectors, thresholds, report writers) has one literal table
+`name -> "module:Class"`. Plug-ins are entry points of the group `cdtool.<kind>s`; they are searched only for an unknown
+name or a full list, and checked against the contract when they are loaded.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from cdtool.errors import CdtoolError, UsageError, nearest
 
 @dataclass(frozen=True)
 class Registry:
-    """The table of one kind of class, with its short names, and what a plug-in of that kind must have.
+    """The table of one kind of class, with its short names, and the requirements on a plug-in of that kind.
 
-    `contract`: attributes of the class. `optional`: attributes that it may have, with their types. `settings`: the
-    metadata that each field of a frozen dataclass carries beside its default; None where the class need not be one.
+    `contract`: attributes of the class. `optional`: optional attributes with their types. `settings`: the metadata that
+    each field of a frozen dataclass needs in addition to its default; None if the class need not be one.
     """
 
     kind: str
@@ -32,19 +32,19 @@ class Registry:
     settings: tuple[str, ...] | None = None
 
     def names(self, plugins: bool = False) -> list[str]:
-        """Names in the table's order; plug-ins behind them if asked for."""
+        """Return the names in the table's order; with `plugins`, followed by those of plug-ins."""
         found = list(self.table)
         if plugins:
             found += sorted(set(self._plugins()) - set(found))
         return found
 
     def usable_names(self) -> list[str]:
-        """Names in the table's order, then the plug-ins that can be used."""
+        """Return the names in the table's order, then the usable plug-ins."""
         broken = self.broken_plugins()
         return [name for name in self.names(plugins=True) if name in self.table or name not in broken]
 
     def canonical(self, name: str) -> str:
-        """The full name behind a full or short name; raises UsageError with the nearest known ones."""
+        """Return the full name for a full or short name; raises UsageError with the nearest known ones."""
         full = self.short_names.get(name.lower(), name)
         if full in self.table:
             return full
@@ -52,7 +52,7 @@ class Registry:
         return full if full in plugins else self._by_short_name(name, sorted(plugins))
 
     def load(self, name: str) -> Any:
-        """The class of that name; raises CdtoolError, naming its package, where a plug-in cannot be used."""
+        """Return the class of that name; for an unusable plug-in raises CdtoolError, naming its package."""
         full = self.canonical(name)
         if full in self.table:
             module, _, attribute = self.table[full].partition(":")
@@ -60,7 +60,7 @@ class Registry:
         return self._load_plugin(full)
 
     def broken_plugins(self) -> dict[str, CdtoolError]:
-        """The installed plug-ins that cannot be used, and why."""
+        """Return the installed plug-ins that cannot be used, and why."""
         found = {}
         for name in sorted(self._plugins()):
             try:
@@ -80,25 +80,25 @@ class Registry:
         point = points[0]
         if len(points) > 1:
             packages = " and ".join(sorted(_package(item) for item in points))
-            raise CdtoolError(f"the packages {packages} both bring a {self.kind} '{name}'", "uninstall one of them")
+            raise CdtoolError(f"the packages {packages} both provide a {self.kind} '{name}'", "uninstall one of them")
         if name in self.table:
-            raise self._fault(point, f"bears the name of a {self.kind} of cdtool itself")
+            raise self._fault(point, f"has the name of a {self.kind} of cdtool itself")
         try:
             loaded = point.load()
         except Exception as fault:
-            raise self._fault(point, f"does not load: {fault!r}") from fault
+            raise self._fault(point, f"cannot be loaded: {fault!r}") from fault
         if problem := self._breach(loaded, name):
             raise self._fault(point, problem)
         return loaded
 
     def _breach(self, loaded: Any, name: str) -> str:
-        """What a plug-in's class lacks; empty where it keeps the contract."""
+        """Return how a plug-in's class violates the contract; empty if it does not."""
         for attribute in self.contract:
             if not hasattr(loaded, attribute):
-                return f"lacks the attribute '{attribute}'"
+                return f"has no attribute '{attribute}'"
         for attribute, kind in self.optional.items():
             if not isinstance(getattr(loaded, attribute, None), kind | None):
-                return f"has an attribute '{attribute}' that is no {kind.__name__}"
+                return f"has an attribute '{attribute}' that is not of type {kind.__name__}"
         if "name" in self.contract and loaded.name != name:
             return f"is named '{loaded.name}' in its class: both names must be the same"
         short = getattr(loaded, "short_name", "")
@@ -108,14 +108,14 @@ class Registry:
 
     @staticmethod
     def _breach_of_settings(loaded: Any, settings: tuple[str, ...]) -> str:
-        """Return what the dataclass of a plug-in lacks; empty where every field has its default and metadata."""
+        """Return how the dataclass of a plug-in violates the contract; every field needs a default and metadata."""
         if not (is_dataclass(loaded) and getattr(loaded, "__dataclass_params__").frozen):  # noqa: B009 - untyped
-            return "is no frozen dataclass"
+            return "is not a frozen dataclass"
         for item in fields(loaded):
             if item.default is MISSING:
                 return f"has no default for '{item.name}'"
             if absent := [key for key in settings if key not in item.metadata]:
-                return f"gives no {' and no '.join(absent)} for '{item.name}': make it by cdtool.detectors.base.gain"
+                return f"has no {' and no '.join(absent)} for '{item.name}': define it with cdtool.detectors.base.gain"
         return ""
 
     def _fault(self, point: EntryPoint, problem: str) -> CdtoolError:
@@ -131,15 +131,15 @@ class Registry:
         if len(found) == 1:
             return found[0]
         if found:
-            raise UsageError(f"the short name '{name}' belongs to {' and '.join(found)}", "write the full name")
+            raise UsageError(f"the short name '{name}' belongs to {' and '.join(found)}", "give the full name")
         hint = nearest(name, [*self.names(plugins=True), *self.short_names, *filter(None, short.values())])
-        # What does not load stands before the hint: the list of known names is cut where the line is full.
+        # Failures come before the hint: the list of known names is cut at the end of the line.
         told = "; ".join([f"unknown {self.kind} '{name}'", *(item.message for item in broken.values())])
         raise UsageError(told, hint)
 
 
 def plugin_packages() -> dict[str, str]:
-    """The installed packages that bring plug-ins, with their versions: what a report has to name."""
+    """Return the installed packages that provide plug-ins, with their versions, for reports."""
     found = {
         point.dist.name: point.dist.version
         for kind in ("detectors", "thresholds", "machines", "formats", "writers")

@@ -1,4 +1,4 @@
-"""What a signature file holds: the thresholds of one machine and one detector, and where they come from."""
+"""The content of a signature file: the thresholds of one machine and one detector, and their origin."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdtool.thresholds.normal_motion import NormalMotion
 
 @dataclass(frozen=True)
 class LearnedRun:
-    """A run that a signature was learned from: its name, the SHA-256 of its file, and which operation of it."""
+    """A run that a signature was learned from: its name, the SHA-256 of its file, and the number of its operation."""
 
     name: str
     sha256: str
@@ -27,10 +27,10 @@ class LearnedRun:
 
 @dataclass(frozen=True)
 class FactorOrigin:
-    """Where a safety factor comes from: the rule's default, a hand, or a false-alarm budget.
+    """Origin of a safety factor: the rule's default, set by hand, or a false-alarm budget.
 
-    With a budget: its text, the impact-free operations that the factor was set on, and the alarms it gives on them.
-    `added`: runs that a signature was updated with since.
+    With a budget: its text, the impact-free operations used to set the factor, and the alarms on them. `added`: runs
+    added to the signature later.
     """
 
     by: Literal["default", "hand", "budget"] = "default"
@@ -48,13 +48,12 @@ class FactorOrigin:
 
 @dataclass(frozen=True)
 class SignatureFile:
-    """The thresholds of one machine and one detector with its gains: of a signature, one for each class of motion.
+    """The thresholds of one machine and one detector with its gains: for a signature, one per class of motion.
 
-    `rule` is the threshold's with its settings, `origin` where its safety factor comes from. `first` keeps what was
-    first learned; `current` is what counts. `joints` are those that are watched: the columns of the signal.
-    `operations`: how the logs were cut. `plausible`: what values the runs' channels had; None in older files. `normal`:
-    what every channel looks like in the runs, one for each class of motion with enough of them; None in a file that
-    was written before there was such a thing.
+    `rule` is the threshold rule with its settings, `origin` the origin of its safety factor. `first` is what was first
+    learned; `current` is in use. `joints` are the monitored joints: the columns of the signal. `operations`: how the
+    logs were cut. `plausible`: value ranges of the runs' channels; None in older files. `normal`: the normal motion of
+    every channel, one per class of motion with enough runs; None in older files.
     """
 
     machine: str
@@ -76,28 +75,28 @@ class SignatureFile:
 
     @property
     def threshold(self) -> str:
-        """The threshold's name."""
+        """Return the threshold's name."""
         return str(self.rule.name)
 
     @property
     def of_earlier_version(self) -> str:
-        """What a file of an earlier version has not, and how to migrate it, in a line; empty of one of this version.
+        """Return what is missing from a file of an earlier version, and how to migrate it; empty for the current one.
 
-        Runs that are added to such a file do not make up for it.
+        Runs added to such a file do not complete it.
         """
         if self.normal is not None:
             return ""
         parts = "the speed profiles, plausible ranges and normal motions of its runs"
-        return f"of an earlier version, without {parts}: learn it again with cdtool learn-signature to have them"
+        return f"of an earlier version, without {parts}: relearn it with cdtool learn-signature to add them"
 
     @property
     def learns_limits(self) -> bool:
-        """Whether the runs decide the limits, and no hand."""
+        """Whether the limits are learned from the runs, not set by hand."""
         return not getattr(self.rule, "limits", ())
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The rule's settings that differ from its defaults, its safety factor apart."""
+        """Return the rule's settings that differ from its defaults, without the safety factor."""
         plain = asdict(type(self.rule)())
         return {
             name: value
@@ -107,7 +106,7 @@ class SignatureFile:
 
     @property
     def described(self) -> str:
-        """The threshold with its safety factor or limits, and where those come from."""
+        """Return the threshold in words, with its safety factor or limits and their origin."""
         if by_hand := getattr(self.rule, "limits", ()):
             return f"{self.threshold} {', '.join(map(digits, by_hand))} {self.unit} {self.origin}"
         return f"{self.threshold}, safety factor {self.current[0].safety_factor:.4g} {self.origin}"
@@ -116,18 +115,20 @@ class SignatureFile:
         """Raise SignatureError unless this was learned on that machine with that detector and those gains."""
         where = self.source or "signature"
         if detector.name != self.detector:
-            raise SignatureError(f"{where}: learned with {self.detector}, not {detector.name}", "learn one for it")
+            raise SignatureError(
+                f"{where}: learned with {self.detector}, not {detector.name}", "learn a signature for it"
+            )
         if fingerprint(machine) != self.machine_fingerprint:
             raise SignatureError(
-                f"{where}: learned on another machine ('{self.machine}', other parameters than '{machine.name}')",
+                f"{where}: learned on another machine ('{self.machine}', with other parameters than '{machine.name}')",
                 "learn a signature with this machine file",
             )
         gains = asdict(detector)
         for name, value in gains.items():
             if self.gains.get(name) != value:
                 raise SignatureError(
-                    f"{where}: learned with {name} = {self.gains.get(name)}, the machine file has {value}",
-                    "learn again, or restore the gain in [detectors]",
+                    f"{where}: learned with {name} = {self.gains.get(name)}, but the machine file has {value}",
+                    "relearn it, or restore the gain in [detectors]",
                 )
 
 
@@ -138,7 +139,7 @@ def with_run(
     run: LearnedRun,
     normal: tuple[NormalMotion, ...] | None = None,
 ) -> SignatureFile:
-    """The file with the class at `index` and the normal motions replaced, and the run noted; the first signature stays.
+    """Return the file with the class at `index` and the normal motions replaced, and the run added; `first` stays.
 
     Without `normal` the file keeps its own.
     """

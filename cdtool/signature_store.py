@@ -27,15 +27,15 @@ from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from
 from cdtool.value_words import fault_in_words, value_in_words
 
 SCHEMA_VERSION = 4
-# Version 3 has no normal motions, plausible ranges and speed courses; all else is the same.
+# Version 3 has no normal motions, plausible ranges and speed courses; everything else is the same.
 _READABLE = (3, SCHEMA_VERSION)
 _KIND = "cdtool signature"
-# Every signature file begins with it: `_to_json` names its kind first.
+# Beginning of every signature file: `_to_json` writes its kind first.
 SIGNATURE = Kind(f'"kind": "{_KIND}"'.encode(), "signature")
 
 
 def write_signature(path: str | Path, signature: SignatureFile) -> None:
-    """Write a file in .json, whole or not at all (see `cdtool.files`). Raises SignatureError."""
+    """Write a .json file, completely or not at all (see `cdtool.files`). Raises SignatureError."""
     file = Path(path)
     check_name(file)
     text = json.dumps(_to_json(signature), allow_nan=False)
@@ -44,15 +44,15 @@ def write_signature(path: str | Path, signature: SignatureFile) -> None:
 
 
 def check_name(file: Path) -> None:
-    """Raise SignatureError where a file's name is none of a signature's: that of a recording would be lost."""
+    """Raise SignatureError for a name not allowed for a signature, which protects recordings."""
     if file.suffix.lower() != ".json":
-        raise SignatureError(f"{file}: is not a name for a signature file", "it must end in .json")
+        raise SignatureError(f"{file}: must end in .json", "choose another name")
 
 
 def read_signature(path: str | Path) -> SignatureFile:
     """Read and check a signature file; raises SignatureError."""
     file = Path(path)
-    content = read_bytes(file, SignatureError, most=MOST_JSON, hint="make one with cdtool learn-signature")
+    content = read_bytes(file, SignatureError, most=MOST_JSON, hint="create one with cdtool learn-signature")
     try:
         values = parse_json(content)
     except ContentError as fault:
@@ -61,28 +61,28 @@ def read_signature(path: str | Path) -> SignatureFile:
         raise _no_signature(file, content)
     if values.get("schema_version") not in _READABLE:
         raise SignatureError(
-            f"{file}: schema_version is {value_in_words(values.get('schema_version'))}, this cdtool knows "
+            f"{file}: schema_version is {value_in_words(values.get('schema_version'))}, this cdtool reads "
             f"{' and '.join(map(str, _READABLE))}",
-            "learn it again with this version",
+            "relearn it with this version",
         )
     try:
         return _from_json(values, str(file))
     except UsageError as fault:
         raise SignatureError(f"{file}: {fault.message}", fault.hint) from fault
-    except Exception as fault:  # whatever wrong values provoke, plug-in thresholds included
-        raise SignatureError(f"{file}: damaged signature file: {fault_in_words(fault)}", "learn it again") from fault
+    except Exception as fault:  # any exception from wrong values, including plug-in thresholds
+        raise SignatureError(f"{file}: damaged signature file: {fault_in_words(fault)}", "relearn it") from fault
 
 
 def _no_signature(file: Path, content: bytes, why: str = "") -> SignatureError:
     kind = kind_of(content)
-    # A signature file is JSON itself: what is wrong in it says more.
+    # A signature file is JSON itself, so a more specific message is used.
     own = not kind or kind in ("a signature file", "JSON")
     what = f"not a signature file{why}" if own else f"is {kind}, not a signature file"
-    return SignatureError(f"{file}: {what}", "make one with cdtool learn-signature")
+    return SignatureError(f"{file}: {what}", "create one with cdtool learn-signature")
 
 
 def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
-    """Read, change and write under a lock, so that no concurrent update is lost. Raises SignatureError."""
+    """Read, change and write a file under a lock, so that no concurrent update is lost. Raises SignatureError."""
     with _faults(), locked(Path(path)):
         stored = read_signature(path)
         changed = change(stored)
@@ -93,7 +93,7 @@ def update_signature(path: str | Path, change: Callable[[SignatureFile], Signatu
 
 @contextmanager
 def _faults() -> Iterator[None]:
-    """What goes wrong with writing, as a SignatureError."""
+    """Convert errors while writing to SignatureError."""
     try:
         yield
     except (OutputError, UsageError) as fault:
@@ -101,7 +101,7 @@ def _faults() -> Iterator[None]:
 
 
 def _to_json(signature: SignatureFile) -> dict[str, Any]:
-    from cdtool.version import __version__  # looking it up costs as much as all of --help
+    from cdtool.version import __version__  # looking it up takes as long as all of --help
 
     return {
         "kind": _KIND,
@@ -128,7 +128,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
     current, first = (tuple(fitted_from_dict(rule, item) for item in values[name]) for name in ("current", "first"))
     joints = tuple(values["joints"])
     if not all(isinstance(name, str) for name in joints):
-        raise ValueError("joints: a list of names is needed")
+        raise ValueError("joints must be a list of names")
     _check_fitted(current, first, joints)
     normal = values.get("normal_motion") if values["schema_version"] > 3 else None
     return SignatureFile(
@@ -153,7 +153,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
 
 def _check_fitted(current: Sequence[FittedThreshold], first: Sequence[FittedThreshold], joints: Sequence[str]) -> None:
     if not current or len(current) != len(first):
-        raise ValueError(f"{len(current)} current thresholds, {len(first)} first ones")
+        raise ValueError(f"{len(current)} current thresholds, but {len(first)} first ones")
     for item in (*current, *first):
         if not 0.0 < item.safety_factor < math.inf:
             raise ValueError(f"safety factor {item.safety_factor}")
@@ -161,7 +161,7 @@ def _check_fitted(current: Sequence[FittedThreshold], first: Sequence[FittedThre
         if motion is not None and not (motion.direction in (-1, 1) and 0.0 < motion.nominal_speed < math.inf):
             raise ValueError(f"a class of motion with direction {motion.direction:g}, speed {motion.nominal_speed:g}")
         if getattr(item, "joints", tuple(joints)) != tuple(joints):
-            raise ValueError(f"joints {', '.join(joints) or 'none'}, but limits of others")
+            raise ValueError(f"joints {', '.join(joints) or 'none'}, but limits for other joints")
 
 
 def _origin(values: Mapping[str, Any]) -> FactorOrigin:
@@ -172,7 +172,7 @@ def _origin(values: Mapping[str, Any]) -> FactorOrigin:
 def _activation(values: Mapping[str, Any]) -> Activation:
     debounce, latch = values["debounce"], values["latch"]
     if isinstance(debounce, bool) or not isinstance(debounce, int | None) or not isinstance(latch, bool):
-        raise ValueError("activation: debounce is a number of samples, latch is true or false")
+        raise ValueError("activation: debounce must be a number of samples, latch true or false")
     return Activation(debounce, float(values["rearm"]), float(values["hysteresis"]), latch)
 
 

@@ -1,4 +1,4 @@
-"""Strict JSON: no NaN or infinity, nothing that cannot be written or that a terminal would obey."""
+"""Strict JSON: without NaN or infinity, unencodable text or characters that a terminal would interpret."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import math
 import re
 from typing import Any
 
-# JSON allows these as they are. Half a surrogate pair, from a file name that is no UTF-8, cannot be written at all.
+# JSON allows these unescaped. Half a surrogate pair, from a file name that is not UTF-8, cannot be encoded.
 _ACTIVE = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
 
 
 def strict_json(value: Any, *, compact: bool = False) -> str:
-    """JSON of mappings, sequences and plain values: null where a number is not finite, active characters escaped."""
+    """Return JSON of mappings, sequences and plain values: null for non-finite numbers, active characters escaped."""
     layout: dict[str, Any] = {"separators": (",", ":")} if compact else {"indent": 1}
     text = json.dumps(finite(value), allow_nan=False, ensure_ascii=False, **layout)
     return _ACTIVE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def finite(value: Any) -> Any:
-    """The same with None for every number that is not finite."""
+    """Return the value with None for every number that is not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        # Columns of traces are a million plain numbers: no call for each.
+        # Columns of traces are a million plain numbers: avoid a call for each.
         return [
             item if type(item) is int or (type(item) is float and math.isfinite(item)) else finite(item)
             for item in value

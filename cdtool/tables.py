@@ -1,4 +1,4 @@
-"""Reading a TOML table so that every error names the file, the key and what is allowed."""
+"""Read a TOML table so that every error names the file, the key and what is allowed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdtool.value_words import value_in_words
 
 
 class Table:
-    """A table of a TOML file; what is not asked for by `finish()` is an unknown key."""
+    """A table of a TOML file; a key that was not read before `finish()` is an unknown key."""
 
     def __init__(self, values: Mapping[str, Any], where: str, prefix: str = "") -> None:
         self.values = values
@@ -23,11 +23,11 @@ class Table:
         self._asked: list[str] = []
 
     def key(self, name: str) -> str:
-        """File and full key, for an error message."""
+        """Return file and full key, for an error message."""
         return f"{self.where}: {self.prefix}{name}"
 
     def fault(self, name: str, problem: str, hint: str = "") -> ConfigurationError:
-        """An error about one key."""
+        """Return an error about one key."""
         return ConfigurationError(f"{self.key(name)}: {problem}", hint)
 
     def __contains__(self, name: str) -> bool:
@@ -35,18 +35,18 @@ class Table:
         return name in self.values
 
     def raw(self, name: str, default: Any = None) -> Any:
-        """The value as TOML has it."""
+        """Return the value as read from TOML."""
         self._note(name)
         return self.values.get(name, default)
 
     def number(
         self, name: str, default: float | None = None, *, minimum: float = -math.inf, above: float = -math.inf
     ) -> float:
-        """A finite number, at least `minimum` and more than `above`; required without a default."""
+        """Return a finite number, at least `minimum` and more than `above`; required without a default."""
         value = self.raw(name)
         if value is None:
             if default is None:
-                raise self.fault(name, "is missing", f"a number{_range_text(minimum, above)} is needed")
+                raise self.fault(name, "is missing", f"give a number{_range_text(minimum, above)}")
             return default
         return self._checked(name, value, minimum, above)
 
@@ -59,48 +59,48 @@ class Table:
         minimum: float = -math.inf,
         above: float = -math.inf,
     ) -> tuple[float, ...]:
-        """One number for all joints, or a list with one for each."""
+        """Return one number for all joints, or a list with one per joint."""
         value = self.raw(name)
         if not isinstance(value, list):
             return (self.number(name, default, minimum=minimum, above=above),) * count
         if len(value) != count:
-            raise self.fault(name, f"has {len(value)} values", f"one number, or {count}: one a joint")
+            raise self.fault(name, f"has {len(value)} values", f"give one number, or {count}: one per joint")
         return tuple(self._checked(f"{name}[{i}]", item, minimum, above) for i, item in enumerate(value))
 
     def whole(self, name: str, default: int, *, minimum: int) -> int:
-        """A whole number of at least `minimum`."""
+        """Return an integer of at least `minimum`."""
         value = self.raw(name, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
-            raise self.fault(name, f"is {value_in_words(value)}", f"a whole number of at least {minimum} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"give a whole number of at least {minimum}")
         return value
 
     def flag(self, name: str, default: bool) -> bool:
-        """true or false."""
+        """Return true or false."""
         value = self.raw(name, default)
         if not isinstance(value, bool):
-            raise self.fault(name, f"is {value_in_words(value)}", "true or false, without quotes")
+            raise self.fault(name, f"is {value_in_words(value)}", "give true or false, without quotes")
         return value
 
     def text(self, name: str, default: str | None = None) -> str:
-        """A string; required without a default."""
+        """Return a string; required without a default."""
         value = self.raw(name)
         if value is None:
             if default is None:
-                raise self.fault(name, "is missing", "a text is needed")
+                raise self.fault(name, "is missing", "give a text")
             return default
         if not isinstance(value, str):
-            raise self.fault(name, f"is {value_in_words(value)}", "a text in quotes is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", "give a text in quotes")
         return value
 
     def choice(self, name: str, allowed: Sequence[str], default: str | None = None) -> str:
-        """One of the allowed words."""
+        """Return one of the allowed words."""
         value = self.text(name, default)
         if value not in allowed:
             raise self.fault(name, f"is '{value}'", nearest(value, allowed))
         return value
 
     def texts(self, name: str, default: Sequence[str] | None = None) -> tuple[str, ...]:
-        """A list of strings; one string alone is taken as a list of one."""
+        """Return a list of strings; a single string becomes a list of one."""
         value = self.raw(name)
         if value is None and default is not None:
             return tuple(default)
@@ -108,22 +108,22 @@ class Table:
             return (value,)
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
             raise self.fault(
-                name, "is missing" if value is None else f"is {value_in_words(value)}", "a list of texts is needed"
+                name, "is missing" if value is None else f"is {value_in_words(value)}", "give a list of texts"
             )
         return tuple(value)
 
     def table(self, name: str, required: bool = False) -> Table:
-        """A table below this one; an empty one where it is absent and not required."""
+        """Return a table below this one; an empty one if it is missing and not required."""
         value = self.raw(name)
         if value is None and not required:
             value = {}
         if not isinstance(value, dict):
             problem = "is missing" if value is None else f"is {value_in_words(value)}"
-            raise self.fault(name, problem, f"a table [{self.prefix}{name}] is needed")
+            raise self.fault(name, problem, f"add a table [{self.prefix}{name}]")
         return Table(value, self.where, f"{self.prefix}{name}.")
 
     def finish(self) -> None:
-        """Raise ConfigurationError if a key is left that nobody asked for."""
+        """Raise ConfigurationError if a key is left that was not read."""
         for name in self.values:
             if name not in self._asked:
                 raise self.fault(name, "unknown key", nearest(name, self._asked))
@@ -134,14 +134,14 @@ class Table:
 
     def _checked(self, name: str, value: Any, minimum: float, above: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.fault(name, f"is {value_in_words(value)}", f"a number{_range_text(minimum, above)} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"give a number{_range_text(minimum, above)}")
         if value < minimum or value <= above:
-            raise self.fault(name, f"is {value_in_words(value)}", f"a number{_range_text(minimum, above)} is needed")
+            raise self.fault(name, f"is {value_in_words(value)}", f"give a number{_range_text(minimum, above)}")
         return float(value)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file; raises ConfigurationError with the file and the line."""
+    """Return the tables of a TOML file; raises ConfigurationError with the file and the line."""
     text = read_text(path, ConfigurationError, most=MOST_TOML)
     try:
         return parse_toml(text)
@@ -150,7 +150,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         what = f"is {kind}, not TOML" if kind and not kind.endswith(("machine file", "benchmark file")) else ""
         raise ConfigurationError(
             f"{path}: {what or f'not valid TOML: {fault}'}",
-            "give a machine file or benchmark file" if what else "texts in quotes, decimals with a point",
+            "give a machine file or benchmark file" if what else "write texts in quotes, decimals with a point",
         ) from fault
 
 

@@ -1,4 +1,4 @@
-"""Source unit -> SI. An unknown unit is an error that lists the known ones."""
+"""Conversion of units to SI. An unknown unit is an error that lists the known ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from cdtool.errors import ConfigurationError, nearest
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit's dimension, named by its SI unit, and the factor that leads there."""
+    """A unit's dimension, named by its SI unit, and the factor to that unit."""
 
     si: str
     factor: float
 
 
-# SI units of what a drive reports: from these a scale leads to a channel's own unit (N m per A, say).
+# SI units of raw drive values: a scale converts them to a channel's own unit (N m per A, for example).
 RAW_UNITS = ("A", "V", "1", "count")
 
 _STANDARD_GRAVITY = 9.80665
@@ -61,9 +61,9 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m", 1.0),
     "mN m": Unit("N m", 1e-3),
     "kN m": Unit("N m", 1e3),
-    # a channel of a robot with joints of both kinds: rad or m, N m or N ... each joint's own
+    # a channel of a robot with linear and rotary joints: rad or m, N m or N ... for each joint
     "SI": Unit("SI", 1.0),
-    # what a drive reports: RAW_UNITS
+    # raw drive values: RAW_UNITS
     "A": Unit("A", 1.0),
     "mA": Unit("A", 1e-3),
     "V": Unit("V", 1.0),
@@ -99,7 +99,7 @@ _SPELLINGS = {
 
 
 def unit(name: str, where: str) -> Unit:
-    """The unit of that name. Raises ConfigurationError, naming `where`, if it is not known."""
+    """Return the unit of that name. Raises ConfigurationError, naming `where`, if it is unknown."""
     known = find_unit(name)
     if known is None:
         raise ConfigurationError(f"{where}: unknown unit '{name}'", nearest(name, UNITS))
@@ -107,6 +107,6 @@ def unit(name: str, where: str) -> Unit:
 
 
 def find_unit(name: str) -> Unit | None:
-    """The unit of that name, or None."""
+    """Return the unit of that name, or None."""
     text = name.strip()
     return UNITS.get(_SPELLINGS.get(text, text))

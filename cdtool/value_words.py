@@ -1,4 +1,4 @@
-"""Values and faults that came out of a file, in words for a message: never as Python would write them."""
+"""Values and errors from a file as words for a message, without Python notation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _WRONG_KIND = (TypeError, AttributeError, IndexError)
 
 
 def value_in_words(value: Any) -> str:
-    """Return a value as a message names it.
+    """Return a value in words for a message.
 
     >>> [value_in_words(value) for value in (True, None, "a", 2.5, [1, 2], {"b": 1})]
     ['true', 'empty', "'a'", '2.5', 'a list of 2 values', 'a table']
@@ -32,15 +32,15 @@ def value_in_words(value: Any) -> str:
 
 
 def fault_in_words(fault: Exception) -> str:
-    """Return why values of a file do not fit, where reading them raised a fault of Python.
+    """Return why values of a file are invalid, from the Python exception that reading them raised.
 
     >>> fault_in_words(KeyError("unit")), fault_in_words(TypeError("'int' object is not iterable"))
-    ("'unit' is missing", 'a value is of the wrong kind')
+    ("'unit' is missing", 'a value has the wrong type')
     """
     if isinstance(fault, KeyError) and fault.args:
         return f"'{fault.args[0]}' is missing"
     if isinstance(fault, _WRONG_KIND) or not str(fault):
-        return "a value is of the wrong kind"
+        return "a value has the wrong type"
     if match := _NO_NUMBER.fullmatch(str(fault)):
-        return f"{match[1]} is no number"
+        return f"{match[1]} is not a number"
     return str(fault)

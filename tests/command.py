@@ -1,4 +1,4 @@
-"""Running a command line in this process, as a shell would see it."""
+"""Run a command line in this process, as a shell would see it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Outcome:
 
 
 def one_line(text: str) -> str:
-    """A text without its line ends and the frames of the help: the same wherever a terminal wraps it."""
+    """Return a text without line ends and frames of the help, independent of the terminal's width."""
     return " ".join(text.replace("│", " ").split())
 
 
 def cdtool(*arguments: object) -> Outcome:
-    """`cdtool ARGUMENTS`: exit status, standard output, standard error."""
+    """Run `cdtool ARGUMENTS`; return exit status, standard output, standard error."""
     out, err = io.StringIO(), io.StringIO()
     status = 0
     argv = ["cdtool", *map(str, arguments)]

@@ -1,4 +1,4 @@
-"""The markers of the tests, and recordings that many tests share: an axis of known parameters, the simulated gate."""
+"""The markers of the tests, and shared recordings: an axis of known parameters, the simulated gate."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cdtool.simulation.gate_recordings import as_recording
 from tests import markers
 from tests.made_up.machines import ARM, GATE, arm_of, machine_of
 
-# No test is timed: a busy machine needs longer for an example.
+# Tests have no deadline: a busy machine takes longer for an example.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m chooses among the tests
+@pytest.hookimpl(tryfirst=True)  # before -m selects tests
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     markers.mark(items)
 
@@ -39,7 +39,7 @@ def gate() -> LinearAxis:
 
 @pytest.fixture(scope="session")
 def simulated() -> Callable[[str, int], Recording]:
-    """simulated(kind, seed): a gate run of kind none, stiff or soft; the same arguments give the same object."""
+    """simulated(kind, seed): a gate run of kind none, stiff or soft; equal arguments return the same object."""
     kept: dict[tuple[str, int], Recording] = {}
 
     def make(kind: str, seed: int) -> Recording:

@@ -1,4 +1,4 @@
-"""Where the real recordings are, and the marker of a test that needs one of them."""
+"""Location of the real recordings, and the marker of tests that need one."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ DATA: Path | None = _GIVEN if _GIVEN.is_dir() else None
 
 
 def is_present(name: str) -> bool:
-    """Whether the file or folder `name` of the recordings is there."""
+    """Whether the file or folder `name` of the recordings exists."""
     return DATA is not None and (DATA / name).exists()
 
 
 def needs_data(*names: str) -> pytest.MarkDecorator:
-    """Mark a test that is skipped, by name, where one of these files or folders of the recordings is absent."""
+    """Mark a test to be skipped, by name, if one of these files or folders of the recordings is missing."""
     return pytest.mark.real_data(*names)
 
 
 def data(name: str) -> Path:
-    """The path of a recording; only in tests marked with `needs_data`."""
+    """Return the path of a recording; only for tests marked with `needs_data`."""
     assert DATA is not None
     return DATA / name

@@ -1,10 +1,10 @@
-"""The rules by which tests are marked: which of them are slow, start programs, drive a browser, read real recordings.
+"""The rules for markers of tests: slow, starting programs, driving a browser, reading real recordings.
 
-* `real_data`: the test names a recording with `needs_data`; it is skipped, by name, where the recording is absent.
+* `real_data`: the test names a recording with `needs_data`; it is skipped, by name, if the recording is missing.
 * `browser`: the test, one of its fixtures or a function of tests/ that it uses names the module selenium.
 * `external`: the same with the module subprocess: the test starts another program, or installs a package.
 * `slow`: all cases of the test function together take longer than `BOUND_S` on two idle cores. slow_tests.txt lists
-  these functions; `python -m tests.project.slow_tests` makes the list from what a run of the suite measured.
+  these functions; `python -m tests.project.slow_tests` writes the list from the measured times of a run.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def mark(items: Iterable[pytest.Item]) -> None:
 
 
 def slow_tests(path: Path = SLOW_TESTS) -> list[str]:
-    """The functions that are listed as slow, `tests/test_files.py::test_a_link_stays`."""
+    """Return the functions listed as slow, `tests/test_files.py::test_a_link_stays`."""
     return [line for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
 
 
 @cache
 def markers_of(module: str, function: str) -> frozenset[str]:
-    """The markers of a test function by what it, its fixtures and the functions of tests/ that it uses name."""
+    """Return the markers of a test function from the names used by it, its fixtures and the functions of tests/."""
     if not _relevant().intersection([module, *_conftests(module)]):
         return frozenset()
     return frozenset(MODULES[name] for name in _reached(module, function) if name in MODULES)
@@ -55,7 +55,7 @@ def markers_of(module: str, function: str) -> frozenset[str]:
 
 @cache
 def _relevant() -> set[str]:
-    """The modules of tests/ that name one of `MODULES`, or a module that does: the others need no closer look."""
+    """Return the modules of tests/ that name one of `MODULES`, directly or through another module."""
     texts = {
         ".".join(file.relative_to(ROOT).with_suffix("").parts): file.read_text(encoding="utf-8")
         for file in Path(__file__).parent.rglob("*.py")
@@ -70,7 +70,7 @@ def _relevant() -> set[str]:
 
 
 def _reached(module: str, name: str) -> set[str]:
-    """What is reached from a name of a module: names of modules outside tests/."""
+    """Return the names of modules outside tests/ that a name of a module reaches."""
     found, seen, waiting = set(), set(), [(module, name)]
     while waiting:
         place = waiting.pop()
@@ -91,7 +91,7 @@ def _reached(module: str, name: str) -> set[str]:
 
 @dataclass(frozen=True)
 class _Names:
-    """The names of a module: what each definition uses, and what is imported."""
+    """Return the names of a module: the names that each definition uses, and its imports."""
 
     uses: Mapping[str, set[str]] = field(default_factory=dict)
     outside: Mapping[str, set[str]] = field(default_factory=dict)
@@ -121,7 +121,7 @@ def _names(module: str) -> _Names:
 
 
 def _parts(node: ast.stmt) -> tuple[set[str], set[str], list[tuple[str, str, str]]]:
-    """What a statement names (a parameter is a fixture that a test asks for), what it binds, and (from, name, as)."""
+    """Return the names a statement uses (a parameter is a fixture), the names it binds, and (from, name, as)."""
     names, stored, imports = set(), set(), []
     for part in ast.walk(node):
         if isinstance(part, ast.Name):
@@ -135,12 +135,12 @@ def _parts(node: ast.stmt) -> tuple[set[str], set[str], list[tuple[str, str, str
 
 
 def _file(module: str) -> Path | None:
-    """The file of a module of tests/; a package's holds nothing, and outside tests/ nothing is looked into."""
+    """Return the file of a module of tests/; a package's is empty, and modules outside tests/ are not searched."""
     file = ROOT.joinpath(*module.split(".")).with_suffix(".py")
     return file if file.is_file() else None
 
 
 def _conftests(module: str) -> list[str]:
-    """The conftest modules that hold for a module, the nearest first."""
+    """Return the conftest modules that apply to a module, the nearest first."""
     parts = module.split(".")[:-1]
     return [".".join([*parts[:count], "conftest"]) for count in range(len(parts), 0, -1)]

@@ -1,4 +1,4 @@
-"""No test is timed: what a test knows to be bounded in time it notes, and `benchmarks/time_bounds.py` holds it."""
+"""Times recorded by tests, which have no time limits; `benchmarks/time_bounds.py` checks them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FILE = "CDTOOL_NOTED_TIMES"
 
 
 def note(seconds: float, bound: float) -> None:
-    """Note what the present test took [s] beside the bound that is promised."""
+    """Record the time of the current test [s] and its promised bound."""
     if file := os.environ.get(FILE):
         test = os.environ.get("PYTEST_CURRENT_TEST", "").removesuffix(" (call)")
         with Path(file).open("a", encoding="utf-8") as lines:
@@ -23,7 +23,7 @@ def note(seconds: float, bound: float) -> None:
 
 @contextmanager
 def noted(bound: float) -> Iterator[None]:
-    """Note the processor time of a block, whatever else runs."""
+    """Record the processor time of a block, independent of other processes."""
     begin = process_time()
     try:
         yield

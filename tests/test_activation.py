@@ -1,4 +1,4 @@
-"""Debounce, re-arming and the handling of samples that cannot be judged."""
+"""Debounce, re-arming and the handling of samples that are not assessable."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
     assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, 0)
 
 
-def test_a_value_inside_breaks_the_succession():
+def test_a_value_inside_interrupts_the_sequence():
     assert alarms([2, 2, 0, 2, 2, 0, 2, 2]) == ()
 
 
-def test_a_missing_sample_is_skipped_and_neither_counts_nor_breaks():
+def test_a_missing_sample_neither_counts_nor_interrupts():
     (alarm,) = alarms([0, 2, np.nan, 2, np.nan, 2, 0], status=[0, 0, 3, 0, 3, 0, 0])
     assert alarm.time == pytest.approx(5e-3)
 
 
-def test_a_sample_where_the_method_does_not_apply_breaks_the_succession():
+def test_a_sample_where_the_method_does_not_apply_interrupts_the_sequence():
     assert alarms([2, 2, 2, 2, 2], status=[0, 0, 2, 0, 0]) == ()
     assert alarms([2, 2, 2, 2, 2], status=[1, 1, 1, 0, 0]) == ()
 
@@ -89,7 +89,7 @@ def test_a_wrong_setting_is_refused_by_its_name(settings, said):
 
 
 def judged(values, activation):
-    """Alarms and crossings [samples] of values against -1 and 1, through a threshold as the pipeline does it."""
+    """Return alarms and crossings [samples] of values with limits -1 and 1, through a threshold as in the pipeline."""
     values = np.asarray(values, dtype=float).reshape(-1, 1)
     time = np.arange(len(values)) * 1e-3
     recording = Recording("r", "r", ("a",), {"speed": Series(time, np.ones(values.shape), "m/s")})
@@ -98,11 +98,11 @@ def judged(values, activation):
     return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
 
 
-# Out of the band, then 0.6 s just inside it, out again, 0.6 s far inside, and out once more.
+# Outside the band, then 0.6 s just inside it, outside again, 0.6 s far inside, and outside once more.
 DWELLING = [2.0] * 5 + [0.9] * 600 + [2.0] * 5 + [0.1] * 600 + [2.0] * 5
 
 
-def test_with_hysteresis_a_signal_that_dwells_at_its_limit_is_one_alarm():
+def test_with_hysteresis_a_signal_at_its_limit_is_one_alarm():
     assert judged(DWELLING, Activation(3)) == ([2, 607, 1212], [2, 607, 1212])
     assert judged(DWELLING, Activation(3, hysteresis=0.2)) == ([2, 1212], [2, 607, 1212])
     assert judged(DWELLING, Activation(3, hysteresis=0.95)) == ([2], [2, 607, 1212])
@@ -123,7 +123,7 @@ def test_settings_change_only_what_they_name():
     st.floats(0.0, 0.99),
     st.integers(1, 4),
 )
-def test_more_hysteresis_never_makes_more_alarms_nor_other_crossings(values, hysteresis, debounce):
+def test_more_hysteresis_never_causes_more_alarms_or_other_crossings(values, hysteresis, debounce):
     if not values:
         return
     plain, crossings = judged(values, Activation(debounce, 0.005))
@@ -134,7 +134,7 @@ def test_more_hysteresis_never_makes_more_alarms_nor_other_crossings(values, hys
 
 
 @given(st.lists(st.sampled_from([0.0, 2.0, -2.0]), max_size=60), st.integers(1, 5))
-def test_the_alarms_are_those_of_a_plain_reading_of_the_rule(values, debounce):
+def test_the_alarms_agree_with_a_plain_implementation(values, debounce):
     expected, count, armed, inside_since = [], 0, True, None
     for k, value in enumerate(values):
         if abs(value) > 1.0:
@@ -168,7 +168,7 @@ def test_each_alarm_has_the_time_at_which_it_is_armed_again():
     assert again == pytest.approx([alarm.time + 3e-3 + 0.5 for alarm in raised], abs=2e-3)
 
 
-def test_an_alarm_that_is_never_calm_for_long_enough_is_never_armed_again():
+def test_an_alarm_that_never_stays_inside_is_never_rearmed():
     raised, again = rearmed([0.0] * 10 + [2.0] * 5 + [0.0] * 100)
     assert len(raised) == 1 and again == (np.inf,)
     signal = Signal(
@@ -192,7 +192,7 @@ def test_no_alarm_comes_before_the_one_before_it_is_armed_again(samples, debounc
     for i, alarm in enumerate(raised):
         assert alarm.time < again[i]
         assert i + 1 == len(raised) or again[i] < raised[i + 1].time
-    # Cut where the last one is armed again, nothing but that sample is missing for it.
+    # Cut at the last re-arming, only that sample is missing for it.
     if raised and np.isfinite(again[-1]):
         k = round(again[-1] / 1e-3)
         assert rearmed(values[:k], status[:k], debounce, rearm=4e-3)[1][-1:] in ((np.inf,), again[-2:-1])

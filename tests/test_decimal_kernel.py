@@ -1,4 +1,4 @@
-"""The nearest float64 to a decimal number: as Python's float() has it, bit for bit."""
+"""The nearest float64 to a decimal number, bit for bit as Python's float()."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_product_of_two_words_has_all_its_bits(a, b):
 @example(w=17976931348623157, q=292)  # the largest
 @example(w=17976931348623159, q=292)
 @example(w=0, q=400)
-def test_what_is_decided_is_what_python_reads(w, q):
+def test_decided_numbers_agree_with_python(w, q):
     bits = float_bits(np.uint64(w), q, powers_of_five())
     if bits != UNDECIDED:
         assert int(bits) == _bits(float(f"{w}e{q}"))
@@ -56,5 +56,5 @@ def test_subnormal_and_infinite_numbers_are_left_to_python(text):
 
 @settings(deadline=None)  # the first call may compile
 @given(st.floats(min_value=math.ldexp(1.0, -1022), max_value=1.7976931348623157e308))
-def test_bits_become_the_number_they_are_of(value):
+def test_bits_are_converted_to_their_number(value):
     assert as_float(np.uint64(_bits(value))) == value

@@ -1,4 +1,4 @@
-"""Quantiles of more values than memory holds."""
+"""Quantiles of more values than memory can hold."""
 
 from __future__ import annotations
 
@@ -45,5 +45,5 @@ def test_steps_of_a_jittering_clock_keep_five_digits_however_many_there_are():
     assert found.share(0.95e-3, 1.05e-3) == pytest.approx(np.mean(np.abs(steps - 1e-3) <= 5e-5), abs=1e-4)
 
 
-def test_nothing_has_no_median():
+def test_without_values_there_is_no_median():
     assert np.isnan(Distribution().median) and np.isnan(Distribution().percentile(5))

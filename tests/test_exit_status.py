@@ -1,4 +1,4 @@
-"""Exit statuses: one place decides from facts, and docs and help say what the code does."""
+"""Exit statuses: derived from facts in one place, and documented as in the code."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def commands() -> list[str]:
     return found
 
 
-def test_each_fact_has_its_status_and_nothing_else_is_0():
+def test_each_fact_has_its_status_and_none_is_0():
     assert ALONE.keys() == set(Fact)
     assert {fact: int(status_of([fact])) for fact in Fact} == ALONE
     assert status_of([]) == 0
 
 
-def test_where_several_facts_apply_2_comes_before_1_before_3_before_4():
+def test_with_several_facts_2_comes_before_1_before_3_before_4():
     facts = [fact for fact in Fact if fact is not Fact.INTERRUPTED]
     for size in (2, 3):
         for some in combinations(facts, size):
@@ -62,7 +62,7 @@ def test_the_table_of_the_docs_is_that_of_the_code():
     assert table_of("docs/ci.md") == {int(status): meaning for status, meaning in STATUSES.items()}
 
 
-def test_the_docs_say_which_command_has_which_status():
+def test_the_docs_list_the_statuses_of_each_command():
     text = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([\d, ]+) \| ((?:`[a-z -]+`(?:, )?)+) \|", text, re.MULTILINE)
     documented = {name: numbers for numbers, names in rows for name in re.findall("`([^`]+)`", names)}
@@ -85,7 +85,7 @@ def test_every_command_has_its_statuses_listed():
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "cdtool").rglob("*.py")), ids=lambda path: path.stem)
-def test_no_other_place_chooses_a_status(path):
+def test_no_other_module_chooses_a_status(path):
     text = path.read_text(encoding="utf-8")
     chosen = re.findall(r"typer\.Exit\(([^)]*)\)|sys\.exit\(([^)\n]*)", text)
     for words in (one or other for one, other in chosen):

@@ -1,4 +1,4 @@
-"""The one safe write: links, locks, modes, leftovers, signals, whole folders."""
+"""Safe writing: links, locks, modes, leftover files, signals, whole folders."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def names(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def test_a_file_is_written_whole_and_nothing_else_is_left(tmp_path):
+def test_a_file_is_written_completely_and_nothing_else_remains(tmp_path):
     write_text(tmp_path / "a.md", "ä\n")
     write_bytes(tmp_path / "a.md", b"new")
     assert names(tmp_path) == {"a.md"} and (tmp_path / "a.md").read_bytes() == b"new"
 
 
-def test_while_it_is_written_only_dotfiles_that_end_in_tmp_or_lock_are_there(tmp_path):
+def test_while_writing_only_dotfiles_in_tmp_or_lock_exist(tmp_path):
     with replaced(tmp_path / "a.csv", tmp_path / "b.parquet") as parts:
         assert all(path.name.startswith(".cdtool-") and path.suffix == ".tmp" for path in parts)
         hidden = names(tmp_path)
@@ -51,7 +51,7 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
 
 
 @posix_only
-def test_a_link_that_leads_nowhere_is_refused(tmp_path):
+def test_a_link_to_a_missing_file_is_refused(tmp_path):
     (tmp_path / "link.md").symlink_to("elsewhere/a.md")
     (tmp_path / "elsewhere").mkdir()
     with pytest.raises(UsageError, match=r"link\.md: is a link to a missing file"):
@@ -82,12 +82,12 @@ def test_an_existing_file_keeps_its_mode(tmp_path, mode):
     path.write_text("old")
     path.chmod(mode)
     with replaced(path) as (part,):
-        assert stat.S_IMODE(part.stat().st_mode) & ~mode & 0o077 == 0  # no more readers meanwhile than it had
+        assert stat.S_IMODE(part.stat().st_mode) & ~mode & 0o077 == 0  # no additional readers meanwhile
         part.write_text("new")
     assert stat.S_IMODE(path.stat().st_mode) == mode and path.read_text() == "new"
 
 
-def test_an_error_in_the_block_leaves_what_was_there_and_nothing_else(tmp_path):
+def test_an_error_in_the_block_leaves_the_old_file_only(tmp_path):
     (tmp_path / "a.md").write_text("old")
     with pytest.raises(CdtoolError, match=r"^.*a\.md is bad$"), replaced(tmp_path / "a.md", tmp_path / "b.md") as parts:
         parts[1].write_text("new")
@@ -116,7 +116,7 @@ def test_of_several_files_all_are_replaced_or_none(tmp_path, monkeypatch, failin
     assert {(tmp_path / name).read_text() for name in ("a.md", "b.md")} == {"old"}
 
 
-def test_an_interruption_right_after_a_rename_never_costs_the_file(tmp_path, monkeypatch):
+def test_an_interruption_right_after_a_rename_never_loses_the_file(tmp_path, monkeypatch):
     (tmp_path / "a.md").write_text("old")
     real = Path.replace
 
@@ -161,7 +161,7 @@ def _writer(folder: Path, how: str) -> subprocess.Popen[bytes]:
 
 
 @posix_only
-def test_what_a_dead_writer_left_behind_is_removed_and_what_a_living_one_needs_is_not(tmp_path):
+def test_files_of_a_dead_writer_are_removed_and_those_of_a_living_one_are_not(tmp_path):
     _writer(tmp_path, "die").wait(60)
     left = names(tmp_path)
     assert len(left) == 5 and all(name.startswith(".cdtool-") for name in left)
@@ -179,7 +179,7 @@ def test_one_writer_of_a_file_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr(file_locks, "LOCK_SECONDS", 0.05)
     with locked(tmp_path / "a.json") as target:
         assert target == (tmp_path / "a.json").resolve()
-        write_text(target, "mine")  # under the lock that this thread holds
+        write_text(target, "mine")  # under the lock held by this thread
         told: list[Exception] = []
 
         def other() -> None:
@@ -191,12 +191,12 @@ def test_one_writer_of_a_file_at_a_time(tmp_path, monkeypatch):
         thread = threading.Thread(target=other)
         thread.start()
         thread.join(30)
-        assert "a.json: another process is writing it" in str(told[0])
+        assert "a.json: is being written by another process" in str(told[0])
         write_text(tmp_path / "b.json", "another file is free")
     assert (tmp_path / "a.json").read_text() == "mine" and names(tmp_path) == {"a.json", "b.json"}
 
 
-def test_a_folder_is_swapped_in_as_a_whole(tmp_path):
+def test_a_folder_is_replaced_as_a_whole(tmp_path):
     target = tmp_path / "deep" / "report"
     with replaced_folder(target) as part:
         (part / "a.md").write_text("first")
@@ -223,7 +223,7 @@ def test_a_folder_that_fails_leaves_the_old_one_and_no_new_parents(tmp_path):
 
 
 @pytest.mark.parametrize("why", ["not everything may go", "no exchange", "current folder"])
-def test_where_a_folder_cannot_go_as_a_whole_its_files_are_replaced_and_the_others_stay(tmp_path, monkeypatch, why):
+def test_if_a_folder_cannot_be_exchanged_its_files_are_replaced(tmp_path, monkeypatch, why):
     target = tmp_path / "report"
     target.mkdir()
     (target / "a.md").write_text("old")
@@ -264,7 +264,7 @@ def test_a_device_is_written_to_and_never_replaced():
     assert stat.S_ISCHR(Path("/dev/full").stat().st_mode)
 
 
-def test_what_an_exception_between_two_steps_leaves_is_removed_at_the_end_of_the_process(tmp_path):
+def test_files_left_by_an_exception_are_removed_at_the_end_of_the_process(tmp_path):
     part = file_locks.temporary_name(tmp_path / "a.md", tmp_path)
     part.write_text("x")
     files._temporaries.add(part)
@@ -301,7 +301,7 @@ def test_sigterm_cleans_up_as_sigint_does(tmp_path, name, status, word):
 
 @posix_only
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_a_command_as_such_whatever_an_import_makes_of_it(monkeypatch, number, status):
+def test_a_signal_ends_a_command_even_during_an_import(monkeypatch, number, status):
     import cdtool.registry
     from tests.command import cdtool as run
 
@@ -320,7 +320,7 @@ def test_a_signal_ends_a_command_as_such_whatever_an_import_makes_of_it(monkeypa
     assert done.status == status and "Traceback" not in done.err
 
 
-def test_the_command_line_gives_signals_back_as_they_were():
+def test_the_command_line_restores_signal_handlers():
     from tests.command import cdtool
 
     numbers = (signal.SIGTERM, signal.SIGINT)

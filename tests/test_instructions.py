@@ -1,4 +1,4 @@
-"""Instructions in kernels: prefetch changes nothing, wherever it points; store writes what it is given, there only."""
+"""Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def add_up(data, ahead):
     return total
 
 
-def test_places_beyond_the_memory_do_no_harm():
+def test_addresses_beyond_the_array_are_harmless():
     data = np.arange(200, dtype=np.uint8)
     for ahead in (0, 64, 10**6, 2**62, -(10**9)):
         assert add_up(data, ahead) == data.sum()

@@ -1,4 +1,4 @@
-"""Compiled kernels: lazy, linked, cached, and without a cache where none can be written."""
+"""Compiled kernels: lazy, linked, cached, and without a writable cache."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_kernel_may_call_a_kernel_of_its_module():
     assert _twice_and_one(3.0) == 7.0
 
 
-def test_a_kernel_says_what_the_function_said():
+def test_a_kernel_keeps_the_docstring_of_its_function():
     assert _double.__name__ == "_double"
 
 
@@ -54,7 +54,7 @@ def test_a_named_tuple_gives_a_kernel_numbers_and_arrays_by_name(values):
     assert _scaled(_Scale(values=read_only(values), factor=5.0), 2) == 10.0
 
 
-def test_what_a_named_tuple_holds_cannot_be_written_to_and_is_no_copy():
+def test_arrays_in_a_named_tuple_are_read_only_and_not_copied():
     values = np.arange(3.0)
     shown = read_only(values)
     assert np.shares_memory(shown, values) and values.flags.writeable
@@ -64,7 +64,7 @@ def test_what_a_named_tuple_holds_cannot_be_written_to_and_is_no_copy():
 
 @pytest.fixture
 def no_cache_folder(monkeypatch):
-    """As in a read-only installation with a read-only home: numba finds nowhere to put its cache."""
+    """As in a read-only installation with a read-only home: numba has no writable cache."""
     from numba.core import caching
 
     implementation = getattr(caching, "_CacheImpl", None) or caching.CacheImpl
@@ -72,7 +72,7 @@ def no_cache_folder(monkeypatch):
     monkeypatch.setattr(kernels, "_told", False)
 
 
-def test_where_no_cache_can_be_written_it_compiles_anyway_and_says_so_once(no_cache_folder):
+def test_without_a_writable_cache_it_compiles_and_warns_once(no_cache_folder):
     first = kernel("float64(float64)")(lambda x: x + 1.0)
     second = kernel("float64(float64)")(lambda x: x + 2.0)
     with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as told:
@@ -218,5 +218,5 @@ def test_a_kernel_is_not_in_the_cache_before_it_is_compiled_and_after_its_file_h
     assert kernel_warm_up._not_cached([item]) == [item]
 
 
-def test_where_no_cache_can_be_written_no_process_is_started(no_cache_folder):
+def test_without_a_writable_cache_no_process_is_started(no_cache_folder):
     assert kernel_warm_up._not_cached(_ours()) == []

@@ -1,4 +1,4 @@
-"""machine.toml: what is accepted, and that every refusal names the key and what is allowed."""
+"""machine.toml: accepted content, and errors that name the key and what is allowed."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_example_of_the_documentation_is_read(tmp_path):
         ('time = { column = "t", unit = "ms" }', "", "channels.time", "is missing"),
         ('unit = "ms"', 'unit = "mm"', "channels.time.unit", "unit of time"),
         ('column = "phi"', "column = -1", "channels.position.column", "counted from 0"),
-        ('column = "phi"', 'columns = ["a", "b"]', "channels.position.columns", "1 are needed"),
+        ('column = "phi"', 'columns = ["a", "b"]', "channels.position.columns", "give 1"),
         ('field = "position[0]"', 'feild = "position[0]"', "channels.mcap.position.field", "missing"),
         ("[detectors.friction_ekf]", "[detectors.friction]", "detectors.friction", "friction_ekf"),
         ("minimum_speed = 0.02", "minimum_sped = 0.02", "minimum_sped", "minimum_speed"),
@@ -101,7 +101,7 @@ def test_missing_and_broken_files_are_one_line(tmp_path):
         read(tmp_path, "[machine]\nname = = 3\n")
 
 
-def test_load_coordinates_take_masses_only(tmp_path):
+def test_load_coordinates_accept_only_masses(tmp_path):
     text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95.1\nviscous_friction = 204.3\n'
     file = read(tmp_path, text)
     assert file.machine.nominal_inertia[0] == 95.1 and file.machine.viscous_friction == (204.3,)
@@ -109,16 +109,16 @@ def test_load_coordinates_take_masses_only(tmp_path):
         read(tmp_path, text + "motor_inertia = 1e-3\n")
 
 
-def test_many_joints_take_one_value_or_one_each(tmp_path):
+def test_many_joints_accept_one_value_or_one_each(tmp_path):
     text = MACHINE.replace('name = "gate"', 'name = "portal"\njoints = ["x", "y"]').replace("620.0", "[620.0, 30.0]")
     file = read(tmp_path, text + '[channels]\ntime = { rate_hz = 1000 }\nspeed = { columns = [1, 2], unit = "rpm" }\n')
     assert file.machine.nominal_inertia == pytest.approx([1154.4, 564.4], abs=0.2)
     assert file.columns.time.rate == 1000.0
-    with pytest.raises(ConfigurationError, match="one a joint"):
+    with pytest.raises(ConfigurationError, match="one per joint"):
         read(tmp_path, text.replace("[620.0, 30.0]", "[620.0, 30.0, 1.0]"))
 
 
-def test_a_speed_logged_at_the_load_is_accepted_beside_motor_channels(tmp_path):
+def test_a_load_side_speed_is_accepted_with_motor_channels(tmp_path):
     text = MACHINE + CHANNELS.replace('{ column = "n_motor", unit = "rpm" }', '{ column = "v", unit = "mm/s" }')
     source = next(item for item in read(tmp_path, text).columns.sources if item.channel == "speed")
     assert (source.unit, source.factor) == ("m/s", (1e-3,))
@@ -133,7 +133,7 @@ def test_the_fingerprint_changes_with_every_parameter(tmp_path):
     )
 
 
-def test_a_motor_voltage_can_stand_for_the_torque(tmp_path):
+def test_a_motor_voltage_can_replace_the_torque(tmp_path):
     torque = (
         'torque = { column = "pwm", unit = "%", kind = "duty", supply_voltage = 24.0, resistance = 0.5, '
         "back_emf_constant = 0.05, torque_constant = 0.05 }"
@@ -147,7 +147,7 @@ def test_a_motor_voltage_can_stand_for_the_torque(tmp_path):
 
 def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
     text = MACHINE + CHANNELS + "[detectors.feekf]\nminimum_speed = 0.04\n"
-    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*friction_ekf again"):
+    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*repeats friction_ekf"):
         read(tmp_path, text)
 
 

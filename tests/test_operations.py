@@ -1,4 +1,4 @@
-"""Cutting and classing of strokes."""
+"""Division into strokes and their classes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_reversal_without_rest_ends_a_stroke():
     assert [part.motion.direction for part in parts] == [1, -1]
 
 
-def test_a_short_pause_does_not_end_a_stroke_and_a_twitch_is_none():
+def test_a_short_pause_does_not_end_a_stroke_and_a_short_motion_is_not_one():
     parts = operations_of(recording(speed_of((1, 3, 0.2), (3.1, 5, 0.2), (8, 8.1, 0.2))), "motion")
     assert len(parts) == 1
 

@@ -1,4 +1,4 @@
-"""Text from files is made harmless, long text short, and counts agree with their nouns."""
+"""Text from files is made safe, long text short, and counts agree with their nouns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values that no sensor gives are masked, counted and a loss, and real contacts are not."""
+"""Values that no sensor can measure are masked, counted and reported as a loss; real contacts are not."""
 
 from __future__ import annotations
 
@@ -69,7 +69,9 @@ def test_a_peak_of_hundreds_of_spreads_is_a_contact_and_not_masked(runs, factor)
         series = free[0].recording[channel]
         peak = factor * np.nanstd(series.values)
         log = free[0]
-        for k, share in enumerate(np.sin(np.linspace(0.1, 3.0, 12)).tolist()):  # it rises and falls within some samples
+        for k, share in enumerate(
+            np.sin(np.linspace(0.1, 3.0, 12)).tolist()
+        ):  # it rises and falls within a few samples
             log = with_values(log, channel, slice(100 + k, 101 + k), peak * share)
         assert not masked(ranges, log)[channel].any(), channel
 
@@ -77,7 +79,7 @@ def test_a_peak_of_hundreds_of_spreads_is_a_contact_and_not_masked(runs, factor)
 @pytest.mark.parametrize("row", [0, 1, 200, -1])
 @pytest.mark.parametrize("raw", [1e306, 1e12, 9.99e37, -1e9, -(2.0**31), 2.0**32 - 1])
 @pytest.mark.parametrize("channel", MEASURED)
-def test_a_value_that_no_sensor_gives_is_masked_in_its_own_row_only(runs, channel, raw, row):
+def test_an_impossible_value_is_masked_only_in_its_own_row(runs, channel, raw, row):
     free, ranges = runs
     at = row % len(free[0].recording[channel])
     wrong = with_values(free[0], channel, slice(at, at + 1), raw * free[0].factors[channel][0])
@@ -90,7 +92,7 @@ def test_a_value_that_no_sensor_gives_is_masked_in_its_own_row_only(runs, channe
 
 @pytest.mark.parametrize("raw", [-32768.0, 32767.0, 65535.0])
 def test_the_end_of_an_integer_that_fills_a_gap_is_masked(raw):
-    """Counts of an int16 that stay within some hundred, as a drive's torque in thousandths does."""
+    """Counts of an int16 that stay within some hundred, like a drive's torque in per mille."""
     rng = np.random.default_rng(1)
     free = logged(FOLDERS[0], "free")[:3]
     counts = [np.rint(300.0 * np.sin(np.arange(500) / 40.0) + rng.normal(0.0, 5.0, 500)) for _ in free]
@@ -114,7 +116,7 @@ def test_a_position_whose_counter_wraps_is_masked_until_it_is_back():
         return LoggedRecording(replace(free.recording, channels=channels), {"position": (1e-3,)}, 50.0)
 
     ranges = learned_of([log(stroke)] * 3)
-    wrapped = np.mod(stroke + 20000.0 + 2.0**15, 2.0**16) - 2.0**15  # as an int16 that starts at 20,000
+    wrapped = np.mod(stroke + 20000.0 + 2.0**15, 2.0**16) - 2.0**15  # like an int16 that starts at 20,000
     assert (np.abs(np.diff(wrapped)) > 60000.0).sum() == 2
     found = masked(ranges, log(wrapped))["position"][:, 0]
     assert np.array_equal(found, wrapped < 0.0)
@@ -122,7 +124,7 @@ def test_a_position_whose_counter_wraps_is_masked_until_it_is_back():
 
 @pytest.mark.parametrize(("channel", "times"), [("torque", 8.0), ("torque", 300.0), ("speed", 8.0), ("speed", 40.0)])
 @pytest.mark.parametrize("samples", [1, 3])
-def test_a_spike_in_a_run_to_learn_from_is_masked_and_in_a_log_to_judge_it_is_not(runs, channel, times, samples):
+def test_a_spike_is_masked_in_a_run_to_learn_from_but_not_in_a_log_to_assess(runs, channel, times, samples):
     free, _ = runs
     highest = max(float(np.nanmax(np.abs(item.recording[channel].values))) for item in free)
     spiked = with_values(free[3], channel, slice(300, 300 + samples), times * highest)
@@ -134,7 +136,7 @@ def test_a_spike_in_a_run_to_learn_from_is_masked_and_in_a_log_to_judge_it_is_no
         assert not masked(ranges, spiked)[channel].any()
 
 
-def test_no_sample_of_a_run_to_learn_from_is_a_spike_unless_it_was_put_there(runs):
+def test_no_unchanged_sample_of_a_run_to_learn_from_is_a_spike(runs):
     free, ranges = runs
     for log in free:
         made = ranges.masked(log.recording, log.factors, to_learn=True)
@@ -159,7 +161,7 @@ def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
 
 
 def strokes(*starts: float, stuck: slice | None = None) -> Series:
-    """One stroke of 20 rad after another, each from its own start, with rests; stuck at 0 where asked."""
+    """Consecutive strokes of 20 rad, each from its own start, with rests; constant at 0 on request."""
     shape = np.concatenate((np.zeros(50), np.linspace(0.0, 20.0, 400), np.full(50, 20.0)))
     values = np.concatenate([start + shape for start in starts])
     if stuck:
@@ -177,11 +179,11 @@ def masked_position(free: LoggedRecording, series: Series) -> tuple[np.ndarray, 
     return np.isnan(made["position"].values[:, 0]), words
 
 
-def test_an_encoder_that_is_set_anew_is_read_from_its_new_zero_once_it_moves_on():
+def test_a_reset_encoder_is_read_from_its_new_zero_once_it_moves():
     free = logged(FOLDERS[0], "free")[0]
     found, words = masked_position(free, strokes(0.0, 0.0, 0.0))
     rows = np.flatnonzero(found)
-    # Behind each leap: the rest, and until it has moved by a fiftieth of what runs move.
+    # After each leap: the rest, and until it has moved by a fiftieth of the runs' travel.
     for leap in (500, 1000):
         own = rows[(rows >= leap) & (rows < leap + 500)]
         assert own[0] == leap and 55 <= len(own) <= 65 and np.array_equal(own, np.arange(leap, leap + len(own)))
@@ -189,14 +191,14 @@ def test_an_encoder_that_is_set_anew_is_read_from_its_new_zero_once_it_moves_on(
     assert "2 leaps" in words and "from 20 to 0 rad at 5.000 s" in words and "new zero from 5.5" in words
 
 
-def test_a_position_that_reads_nothing_is_masked_until_it_is_back():
+def test_a_failed_position_is_masked_until_it_is_back():
     free = logged(FOLDERS[0], "free")[0]
     found, words = masked_position(free, strokes(0.0, stuck=slice(460, 480)))
     assert np.flatnonzero(found).tolist() == list(range(460, 480))
     assert "20 values" in words and "1 leap " in words and "new zero" not in words
 
 
-def test_a_position_that_leaps_on_and_on_is_masked():
+def test_a_repeatedly_leaping_position_is_masked():
     free = logged(FOLDERS[0], "free")[0]
     series = strokes(0.0, 0.0)
     values = series.values.copy()
@@ -205,7 +207,7 @@ def test_a_position_that_leaps_on_and_on_is_masked():
     assert found[501::2].all()
 
 
-def test_what_is_masked_does_not_depend_on_later_samples(runs):
+def test_masking_does_not_depend_on_later_samples(runs):
     free, ranges = runs
     rng = np.random.default_rng(3)
     log = free[0]
@@ -227,7 +229,7 @@ def test_a_fifth_of_the_runs_may_be_wrong_without_moving_the_range(runs):
     assert moved.reach < 2.0 * ranges.channels["torque"].reach
 
 
-def test_ranges_survive_json_and_refuse_what_is_none(runs):
+def test_ranges_survive_json_and_refuse_invalid_values(runs):
     _, ranges = runs
     assert PlausibleRanges.from_dict(json.loads(json.dumps(ranges.to_dict()))) == ranges
     values = ranges.to_dict()
@@ -273,7 +275,7 @@ def learn(gate: Path, out: Path):
 
 
 @pytest.mark.parametrize("text", ["1e306", "9.99e37", "-3e7"])
-def test_learning_from_a_log_with_wild_values_is_a_loss_and_the_limits_stay(gate, tmp_path, text):
+def test_wild_values_in_a_learned_log_are_a_loss_and_do_not_change_the_limits(gate, tmp_path, text):
     before, after = tmp_path / "before.json", tmp_path / "after.json"
     assert learn(gate, before).status == 0
     spoil(gate / "free" / "03.csv", 1, [900, 1500], text)
@@ -284,7 +286,7 @@ def test_learning_from_a_log_with_wild_values_is_a_loss_and_the_limits_stay(gate
     assert largest[1] == pytest.approx(largest[0], rel=0.2)
 
 
-def test_a_log_is_held_against_what_was_learned(gate, tmp_path):
+def test_a_log_is_compared_with_the_learned_ranges(gate, tmp_path):
     signature, log = tmp_path / "gate.json", gate / "holdout" / "03.csv"
     assert learn(gate, signature).status == 0
     assert cdtool("detect", log, "-m", gate / "machine.toml", "-s", signature).status == 0
@@ -306,7 +308,7 @@ def test_min_and_max_of_the_machine_file_mask_and_are_a_loss(gate):
     ("keys", "told"),
     [("min = 5, max = 5", "channels.torque.min: is 5, max is 5"), ('max = "4"', "channels.torque.max: is '4'")],
 )
-def test_a_range_without_room_is_refused(gate, keys, told):
+def test_an_empty_range_is_refused(gate, keys, told):
     machine = gate / "machine.toml"
     machine.write_text(
         machine.read_text().replace('unit = "A", scale = 0.56 }  #', f'unit = "A", scale = 0.56, {keys} }}  #')

@@ -77,11 +77,11 @@ def test_a_file_of_version_3_is_still_read_and_has_no_normal_motions(tmp_path, l
     path.write_text(json.dumps({**values, "schema_version": 3}))
     loaded = read_signature(path)
     assert loaded.normal is None and loaded.current[0].to_dict() == learned.current[0].to_dict()
-    write_signature(path, loaded)  # an update: version 4 from now on, and still nothing to compare with
+    write_signature(path, loaded)  # an update: now version 4, still without normal motions
     assert json.loads(path.read_text())["schema_version"] == 4 and read_signature(path).normal is None
 
 
-def test_normal_motions_that_are_none_are_a_damaged_file(tmp_path, learned):
+def test_invalid_normal_motions_are_a_damaged_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     values = json.loads(path.read_text())
@@ -93,7 +93,7 @@ def test_normal_motions_that_are_none_are_a_damaged_file(tmp_path, learned):
 
 def test_another_machine_detector_or_gain_is_refused(learned, gate):
     learned.check(gate, DETECTOR)
-    with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, the machine file has 12\.0"):
+    with pytest.raises(SignatureError, match=r"bandwidth = 10\.0, but the machine file has 12\.0"):
         learned.check(gate, Momentum(12.0))
     with pytest.raises(SignatureError, match="another machine"):
         learned.check(replace(gate, load_inertia=(621.0,)), DETECTOR)
@@ -114,7 +114,7 @@ def test_another_machine_detector_or_gain_is_refused(learned, gate):
         ("\x00\x01", "not a signature file"),
     ],
 )
-def test_a_file_that_is_no_signature_is_one_clear_error(tmp_path, content, message):
+def test_a_file_that_is_not_a_signature_is_one_clear_error(tmp_path, content, message):
     path = tmp_path / "s.json"
     path.write_text(content)
     with pytest.raises(SignatureError, match=message):
@@ -128,7 +128,7 @@ def test_a_missing_file_and_a_missing_folder_are_named(tmp_path, learned):
         write_signature(tmp_path / "no" / "s.json", learned)
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, learned, monkeypatch):
+def test_a_failed_write_leaves_only_the_old_file(tmp_path, learned, monkeypatch):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     old = path.read_bytes()
@@ -163,7 +163,7 @@ def test_concurrent_updates_lose_no_run(tmp_path, learned):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="links as POSIX has them")
 def test_eight_processes_that_update_by_three_paths_one_of_them_a_link_lose_no_run(tmp_path, learned):
-    """48 runs, six by each process; through the link 20 of them were lost."""
+    """48 runs, six per process; without following the link, 20 of them were lost."""
     (tmp_path / "store").mkdir()
     path = tmp_path / "store" / "s.json"
     write_signature(path, learned)
@@ -238,13 +238,13 @@ def test_a_wrong_value_in_the_file_is_one_clear_error(tmp_path, learned, path, v
         read_signature(file)
 
 
-def test_deeply_nested_rubbish_is_one_clear_error(tmp_path):
+def test_deeply_nested_content_is_one_clear_error(tmp_path):
     (tmp_path / "s.json").write_text("[" * 100_000)
     with pytest.raises(SignatureError, match="not a signature file"):
         read_signature(tmp_path / "s.json")
 
 
-def test_an_update_without_a_change_leaves_the_file_alone(tmp_path, learned):
+def test_an_update_without_a_change_does_not_write_the_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     before = path.stat()

@@ -1,4 +1,4 @@
-"""The app: the table of commands, and the one place where a known error becomes one line and an exit status."""
+"""The command line: the table of commands, and how an error becomes one line and an exit status."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ COMMANDS: Mapping[str, str] = {
     "simulate": "cdtool.cli.simulate:simulate",
     "study": "cdtool.cli.study:study",
 }
-"""Every command, in the order of the help: the function with its options, or the app with its subcommands."""
+"""Every command in the order of the help: the function that defines its options, or the app with its subcommands."""
 
-# In typer's default mode the help loses what stands in brackets, such as units.
+# In typer's default mode the help drops text in brackets, such as units.
 _LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
 
 
 class _Commands(UserDict[str, Any]):
-    """The commands by name. Each is imported when it is asked for: running one reads the options of no other."""
+    """The commands by name, each imported on first use: running one does not load the options of the others."""
 
     def __getitem__(self, name: str) -> Any:
         if isinstance(self.data[name], str):
@@ -60,7 +60,7 @@ def _load_command(name: str, place: str) -> Any:
     module, _, attribute = place.partition(":")
     command = getattr(import_module(module), attribute)
     group = typer.Typer(add_completion=False, **_LOOK)
-    group.callback()(lambda: None)  # without a callback typer makes no group of a single command
+    group.callback()(lambda: None)  # without a callback typer does not create a group for a single command
     if isinstance(command, typer.Typer):
         group.add_typer(command, name=name)
     else:
@@ -82,8 +82,8 @@ app = typer.Typer(
     **_LOOK,
 )
 
-_WHAT_FOR = "How fast, how surely and at which force does a machine notice that it has hit something?"
-# What a service manager or a pipeline sends to end a command, and a terminal that is closed.
+_WHAT_FOR = "Measure how quickly, how reliably and at which contact force a machine detects a collision."
+# Sent by a service manager or pipeline to end a command, and by a terminal that is closed.
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -96,7 +96,7 @@ def _show_version(wanted: bool) -> None:
 
 
 def _help() -> str:
-    """What cdtool is for, and the table of exit statuses."""
+    """Return the purpose of cdtool and the table of exit statuses."""
     rows = "\n".join(f"- {int(status)}: {meaning}" for status, meaning in STATUSES.items())
     return f"{_WHAT_FOR}\n\nExit status:\n\n{rows}\n\n{ORDER}"
 
@@ -104,7 +104,7 @@ def _help() -> str:
 @app.callback(help=_help())
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and end.", callback=_show_version, is_eager=True)
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
     ] = False,
 ) -> None:
     """Options of cdtool itself."""
@@ -114,14 +114,14 @@ def _show_note(message: Warning | str, *_: object, **__: object) -> None:
     typer.echo(one_line(f"note: {message}"), err=True)
 
 
-# What click raises for a wrong option or argument; typer brings a click of its own, or the one that is installed.
+# Base class of click's errors for a wrong option or argument. typer uses its own copy of click or the installed one.
 _CLICK_ERROR = typer.BadParameter.__mro__[2]
 
 
 def _print_usage_error(fault: Any) -> None:
     from cdtool.cli.console import print_error
 
-    if type(fault).__name__ == "NoArgsIsHelpError":  # making it has printed the help
+    if type(fault).__name__ == "NoArgsIsHelpError":  # its constructor has printed the help
         return
     command = fault.ctx.command_path if getattr(fault, "ctx", None) else "cdtool"
     message = " ".join(fault.format_message().split()).rstrip(".")
@@ -130,14 +130,14 @@ def _print_usage_error(fault: Any) -> None:
 
 @contextmanager
 def _ending_as_if_interrupted() -> Iterator[list[int]]:
-    """Let SIGTERM and SIGHUP undo what is half written, as Ctrl-C does; the exit status is 128 and their number.
+    """Let SIGTERM and SIGHUP undo half-written output as Ctrl-C does; the exit status is 128 plus the signal's number.
 
-    Yields the signals that have come.
+    Yields the list of signals received so far.
     """
     came: list[int] = []
 
     def end(number: int, _: object) -> None:
-        signal.signal(number, signal.SIG_IGN)  # a second one must not stop the undoing
+        signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
         came.append(number)
         raise _end_of(number)
 
@@ -160,13 +160,13 @@ def _end_of(number: int) -> BaseException:
 
 
 def main() -> None:
-    """Run the app; a known error ends with one line on stderr and status 2."""
+    """Run the app. A known error prints one line to stderr and exits with status 2."""
     with _ending_as_if_interrupted() as came:
         _main(came)
 
 
 def _run_app(came: list[int]) -> Any:
-    """The app's status; a signal ends it as such, whatever a library has made of it that was being imported."""
+    """Run the app and return its status. A signal ends it even if a library replaced the exception during an import."""
     try:
         return app(standalone_mode=False)
     except (KeyboardInterrupt, SystemExit, typer.Abort):
@@ -179,14 +179,14 @@ def _run_app(came: list[int]) -> Any:
 
 def _main(came: list[int]) -> None:
     open_standard_streams()
-    # What imports make stays: searching it for garbage is a tenth of a short command.
+    # Imported modules stay alive: collecting garbage among them takes a tenth of a short command's time.
     gc.set_threshold(50_000, 10, 10)
     warnings.showwarning = _show_note
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its advice about its own cache is not the user's matter
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # hides its advice about its own cache
     try:
         status = _run_app(came)
         if fault := lost_output():
-            raise CdtoolError(f"standard output: {fault.strerror}", "what was printed is incomplete: check the space")
+            raise CdtoolError(f"standard output: {fault.strerror}", "the output is incomplete; free some disk space")
         status = status if isinstance(status, int) else status_of([])
         sys.exit(status)
     except SystemExit as end:
@@ -203,13 +203,13 @@ def _main(came: list[int]) -> None:
 
 
 def _show_fault(fault: Exception) -> Fact:
-    """Print why a command has failed, in one line where the reason is known; returns what its exit status is by."""
+    """Print why a command failed, in one line if the cause is known, and return the fact that sets its exit status."""
     if isinstance(fault, _CLICK_ERROR):
         _print_usage_error(fault)
         return Fact.WRONG_USAGE
     known = _known_fault(fault)
     if known is None:
-        # Python would end with 1, which means a violated limit to a pipeline.
+        # Python would exit with 1, which means a violated limit to a pipeline.
         traceback.print_exception(fault)
         return Fact.INTERNAL_ERROR
     from cdtool.cli.console import print_error
@@ -224,10 +224,10 @@ def _known_fault(fault: Exception) -> tuple[CdtoolError, Fact] | None:
         return fault, Fact.WRONG_USAGE
     if isinstance(fault, OSError):
         where = f"{fault.filename}: " if fault.filename else ""
-        error = CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and space")
+        error = CdtoolError(f"{where}{fault.strerror or fault}", "check path, permissions and disk space")
         return error, Fact.NOTHING_USABLE
     if isinstance(fault, MemoryError):
         return CdtoolError(
-            "not enough memory", "fewer or shorter logs, a smaller --jobs, or more memory"
+            "not enough memory", "use fewer or shorter logs, a smaller --jobs, or more memory"
         ), Fact.NOTHING_USABLE
     return None

@@ -19,18 +19,18 @@ def benchmark(
     force: ForceOption = False,
     detectors: Annotated[
         str | None,
-        typer.Option("--detectors", help="Others than the file's, as gm,vo,eo; all: every one that the logs allow."),
+        typer.Option("--detectors", help="Detectors instead of the file's, as gm,vo,eo; all: all that the logs allow."),
     ] = None,
     false_alarm_budget: Annotated[
         str | None,
-        typer.Option("--false-alarm-budget", help="Set each safety factor for it: 1/1000op (operations) or 0.1/h."),
+        typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
     ] = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Learn, detect and compare: latency, misses and false alarms of each detector in each group.
+    """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
 
-    Ends with 1 where a limit or force profile that the file sets is violated.
+    Exits with status 1 if a limit or force profile in the file is violated.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
@@ -64,5 +64,5 @@ def benchmark(
 def _named(detectors: str | None) -> tuple[str, ...]:
     names = listed(detectors or "")
     if detectors is not None and not names:
-        raise UsageError("--detectors names none", "give names separated by commas, or leave it out")
+        raise UsageError("--detectors is empty", "give detector names separated by commas, or omit the option")
     return names

@@ -25,13 +25,13 @@ def compare(
     old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
     new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
     level: Annotated[
-        float, typer.Option("--level", help="Family-wise error rate: chance of any wrong worse or better.")
+        float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")
     ] = 0.05,
     relevant_change: Annotated[
         float,
         typer.Option(
             "--relevant-change",
-            help="The smallest change for the worse that matters: share of the old mean latency and force, of the "
+            help="Smallest deterioration that matters: a share of the old mean latency and force, of the "
             "contacts missed or not assessable, and of a false alarm per operation.",
         ),
     ] = 0.1,
@@ -39,20 +39,21 @@ def compare(
         bool,
         typer.Option(
             "--require-power",
-            help="End with 4 where these recordings could not have shown a relevant change, or the new file lacks "
-            "a detector or group.",
+            help="Exit with status 4 if the recordings could not have shown a relevant change, or if a detector "
+            "or group is missing from the new file.",
         ),
     ] = False,
     output: Annotated[
-        list[Path] | None, typer.Option("--output", "-o", help="Where to, repeatable: .md (a pull request), .json.")
+        list[Path] | None,
+        typer.Option("--output", "-o", help="Output file, repeatable: .md (for a pull request), .json."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two builds, a real change apart from noise: latency, misses, false alarms, force at the alarm.
+    """Compare two builds and separate real changes from noise: latency, misses, false alarms, force at the alarm.
 
-    Contacts that both files hold are compared one by one. Ends with 1 where anything is shown to be worse. Where
-    a relevant change could not have been shown, the answer is "inconclusive": status 0, or 4 with --require-power.
+    Contacts in both files are compared one by one. Exits with status 1 if anything is shown to be worse. If a relevant
+    change could not have been shown, the result is "inconclusive": status 0, or 4 with --require-power.
 
     Example: cdtool compare old.json new.json -o compare.md
     """
@@ -76,7 +77,7 @@ def compare(
 
 
 def _show(found: BuildComparison) -> None:
-    """What one file lacks, the figures, then every row in words, what differs, and the verdict last."""
+    """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict."""
     from cdtool.report.comparison_model import both, contacts_of, ranges_of
     from cdtool.report.few_contacts import EXPLAINED
     from cdtool.report.number_text import NOTHING
@@ -99,7 +100,7 @@ def _show(found: BuildComparison) -> None:
         for row in found.rows
     ]
     table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
-    _say("old / new; contacts: the same in both, unless there are two numbers; n.a.: not assessable")
+    _say("old / new; contacts: the same number in both unless two are given; n.a.: not assessable")
     if any(row.few for row in found.rows):
         _say(EXPLAINED)
     typer.echo()
@@ -116,6 +117,6 @@ def _show(found: BuildComparison) -> None:
 
 
 def _say(text: str) -> None:
-    """A sentence in lines that fit the terminal; names that are longer than a line are cut into several."""
+    """Print a sentence in lines that fit the terminal; longer names are split over several lines."""
     for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  "):
         typer.echo(line)

@@ -1,4 +1,4 @@
-"""What commands share: messages on stderr, progress, tables that fit a terminal, plain text from files."""
+"""Output shared by the commands: messages on stderr, progress, tables that fit a terminal, plain text from files."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140
 _NARROWEST, _WIDEST = 60, 100
 _PIPE = 160
-# Between two columns [characters].
+# Gap between two columns [characters].
 _GAP = 2
-# Sentences are wrapped at words, but to no less than this where they are longer [characters].
+# Sentences wrap at words, but not to a narrower column than this [characters].
 _LEAST_SENTENCE = 30
 
 
 def print_error(fault: CdtoolError) -> None:
-    """One line of at most 300 characters: what is wrong, then the next step."""
+    """Print an error in one line of at most 300 characters: the problem, then the next step."""
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
     hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
@@ -49,7 +49,7 @@ def print_error(fault: CdtoolError) -> None:
 
 
 def print_json(value: Any) -> None:
-    """Strict JSON on stdout; NaN and infinity are null; characters that its encoding does not have are escaped."""
+    """Print strict JSON to stdout: NaN and infinity become null, characters missing from its encoding are escaped."""
     text = strict_json(value)
     try:
         text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")
@@ -59,7 +59,7 @@ def print_json(value: Any) -> None:
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
-    """On stderr what was left out and why, what is lost, then warnings and notes, what is alike once."""
+    """Print to stderr what was left out, what was lost, then warnings and notes, each distinct message once."""
     left_out, damaged = _apart(skipped)
     for every, word in ((left_out, "left out"), (damaged, "loss"), (findings, "warning"), (notes, "note")):
         items = alike(list(dict.fromkeys(Skipped(item.recording, _bare(item)) for item in every)))
@@ -70,7 +70,7 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), 
 
 
 def leave(skipped: Sequence[Skipped] = (), facts: Iterable[Fact] = ()) -> None:
-    """End with the status of these facts, and of what was left out or is damaged; return where all is good."""
+    """Exit with the status of the facts and of left-out or damaged recordings; return if all is good."""
     left_out, damaged = _apart(skipped)
     logs = len({item.recording for item in damaged})
     items = len({item.recording for item in left_out})
@@ -85,24 +85,24 @@ def leave(skipped: Sequence[Skipped] = (), facts: Iterable[Fact] = ()) -> None:
 
 
 def leave_with(findings: Iterable[Finding], facts: Iterable[Fact] = ()) -> None:
-    """End with the status of these facts, and of what findings call a loss; return where all is good."""
+    """Exit with the status of the facts and of findings that report a loss; return if all is good."""
     lost = any(finding.severity == "loss" for finding in findings)
     leave(facts=[*facts, *([Fact.LOST] if lost else [])])
 
 
 def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
-    """On stderr each log of which no operation, or no contact, could be assessed, with its reasons; what follows.
+    """Print to stderr each log without an assessable operation or contact, with the reasons, and return the facts.
 
-    As in `cdtool benchmark` an alarm without a contact says nothing of contacts that nobody could judge.
+    As in `cdtool benchmark`, an alarm without a contact does not make a contact assessable.
     """
     facts: list[Fact] = []
     for name, found in logs:
         contacts = [row for rows in found.contact_rows for row in rows if row.outcome != "in_progress"]
         if all(item.verdict.outcome == "not_assessable" for item in found.detections):
             reasons = dict.fromkeys(item.verdict.reason for item in found.detections)
-            words = "; ".join(reasons) or "no operation in it"
+            words = "; ".join(reasons) or "it contains no operation"
         elif contacts and all(row.outcome == "not_assessable" for row in contacts):
-            reasons = dict.fromkeys(row.reason or "no reason is known" for row in contacts)
+            reasons = dict.fromkeys(row.reason or "unknown reason" for row in contacts)
             words = f"none of {counted(len(contacts), 'contact')} could be assessed: {'; '.join(reasons)}"
         else:
             continue
@@ -112,7 +112,7 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
 
 
 def say(text: str, indent: str = "") -> None:
-    """A sentence on stdout, in lines that fit the terminal; names are not cut."""
+    """Print a sentence to stdout in lines that fit the terminal; names are not split."""
     lines = fill(
         plain(text),
         columns_to_fill(),
@@ -125,7 +125,7 @@ def say(text: str, indent: str = "") -> None:
 
 
 def columns_to_fill() -> int:
-    """The terminal's width, from 60 to 100; 100 where there is none, so that a file is the same everywhere."""
+    """Return the terminal's width, 60 to 100; 100 without a terminal, so that redirected output is reproducible."""
     if not sys.stdout.isatty():
         return _WIDEST
     return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
@@ -134,7 +134,7 @@ def columns_to_fill() -> int:
 def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], title: str = "") -> None:
     """Print a table: columns as (heading, "left" or "right"); cells are plain text; an empty column is left out.
 
-    The left columns at the beginning name a row. What does not fit the terminal follows below, named again.
+    The first left-aligned columns name a row. Columns that do not fit follow below, with the names repeated.
     """
     from rich.console import Console
     from rich.table import Table as RichTable
@@ -147,7 +147,7 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
     widths = [
         column_width(heading, side, [row[i] for row in cells], i < first) for i, (heading, side) in enumerate(shown)
     ]
-    # A pipe or a log file has no width: nothing is folded or moved there.
+    # A pipe or a log file has no width: columns are neither folded nor moved there.
     is_terminal = sys.stdout.isatty()
     width = (
         max(shutil.get_terminal_size().columns, _NARROWEST)
@@ -173,12 +173,12 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
 
 
 def _stays(column: ColumnWidth) -> bool:
-    """Whether a column is never wrapped: what it needs is its whole width."""
+    """Whether a column never wraps because its needed width is its natural width."""
     return column.needed == column.natural
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A figure for a table; a dash where there is none."""
+    """Return a number for a table, or a dash if it is missing or not finite."""
     if value is None or not math.isfinite(value):
         return "-"
     text = f"{value:.{digits}g}"
@@ -187,7 +187,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 @contextmanager
 def progress(what: str) -> Iterator[Progress | None]:
-    """A progress bar on stderr; None, and nothing drawn, where stderr is not a terminal."""
+    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -202,7 +202,7 @@ def progress(what: str) -> Iterator[Progress | None]:
 
 
 def _apart(skipped: Sequence[Skipped]) -> tuple[list[Skipped], list[Skipped]]:
-    """What was left out, and what was used although it is damaged."""
+    """Return the recordings that were left out, and those that were used although they are damaged."""
     from cdtool.workflows.runs import DAMAGED
 
     damaged = [item for item in skipped if item.reason.startswith(DAMAGED)]
@@ -210,7 +210,7 @@ def _apart(skipped: Sequence[Skipped]) -> tuple[list[Skipped], list[Skipped]]:
 
 
 def _bare(item: Skipped) -> str:
-    """A reason without what the line says before it: the word for its kind and the recording."""
+    """Return a reason without the kind and recording that the line already names."""
     from cdtool.workflows.runs import DAMAGED
 
     return item.reason.removeprefix(DAMAGED).removeprefix(f"{item.recording}: ")
@@ -218,7 +218,7 @@ def _bare(item: Skipped) -> str:
 
 @dataclass(frozen=True)
 class ColumnWidth:
-    """One column: `needed` characters, which words alone keep of a sentence, `natural` ones of its longest cell."""
+    """The width of a column: `needed` characters at least (sentences wrap at words), `natural` for its longest cell."""
 
     is_name: bool
     needed: int
@@ -226,7 +226,7 @@ class ColumnWidth:
 
 
 def column_width(heading: str, side: str, cells: Sequence[str], leading: bool) -> ColumnWidth:
-    """Return the width of a column; a left one that is not `leading` holds sentences."""
+    """Return the width of a column; a left-aligned one that is not `leading` contains sentences."""
     lines = [*heading.split("\n"), *cells]
     natural = max(map(len, lines), default=0)
     if side == "right" or leading:
@@ -236,7 +236,7 @@ def column_width(heading: str, side: str, cells: Sequence[str], leading: bool) -
 
 
 def column_blocks(columns: Sequence[ColumnWidth], width: int) -> list[list[int]]:
-    """Return the columns of each table to print below another: the names first in each, then as many as fit."""
+    """Return the columns of each of the stacked tables: the names in each, then as many others as fit."""
     names = [i for i, column in enumerate(columns) if column.is_name]
     base = sum(columns[i].needed + _GAP for i in names)
     made: list[list[int]] = []

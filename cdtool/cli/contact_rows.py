@@ -1,4 +1,4 @@
-"""A contact as JSON: the row that `cdtool benchmark` writes, in every command that shows one."""
+"""A contact as JSON: the row of `cdtool benchmark`, in every command that shows a contact."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     from cdtool.evaluation.results import ContactResult
     from cdtool.pipeline import Detection
 
-# Said of the log as a whole, or of the benchmark.
+# Fields of the whole log or benchmark, not of the contact.
 _ELSEWHERE = ("recording", "group", "detector")
 
 
 def contact_as_json(detection: Detection, row: ContactResult) -> dict[str, Any]:
-    """A contact's row with the operation that it lies in."""
+    """Return a contact's row together with its operation."""
     values = {name: value for name, value in asdict(row).items() if name not in _ELSEWHERE}
     return {"operation": detection.operation.name, **values}

@@ -15,19 +15,19 @@ from cdtool.plain_text import counted
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="The recording to read, or its folder of parts.", metavar="IN")],
+    source: Annotated[Path, typer.Argument(help="The recording to read, or the folder of its parts.", metavar="IN")],
     output: Annotated[
         Path,
         typer.Argument(help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.", metavar="OUT"),
     ],
     machine: Annotated[
         Path | None,
-        typer.Option("--machine", "-m", help="Machine file: write its channels in SI; without it all columns."),
+        typer.Option("--machine", "-m", help="Machine file: write its channels in SI units. Default: all columns."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a log's channels into another container: to the bit, each on its own clock, with units and provenance.
+    """Convert a log to another file format without rounding; each channel keeps its own clock, unit and provenance.
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
@@ -41,7 +41,7 @@ def convert(
         clocks = f"{counted(done.clocks, 'clock')}"
         typer.echo(f"{', '.join(map(plain, done.files))}: {done.columns} columns on {clocks}")
         for path in done.machine_files:
-            typer.echo(f"{plain(path)}: the machine file that reads it")
+            typer.echo(f"{plain(path)}: machine file for it")
     for finding in done.findings:
         if finding.severity != "note" or finding.message.endswith(": unverified"):
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)

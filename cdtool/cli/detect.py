@@ -32,18 +32,17 @@ def detect(
     logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
     options: LogOptions,
     contact_at: Annotated[
-        str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z, m in the link's frame.")
+        str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z (m, in the link's frame).")
     ] = "",
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw; a folder where several logs are given.")
+        Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw; a folder for several logs.")
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run one detector over logs and show its alarms.
 
-    With --benchmark every setting and the threshold come from that file, and the figures are those of `cdtool
-    benchmark`.
+    With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
@@ -65,7 +64,7 @@ def detect(
             try:
                 run.add(log)
             except CdtoolError as fault:
-                # What is wrong with the call, the signature or the disk is wrong for every log.
+                # An error in the arguments, the signature or the disk affects every log.
                 if len(logs) == 1 or isinstance(fault, UsageError | SignatureError | OutputError):
                     raise
                 run.skipped.append(Skipped(str(log), str(fault)))
@@ -80,7 +79,7 @@ def detect(
 
 @dataclass
 class _Run:
-    """Detection in several logs: what is done for each, and what came of those so far."""
+    """Detection in several logs: the steps for each, and the results so far."""
 
     settings: DetectionOptions
     plot_names: Mapping[Path, Path]
@@ -90,7 +89,7 @@ class _Run:
     forces: dict[str, ForceSummary] = field(default_factory=dict)
 
     def add(self, log: Path) -> None:
-        """Detect in one log, and draw its plot; raises CdtoolError."""
+        """Run detection on one log and draw its plot; raises CdtoolError."""
         from cdtool.workflows.detection import detect_log
         from cdtool.workflows.runs import lost
 
@@ -105,10 +104,10 @@ class _Run:
             plot_detected(found, self.plot_names[log])
 
     def show(self, *, as_json: bool) -> None:
-        """Print what was found, and end with its exit status."""
+        """Print the results and exit with their status."""
         from cdtool.workflows.runs import absent_truth
 
-        taught = "the signature was learned from it: no alarm here shows nothing"
+        taught = "the signature was learned from this log: the absence of alarms is no evidence"
         learned = [Skipped(str(log), taught) for log, found in self.done if found.learned]
         absent = [Skipped(str(log), str(item)) for log, found in self.done for item in absent_truth(found.recording)]
         warnings = [item for _, found in self.done for item in found.warnings]
@@ -130,7 +129,7 @@ def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Pat
     if len(logs) == 1 and not plot.is_dir():
         return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
-        raise UsageError(f"--plot is one file for {len(logs)} logs", "give a folder")
+        raise UsageError(f"--plot names one file for {len(logs)} logs", "give a folder")
     names = {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
     if plot.is_dir():
         names = {log: figure_name(path, force=force) for log, path in names.items()}

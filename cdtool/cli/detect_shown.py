@@ -1,4 +1,4 @@
-"""What `cdtool detect` shows: alarms, contacts without one, and what could not be judged; as a table or as JSON."""
+"""Output of `cdtool detect`: alarms, missed contacts and sections that are not assessable, as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
 
-# Operations whose sections that could not be judged are shown, and how many sections of each.
-_SHOWN, _STRETCHES = 6, 3
-# How a contact is found whose onset the rule for the load cell says.
+# Operations whose sections that are not assessable are shown, and how many sections of each.
+_SHOWN, _SECTIONS = 6, 3
+# `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
-    """The table of all logs, then lines on what could not be judged, on signals and on estimated forces."""
+    """Print the table of all logs, then sections that are not assessable, signal notes and estimated forces."""
     rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
     detections = [detection for found in done for detection in found.detections]
     _show(rows, done[0].threshold)
-    _show_not_judged(detections)
+    _show_not_assessable(detections)
     _show_notes(detections)
     for force in list(forces.values())[:_SHOWN]:
         _show_force(force)
@@ -43,7 +43,7 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
-    """A JSON object an operation."""
+    """Return one JSON object per operation."""
     return [
         _as_json(log, found, detection, matching, rows, forces.get(detection.operation.name))
         for log, found in done
@@ -52,7 +52,7 @@ def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSum
 
 
 def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> None:
-    """A row for each alarm, for each contact without one, and for each operation without either."""
+    """Print a row per alarm, per contact without an alarm, and per operation without either."""
     cells = [cell for row in rows for cell in _rows_of(*row)]
     first = rows[0][1]
     unit = first.statistic.unit
@@ -94,7 +94,7 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
 
 
 def _why_no_latency(found: Detected, alarm: Alarm) -> str:
-    """What an alarm that detected no contact is: one more of a contact, or one without any."""
+    """Explain why an alarm has no latency: it repeats the alarm of a contact, or belongs to no contact."""
     from cdtool.workflows.detection import contact_of, same_contact, why_no_contact
 
     contact = contact_of(found, alarm)
@@ -110,7 +110,7 @@ def _show_force(force: ForceSummary) -> None:
 
 
 def _show_notes(detections: list[Detection]) -> None:
-    """What a detector wants to be known of its signal, of as many operations as for what could not be judged."""
+    """Print the detector's notes on its signal, for as many operations as sections that are not assessable."""
     noted = [detection for detection in detections if detection.statistic.notes]
     for detection in noted[:_SHOWN]:
         for note in detection.statistic.notes:
@@ -119,12 +119,12 @@ def _show_notes(detections: list[Detection]) -> None:
         typer.echo(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
 
 
-def _show_not_judged(detections: list[Detection]) -> None:
-    """What share of an operation could not be judged, and when, where and why in its longest sections."""
+def _show_not_assessable(detections: list[Detection]) -> None:
+    """Print the share of each operation that is not assessable, and the time, position and reason of long sections."""
     shown = [detection for detection in detections if detection.statistic.shares()]
     for detection in shown[:_SHOWN]:
-        not_judged = detection.not_judged()
-        longest = sorted(not_judged, key=lambda item: item.start - item.end)[:_STRETCHES]
+        sections = detection.not_assessable_sections()
+        longest = sorted(sections, key=lambda item: item.start - item.end)[:_SECTIONS]
         unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
@@ -134,18 +134,18 @@ def _show_not_judged(detections: list[Detection]) -> None:
                 else ""
             )
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
-        if more := len(not_judged) - len(longest):
+        if more := len(sections) - len(longest):
             parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
-        if detection.other_speed and detection.verdict.outcome != "not_assessable":  # then it is among the reasons
+        if detection.other_speed and detection.verdict.outcome != "not_assessable":  # otherwise it is among the reasons
             parts.append(detection.other_speed)
         share = 1.0 - float(detection.statistic.valid.mean())
-        say(f"not judged in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
+        say(f"not assessable in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
     if len(shown) > _SHOWN:
-        typer.echo(f"not judged: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
+        typer.echo(f"not assessable: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
 
 
 def _place(way: float) -> str:
-    """A place along the travel [load unit] with three digits, and no more than millimetres or milliradians."""
+    """Return a position along the travel [load unit] with three digits, at most to a millimetre or milliradian."""
     return f"{round(way, 3) + 0.0:.3g}"
 
 
@@ -185,7 +185,7 @@ def _as_json(
         "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
         "other_speed": detection.other_speed or None,
-        "stretches_not_judged": [asdict(item) for item in detection.not_judged()],
+        "stretches_not_judged": [asdict(item) for item in detection.not_assessable_sections()],
         "estimated_force": _force_as_json(force) if force else None,
         "notes": list(detection.statistic.notes),
         "findings": _findings(found),

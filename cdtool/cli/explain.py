@@ -23,15 +23,14 @@ def explain(
     options: LogOptions,
     plot: Annotated[
         Path | None,
-        typer.Option("--plot", help="PNG, SVG or PDF to draw the first event into; an existing folder: all events."),
+        typer.Option("--plot", help="PNG, SVG or PDF file for the first event, or an existing folder for all events."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Explain why each alarm of a log came and why each contact was missed.
+    """Explain the cause of each alarm in a log and why each missed contact was missed.
 
-    With --benchmark every setting and the threshold come from that file, and the figures are those of `cdtool
-    benchmark`.
+    With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
@@ -56,7 +55,7 @@ def explain(
 
 
 def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) -> list[Path]:
-    """One figure of the first event, or one an event in a folder; the files that were written."""
+    """Draw the first event into a file, or each event into a folder; return the files written."""
     if plot is None:
         return []
     from cdtool.report.plots.margin_plot import plot_explanation

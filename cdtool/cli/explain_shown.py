@@ -1,4 +1,4 @@
-"""What `cdtool explain` shows: on screen, and as JSON."""
+"""Output of `cdtool explain`: on screen, and as JSON."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 # Events that are printed and drawn; --json has all.
 SHOWN = 20
-# Its reason names the speeds already.
+# Its reason already names the speeds.
 _BLIND = "not_assessable"
 
 
 def show_explained(explained: Explained) -> None:
-    """Print every event of a log, and the channels beside it."""
+    """Print every event of a log, and the operations without one."""
     shown = explained.events[:SHOWN]
     for _, item in shown:
         _show_event(item)
@@ -33,18 +33,18 @@ def show_explained(explained: Explained) -> None:
         typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
     elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
     for detection in elsewhere[:SHOWN]:
-        say(f"{detection.operation.name}, not judged at another speed: {detection.other_speed}")
+        say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
     pairs = zip(explained.found.detections, explained.explanations, strict=True)
     quiet = [detection for detection, events in pairs if not events]
     for detection in quiet[:SHOWN]:
-        why = detection.verdict.reason or "no alarm, and no contact without one"
+        why = detection.verdict.reason or "no alarm and no missed contact"
         say(f"{detection.operation.name}, {detection.detector}: {why}")
     if len(quiet) > SHOWN:
         typer.echo(f"and {counted(len(quiet) - SHOWN, 'more operation')} without an event")
 
 
 def _show_event(item: Explanation) -> None:
-    """Headline, sentences, and the margin over time."""
+    """Print the headline, the sentences, and the margin over time."""
     from cdtool.evaluation.explanation.explanation import AlarmExplanation
     from cdtool.evaluation.explanation.words import words
 
@@ -52,7 +52,7 @@ def _show_event(item: Explanation) -> None:
     say(f"{item.operation}, {item.detector}: {headline}")
     for sentence in sentences:
         say(sentence, indent="  ")
-    # One column stays empty, and so is left out, where there is no onset or no alarm to count from.
+    # Without an onset or an alarm to count from, one column stays empty and is dropped.
     alarm = item.alarm.time if isinstance(item, AlarmExplanation) else None
     rows = [
         (

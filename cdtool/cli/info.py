@@ -76,6 +76,6 @@ def _show(item: Info) -> None:
     if not item.findings:
         typer.echo("no warnings")
     if item.dialect:
-        typer.echo("\nHow the table is written, to be pasted into a machine file:\n")
+        typer.echo("\nTable format, to be pasted into a machine file:\n")
         for line in item.dialect.splitlines():
             typer.echo(plain(line))

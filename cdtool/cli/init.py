@@ -26,21 +26,21 @@ def init(
     """
     from cdtool.workflows.init.drafting import init as draft
 
-    with late_progress("looking at the log"):
+    with late_progress("analysing the log"):
         drafted = draft(log, output, force=force)
     if as_json:
         print_json(asdict(drafted))
     else:
         typer.echo(drafted.text)
-        first = "Check each line marked CHECK" if drafted.channels else "Write its channels"
-        typer.echo(f"{plain(drafted.path)} written: a draft of guesses. {first}, then")
+        first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
+        typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
         typer.echo(f"  cdtool info {_quoted(log)} --machine {_quoted(drafted.path)}")
     if not drafted.channels:
         typer.echo(
-            "warning: no name or course tells of a torque, speed or position: the columns are comments", err=True
+            "warning: no column's name or values indicate a torque, speed or position: all are comments", err=True
         )
     for name in drafted.left_out:
-        typer.echo(f"warning: {name}: the log contradicts the guess: it stands in the file as a comment", err=True)
+        typer.echo(f"warning: {name}: the log contradicts the guess: written as a comment", err=True)
     for finding in drafted.findings:
         if finding.severity == "loss":
             typer.echo(f"loss: {plain(finding)}", err=True)
@@ -48,5 +48,5 @@ def init(
 
 
 def _quoted(path: object) -> str:
-    """A path as a shell takes it."""
+    """Return a path quoted for a shell."""
     return shlex.quote(plain(path))

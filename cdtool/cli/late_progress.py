@@ -1,4 +1,4 @@
-"""A progress bar for commands that are mostly done before one could be read."""
+"""A progress bar that appears only if a command takes long enough to read it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from cdtool.cli.console import progress
 if TYPE_CHECKING:
     from cdtool.workflows.runs import Progress
 
-# Shorter waits need no bar [s].
+# Shorter waits do not need a bar [s].
 _AFTER = 1.0
 
 
 @contextmanager
 def late_progress(what: str, after: float = _AFTER) -> Iterator[Progress | None]:
-    """The bar of `progress`, drawn where the block takes longer than `after` [s]; None where there is no terminal.
+    """Show the bar of `progress` once the block has taken longer than `after` [s]; yield None without a terminal.
 
-    Until it is told how much there is to do, it only moves.
+    The bar only pulses until the total amount of work is known.
     """
     if not sys.stderr.isatty():
         yield None

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def learn_signature(
-    logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings, 10 or more a class.", metavar="LOG...")],
+    logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings, 10 or more per class.", metavar="LOG...")],
     machine: MachineOption,
     output: Annotated[Path, typer.Option("--output", "-o", help="Signature file to write (.json).")],
     detector: Annotated[
@@ -42,7 +42,7 @@ def learn_signature(
     ] = None,
     false_alarm_budget: Annotated[
         str | None,
-        typer.Option("--false-alarm-budget", help="Set the safety factor for this: 1/300op, 0.1/h. Needs many runs."),
+        typer.Option("--false-alarm-budget", help="Set the safety factor for this rate, as 1/300op or 0.1/h."),
     ] = None,
     operations: OperationsOption = "whole",
     rule: Annotated[
@@ -68,12 +68,12 @@ def learn_signature(
     latch: LatchOption = None,
     onset_above: OnsetAboveOption = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Learn from fewer than 10 runs; the limits are less sure.")
+        bool, typer.Option("--force", help="Learn from fewer than 10 runs; the limits are less certain.")
     ] = False,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Learn from impact-free runs what is normal for a detector: a signature, or any other threshold.
+    """Learn the normal behaviour for a detector from impact-free runs: a signature or any other threshold.
 
     Example: cdtool learn-signature free/*.csv --machine machine.toml --detector feekf -o gate.feekf.json
     """
@@ -112,7 +112,7 @@ def learn_signature(
     for motion, runs in learned.runs:
         if runs < ENOUGH_RUNS and learned.signature.learns_limits:
             which = f" {motion.described}" if motion else ""
-            text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less sure"
+            text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less certain"
             typer.echo(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
     _show(learned, output, as_json)

@@ -19,7 +19,7 @@ def list_known(
     kind: Annotated[str, typer.Argument(help="detectors, thresholds, machines, formats or writers.", metavar="KIND")],
     as_json: JsonOption = False,
 ) -> None:
-    """List what cdtool knows: detectors with their gains, thresholds, machines, formats, report writers; plug-ins too.
+    """List the available detectors (with gains), thresholds, machines, formats or report writers, including plug-ins.
 
     Example: cdtool list detectors --json
     """
@@ -34,7 +34,7 @@ def list_known(
     elif kind == "detectors":
         _show_detectors(entries)
     else:
-        table([("name", "left"), ("what it is", "left")], [(entry["name"], entry["summary"]) for entry in entries])
+        table([("name", "left"), ("description", "left")], [(entry["name"], entry["summary"]) for entry in entries])
     leave(broken)
 
 

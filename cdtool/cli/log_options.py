@@ -1,4 +1,4 @@
-"""The options of the commands that run one detector over logs: by hand, or all of them from a benchmark file."""
+"""Options of the commands that run one detector over logs: set individually or taken from a benchmark file."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from cdtool.workflows.contacts.scoring_rules import ScoringRules
     from cdtool.workflows.detection_options import DetectionOptions
 
-# What a benchmark file does not settle: which of its detectors, and another threshold.
+# Allowed together with a benchmark file: which of its detectors, and another threshold.
 _WITH_BENCHMARK = ("benchmark", "detector", "signature")
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogOptions:
-    """The options as given on the command line; None or empty: not given."""
+    """The options given on the command line; None or empty if not given."""
 
     machine: MachineUnlessBenchmarkOption = None
     benchmark: BenchmarkOption = None
@@ -66,10 +66,10 @@ class LogOptions:
     mass_before_cell: MassBeforeCellOption = None
 
     def settings(self) -> DetectionOptions:
-        """Return the settings of a detection, with the machine or benchmark file read.
+        """Return the detection settings, with the machine or benchmark file read.
 
-        Raises UsageError for a value outside its range, for neither machine nor benchmark file, and for a setting
-        that is given together with the benchmark file that holds it; and what reading these files raises.
+        Raises UsageError for a value outside its range, if neither a machine nor a benchmark file is given, and for a
+        setting given together with the benchmark file that contains it. Raises what reading these files raises.
         """
         from cdtool.machine_file import read_machine_file
         from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
@@ -103,7 +103,7 @@ class LogOptions:
             if item.name not in _WITH_BENCHMARK and getattr(self, item.name) not in (None, ""):
                 option = f"--{item.name.replace('_', '-')}"
                 raise UsageError(
-                    f"{option} is given together with --benchmark", f"write it in {benchmark}, or leave one out"
+                    f"{option} cannot be combined with --benchmark", f"set it in {benchmark}, or omit one of the two"
                 )
 
     def _rules(self) -> ScoringRules:

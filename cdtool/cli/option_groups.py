@@ -1,4 +1,4 @@
-"""Options that several commands share, as one dataclass: typer shows its fields, the command gets one value."""
+"""Options shared by several commands, as one dataclass: typer shows its fields, the command receives one object."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any, get_type_hints
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command with the fields of its parameter `options`, a dataclass, in that parameter's place.
+    """Return the command with its parameter `options`, a dataclass, replaced by the fields of that dataclass.
 
-    Each field's annotation says which option it is; typer reads them as it reads a parameter's.
+    Each field's annotation defines its option; typer reads it like the annotation of a parameter.
     """
     hints = get_type_hints(command, include_extras=True)
     group = hints["options"]
@@ -28,7 +28,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_fields(**given: Any) -> None:
         command(options=group(**{name: given.pop(name) for name in shared}), **given)
 
-    # typer reads the signature, older releases the annotations too.
+    # typer reads the signature; older releases also read the annotations.
     vars(with_fields)["__signature__"] = inspect.Signature(parameters, return_annotation=None)
     with_fields.__annotations__ = {item.name: item.annotation for item in parameters}
     return with_fields

@@ -15,35 +15,41 @@ from cdtool.errors import UsageError
 
 def plan(
     difference_ms: Annotated[
-        float | None, typer.Option("--difference-ms", help="A difference of mean latencies that is to be seen, in ms.")
+        float | None, typer.Option("--difference-ms", help="Difference of mean latencies to detect [ms].")
     ] = None,
     std_ms: Annotated[
-        float | None, typer.Option("--std-ms", help="Standard deviation of the paired differences in ms, as a guess.")
+        float | None, typer.Option("--std-ms", help="Estimated standard deviation of the paired differences [ms].")
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", help="Instead: measured in results.json of an earlier test.")
+        Path | None, typer.Option("--from", help="Take the standard deviation from results.json of an earlier test.")
     ] = None,
     detectors: Annotated[
-        str, typer.Option("--detectors", help="With --from: the two to compare, as feekf,gm; unpaired, one or two.")
+        str,
+        typer.Option(
+            "--detectors", help="With --from: the two detectors to compare, as feekf,gm; unpaired: one or two."
+        ),
     ] = "",
     group: Annotated[str, typer.Option("--group", help="With --from: the group of impacts.")] = "",
     unpaired: Annotated[
-        bool, typer.Option("--unpaired", help="Two sets of impacts: the deviation is that within a set.")
+        bool, typer.Option("--unpaired", help="Two sets of impacts; the standard deviation is that within a set.")
     ] = False,
-    power: Annotated[float, typer.Option("--power", help="Chance that a difference of that size is seen.")] = 0.8,
+    power: Annotated[float, typer.Option("--power", help="Probability of detecting a difference of that size.")] = 0.8,
     missed_at_most: Annotated[
-        str, typer.Option("--missed-at-most", help="A share of missed contacts that is to be shown, as 5%.")
+        str, typer.Option("--missed-at-most", help="Upper bound of the missed share to show, as 5%.")
     ] = "",
     false_alarms_at_most: Annotated[
-        str, typer.Option("--false-alarms-at-most", help="A rate to be shown, as 1/1000op or 0.1/h.")
+        str,
+        typer.Option(
+            "--false-alarms-at-most", help="Upper bound of the false-alarm rate to show, as 1/1000op or 0.1/h."
+        ),
     ] = "",
     allowed: Annotated[
         int | None, typer.Option("--allowed", min=0, help="Misses or false alarms to allow in the test. Default: one.")
     ] = None,
-    level: Annotated[float, typer.Option("--level", help="Chance of a wrong conclusion.")] = 0.05,
+    level: Annotated[float, typer.Option("--level", help="Probability of a wrong conclusion.")] = 0.05,
     as_json: JsonOption = False,
 ) -> None:
-    """How many impacts and impact-free operations a test needs, before it is made.
+    """Calculate how many impacts and impact-free operations a test needs.
 
     Example: cdtool plan --difference-ms 5 --std-ms 8 --missed-at-most 5% --false-alarms-at-most 1/1000op
     """
@@ -51,7 +57,7 @@ def plan(
     from cdtool.workflows.planning import plan as run
 
     if source is not None and std_ms is not None:
-        raise UsageError("--std-ms and --from are given", "give one of them")
+        raise UsageError("--std-ms and --from cannot be combined", "give one of them")
     without = difference_ms is None
     idle = {
         "--std-ms": std_ms is not None and without,
@@ -63,7 +69,7 @@ def plan(
     }
     for option, useless in idle.items():
         if useless:
-            raise UsageError(f"{option} has nothing to act on", _GOES_WITH[option])
+            raise UsageError(f"{option} has no effect", _GOES_WITH[option])
     std = measured_std(source, listed(detectors), group, unpaired=unpaired) if source else std_ms
     found = run(
         difference_ms=difference_ms,
@@ -83,7 +89,7 @@ def plan(
 
 
 _GOES_WITH = {
-    **dict.fromkeys(("--std-ms", "--from", "--unpaired"), "it goes with --difference-ms"),
-    **dict.fromkeys(("--detectors", "--group"), "it goes with --from"),
-    "--allowed": "it goes with --missed-at-most or --false-alarms-at-most",
+    **dict.fromkeys(("--std-ms", "--from", "--unpaired"), "use it with --difference-ms"),
+    **dict.fromkeys(("--detectors", "--group"), "use it with --from"),
+    "--allowed": "use it with --missed-at-most or --false-alarms-at-most",
 }

@@ -13,16 +13,16 @@ from cdtool.exit_status import Fact
 
 
 def recover(
-    log: Annotated[Path, typer.Argument(help="A damaged or cut MCAP file.", metavar="LOG")],
+    log: Annotated[Path, typer.Argument(help="A damaged or truncated MCAP file.", metavar="LOG")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The clean MCAP file to write.")],
     unverified: Annotated[
-        bool, typer.Option("--unverified", help="Also keep messages that no checksum covers, marked as such.")
+        bool, typer.Option("--unverified", help="Also keep messages without a checksum, marked as such.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
-    """Write what is left of a damaged MCAP file as a clean one, and say what was lost.
+    """Write the readable messages of a damaged MCAP file to a clean one, and report what was lost.
 
-    Ends with status 3 where something was lost or left out, 0 where the file was whole.
+    Exits with status 3 if anything was lost or left out, and 0 if the file was intact.
 
     Example: cdtool recover log.mcap -o recovered.mcap
     """
@@ -34,7 +34,7 @@ def recover(
         typer.echo(f"{finding.severity}: {plain(finding)}")
     typer.echo(f"written: {plain(done.output)}: {done.messages} messages")
     if done.unverified:
-        typer.echo(f"{done.unverified} of them no checksum covers: in chunks without one")
+        typer.echo(f"{done.unverified} of them have no checksum: their chunks have none")
     if done.left_out:
-        typer.echo(f"left out: {done.left_out} messages that no checksum covers (--unverified keeps them)")
+        typer.echo(f"left out: {done.left_out} messages without a checksum (--unverified keeps them)")
     leave(facts=() if done.whole else [Fact.LOST])

@@ -17,10 +17,10 @@ def report(
     output: OutputOption = None,
     force: ForceOption = False,
 ) -> None:
-    """Make reports of a benchmark again, without its recordings.
+    """Write the reports of a benchmark again, without its recordings.
 
-    Traces are read from the file beside it (results.traces.json.gz); without it figures over time are left out. Ends
-    as the benchmark did: the status stands in its conclusion.
+    Traces are read from results.traces.json.gz in the same folder; without it, plots over time are left out. Exits with
+    the status of the benchmark, which is part of its conclusion.
 
     Example: cdtool report results.json -o report.html -o summary.md -o junit.xml
     """

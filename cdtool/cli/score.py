@@ -14,24 +14,29 @@ from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 def score(
     triggers: Annotated[
-        Path, typer.Argument(help="CSV with recording, time_s and, if several, detector.", metavar="TRIGGERS")
+        Path,
+        typer.Argument(
+            help="CSV with columns recording, time_s and, for several detectors, detector.", metavar="TRIGGERS"
+        ),
     ],
     benchmark: Annotated[
-        Path, typer.Option("--benchmark", "-b", help="Benchmark file: the recordings, their contacts, the rules.")
+        Path, typer.Option("--benchmark", "-b", help="Benchmark file: recordings, contacts and rules.")
     ],
     output: OutputOption = None,
     force: ForceOption = False,
     clock: Annotated[
         Literal["recording", "source"],
-        typer.Option("--clock", help="Trigger times on the recording's clock as cdtool shows it, or the source's."),
+        typer.Option(
+            "--clock", help="Clock of the trigger times: the recording's, as cdtool shows it, or the source's."
+        ),
     ] = "recording",
     listed_only: Annotated[
-        bool, typer.Option("--listed-only", help="Leave recordings out that have no row; else: watched, no alarm.")
+        bool, typer.Option("--listed-only", help="Skip recordings without a row instead of counting them as no alarm.")
     ] = False,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Score the trigger times of any controller or program by the same rules as cdtool benchmark.
+    """Score the trigger times of any controller or program by the same rules as `cdtool benchmark`.
 
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """

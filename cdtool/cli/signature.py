@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.signature.upkeep import Checked
 
 signature = typer.Typer(
-    help="Look at a signature, check it against runs, add runs to it.",
+    help="Show a signature, check it against runs, add runs to it.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -27,19 +27,19 @@ signature = typer.Typer(
 
 @signature.callback()
 def _signature() -> None:
-    """Look at a signature, check it against runs, add runs to it."""
+    """Show a signature, check it against runs, add runs to it."""
 
 
 FileArgument = Annotated[Path, typer.Argument(help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")]
 CutOption = Annotated[
-    str | None, typer.Option("--operations", help="How to cut a log into strokes. Default: as for learning.")
+    str | None, typer.Option("--operations", help="How to divide a log into operations. Default: as for learning.")
 ]
-PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF to draw.")]
+PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw.")]
 
 
 @signature.command("show", epilog=statuses_words("signature show"))
 def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False, as_json: JsonOption = False) -> None:
-    """What a signature file holds: machine, detector, threshold, classes of motion, runs, and its drift since learned.
+    """Show a signature file: machine, detector, threshold, classes of motion, runs, and how far the limits have moved.
 
     Example: cdtool signature show gate.feekf.json --plot signature.png
     """
@@ -70,28 +70,30 @@ def check(
     file: FileArgument,
     logs: Annotated[
         list[Path],
-        typer.Argument(help="Impact-free recordings: those learned from, and those since, in order.", metavar="LOG..."),
+        typer.Argument(
+            help="Impact-free recordings: the runs learned from and later ones, in order.", metavar="LOG..."
+        ),
     ],
     machine: MachineOption,
     operations: CutOption = None,
     target: Annotated[
-        float, typer.Option("--target", help="Chance of a false alarm in an operation that the runs have to show.")
+        float, typer.Option("--target", help="False-alarm probability per operation that the runs must demonstrate.")
     ] = 1e-3,
     plot: Annotated[
         Path | None,
-        typer.Option("--plot", help="PNG, SVG or PDF of the drift; a folder for several classes."),
+        typer.Option("--plot", help="PNG, SVG or PDF file of the drift; a folder for several classes."),
     ] = None,
     force: ForceOption = False,
     onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Do the runs that a signature was learned from suffice, and has the machine drifted since? Learn again, or not?
+    """Check whether a signature was learned from enough runs and whether the machine has drifted since.
 
-    Runs that are in the signature are judged by all the others (leave one out); others are taken as a season, in the
-    order given.
+    Runs in the signature are checked against a signature of all the others (leave one out). Other runs are treated as a
+    season, in the given order.
 
-    Example: cdtool signature check gate.feekf.json free/*.csv season/*.csv -m machine.toml --plot drift.png
+    Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.workflows.signature.normal_runs import notes_on
@@ -134,19 +136,19 @@ def update(
     machine: MachineOption,
     operations: CutOption = None,
     forget: Annotated[
-        float | None, typer.Option("--forget", help="Forget old runs: effective number of runs, 20 to 50.")
+        float | None, typer.Option("--forget", help="Forget old runs: effective number of runs to keep, 20 to 50.")
     ] = None,
     cap: Annotated[
-        float | None, typer.Option("--cap", help="A run's deviation counts up to this many spreads.")
+        float | None, typer.Option("--cap", help="Limit the deviation of a run to this many spreads.")
     ] = None,
     reserve: Annotated[
-        float | None, typer.Option("--reserve", help="Spreads that a limit may move from where it was first learned.")
+        float | None, typer.Option("--reserve", help="Spreads by which a limit may move from its first learned value.")
     ] = None,
     onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Add impact-free runs to a signature, without learning a fault that grows slowly.
+    """Add impact-free runs to a signature without learning a slowly growing fault.
 
     Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
     """
@@ -173,24 +175,24 @@ def update(
         reasons = [{"recording": item.recording, "reason": item.reason} for item in done.refused]
         print_json({"file": str(file), "added": list(done.added), "refused": reasons})
     else:
-        counts = f"{len(done.refused)} refused; {len(done.file.runs)} in all"
+        counts = f"{len(done.refused)} refused; {len(done.file.runs)} in total"
         typer.echo(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
     leave(done.refused, () if done.added else [Fact.NOTHING_USABLE])
 
 
 def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:
-    """The figure of each class that has a season; raises UsageError where the name fits none."""
+    """Return the plot file of each class with a season; raises UsageError if --plot does not fit."""
     audits = [item.drift for item in checked.classes if item.drift]
     if plot is None:
         return []
     if not audits:
         raise UsageError(
-            "--plot shows the drift over a season: no log is new", "give logs that are not in the signature"
+            "--plot shows the drift over a season, but no log is new", "give logs that are not in the signature"
         )
     if plot.is_dir():
         return [
             (figure_name(plot / f"drift_{number}.png", force=force), audit) for number, audit in enumerate(audits, 1)
         ]
     if len(audits) > 1:
-        raise UsageError(f"--plot is one file for {len(audits)} classes of motion", "give an existing folder")
+        raise UsageError(f"--plot names one file for {len(audits)} classes of motion", "give an existing folder")
     return [(figure_name(plot, force=force), audits[0])]

@@ -1,4 +1,4 @@
-"""What `cdtool signature` shows: a stored file, and what a check of it found."""
+"""Output of `cdtool signature`: a stored file, and the result of a check."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from cdtool.signature_file import SignatureFile
     from cdtool.workflows.signature.upkeep import Checked, CheckedClass
 
-# Rows of a table, and sections, that are shown; --json has all.
+# Table rows, and sections, that are shown; --json has all.
 _SHOWN = 12
 
 
 def show_file(stored: SignatureFile) -> None:
-    """What a signature file holds, as lines and a table."""
+    """Print a signature file as lines and a table."""
     from cdtool.evaluation.upkeep.summary import summarise_signature
     from cdtool.thresholds.fitted_signature import FittedSignature
 
@@ -61,13 +61,13 @@ def _moved_at(item: SignatureSummary, joint: JointSummary) -> str:
 def _activation(stored: SignatureFile) -> str:
     item = stored.activation
     debounce = "9 ms" if item.debounce is None else f"{item.debounce} samples"
-    armed = "latches" if item.latch else f"armed again after {item.rearm:g} s inside"
+    armed = "latches" if item.latch else f"re-armed after {item.rearm:g} s inside the limits"
     calm = f" of (1 - {item.hysteresis:g}) times the safety factor" if item.hysteresis else ""
     return f"debounce {debounce}, {armed}{calm}"
 
 
 def file_as_json(stored: SignatureFile) -> dict[str, Any]:
-    """The same as JSON values."""
+    """Return a signature file as JSON values."""
     from cdtool.evaluation.upkeep.summary import summarise_signature
     from cdtool.thresholds.fitted_signature import FittedSignature
 
@@ -98,7 +98,7 @@ def _summary_as_json(summary: SignatureSummary) -> dict[str, Any]:
 
 
 def show_class(item: CheckedClass) -> None:
-    """What a check found of one class of motion."""
+    """Print the result of a check for one class of motion."""
     from cdtool.evaluation.upkeep.summary import summarise_signature
 
     typer.echo(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
@@ -118,7 +118,7 @@ def _show_coverage(found: Coverage) -> None:
     factors = [run.critical_factor for run in found.runs if math.isfinite(run.critical_factor)]
     share = 100.0 * max(factors) / found.safety_factor if factors else 0.0
     nearest = f"; the nearest run reaches {share:.0f} % of its limit" if factors else ""
-    runs = f"{counted(len(found.runs), 'run')}, each judged by a signature of the others"
+    runs = f"{counted(len(found.runs), 'run')}, each checked against a signature of the others"
     judged = f"{runs}: {counted(found.alarms, 'alarm')}{nearest}"
     typer.echo(f"coverage: {judged}")
     say(found.verdict, indent="  ")
@@ -161,7 +161,7 @@ def _show_drift(found: DriftAudit) -> None:
 
 
 def checked_as_json(checked: Checked) -> dict[str, Any]:
-    """What a check found, as JSON values."""
+    """Return the result of a check as JSON values."""
     return {
         "file": checked.file.source,
         "detector": checked.file.detector,

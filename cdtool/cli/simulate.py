@@ -19,7 +19,7 @@ simulate = typer.Typer(
 )
 
 _FORMATS = ("csv", "mcap", "mixed")
-# As many logs of a group as a folder of numbered files is still handled with.
+# Most logs per group: more numbered files in one folder become unwieldy.
 _MOST = 100_000
 
 
@@ -29,15 +29,15 @@ def _simulate() -> None:
 
 
 FreeOption = Annotated[int, typer.Option("--free", min=0, max=_MOST, help="Impact-free runs to learn from.")]
-HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, max=_MOST, help="Impact-free runs kept apart.")]
+HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, max=_MOST, help="Impact-free runs for scoring only.")]
 StiffOption = Annotated[int, typer.Option("--stiff", min=0, max=_MOST, help="Impacts on the bare load cell.")]
 SoftOption = Annotated[int, typer.Option("--soft", min=0, max=_MOST, help="Impacts with a rubber bumper.")]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")]
-FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two of each group MCAP).")]
+FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two logs per group as MCAP).")]
 ReferenceOption = Annotated[
-    bool, typer.Option("--reference/--no-reference", help="Log the references too: speed, and torque or position.")
+    bool, typer.Option("--reference/--no-reference", help="Also log the references: speed, and torque or position.")
 ]
-OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")]
+OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Output folder.")]
 
 
 @simulate.command("gate", epilog=statuses_words("simulate gate"))
@@ -52,7 +52,7 @@ def gate(
     reference: ReferenceOption = True,
     as_json: JsonOption = False,
 ) -> None:
-    """The heavy sliding gate of the thesis's chapter 5: recordings, machine.toml and benchmark.toml.
+    """Simulate the heavy sliding gate of chapter 5 of the thesis: recordings, machine.toml and benchmark.toml.
 
     Example: cdtool simulate gate --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o gate
     """
@@ -68,7 +68,7 @@ def gate(
 @simulate.command("arm", epilog=statuses_words("simulate arm"))
 def arm(
     output: OutputOption,
-    trial: Annotated[int, typer.Option("--trial", min=1, max=2, help="1: the arm is hit; 2: the forearm.")] = 1,
+    trial: Annotated[int, typer.Option("--trial", min=1, max=2, help="1: impact on the arm; 2: on the forearm.")] = 1,
     free: FreeOption = 14,
     holdout: HoldoutOption = 40,
     stiff: StiffOption = 30,
@@ -78,7 +78,7 @@ def arm(
     reference: ReferenceOption = True,
     as_json: JsonOption = False,
 ) -> None:
-    """The light robot arm of the thesis's chapter 6: recordings, machine.toml and benchmark.toml.
+    """Simulate the light robot arm of chapter 6 of the thesis: recordings, machine.toml and benchmark.toml.
 
     Example: cdtool simulate arm --trial 2 --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o forearm
     """
@@ -96,19 +96,19 @@ def arm(
 @simulate.command("season", epilog=statuses_words("simulate season"))
 def season(
     output: OutputOption,
-    runs: Annotated[int, typer.Option("--runs", min=1, max=_MOST, help="Impact-free runs, one after another.")] = 60,
+    runs: Annotated[int, typer.Option("--runs", min=1, max=_MOST, help="Consecutive impact-free runs.")] = 60,
     friction_change: Annotated[
-        float, typer.Option("--friction-change", help="Share by which friction changes over the season: 0.3, -0.2.")
+        float, typer.Option("--friction-change", help="Relative change of friction over the season: 0.3, -0.2.")
     ] = 0.0,
     obstruction_growth: Annotated[
-        float, typer.Option("--obstruction-growth", help="Resistance that grows at one place [N per run].")
+        float, typer.Option("--obstruction-growth", help="Resistance that grows at one position [N per run].")
     ] = 0.0,
-    obstruction_at: Annotated[float, typer.Option("--obstruction-at", help="That place along the travel [m].")] = 0.9,
+    obstruction_at: Annotated[float, typer.Option("--obstruction-at", help="Position of that resistance [m].")] = 0.9,
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
     as_json: JsonOption = False,
 ) -> None:
-    """A season of the sliding gate without impacts: friction that drifts, an obstruction that grows.
+    """Simulate a season of the sliding gate without impacts: drifting friction, a growing obstruction.
 
     Example: cdtool simulate season --runs 60 --friction-change 0.3 -o season
     """
@@ -135,5 +135,5 @@ def _report(output: Path, written: int, counts: Mapping[str, int], seed: int, as
     recordings, why_not = counted(written, "recording"), without_benchmark(counts)
     files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
     typer.echo(f"{recordings}, {files} and contacts.csv written to {plain(output)}")
-    if why_not and set(counts) > {"free"}:  # a season holds nothing to score
+    if why_not and set(counts) > {"free"}:  # a season has nothing to score
         typer.echo(f"no benchmark.toml: {why_not}")

@@ -1,7 +1,7 @@
-"""Standard output and error: a reader that has gone, a full disk or a narrow encoding raises nothing.
+"""Standard output and error that never raise: for a closed pipe, a full disk or a narrow encoding.
 
-A pager or `head` may close the pipe before a command ends: the rest is dropped, the command goes on, and its exit
-status is its own. Characters that the terminal's encoding does not have are replaced by "?".
+A pager or `head` may close the pipe before a command ends. The remaining output is dropped, the command continues, and
+its exit status does not change. Characters that the terminal's encoding does not have are replaced by "?".
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ _STANDARD_INPUT_OUTPUT_ERROR = range(3)
 
 
 class _Descriptor(io.FileIO):
-    """A descriptor that never fails: what cannot be written is dropped, and the first reason is kept."""
+    """A file descriptor that never fails: unwritable output is dropped, and the first error is kept."""
 
     fault: OSError | None = None
 
     def write(self, content: object, /) -> int:
-        """All of the content, or as much as the descriptor takes at once."""
+        """Return the number of bytes written; after an error, all of them."""
         if self.fault is None:
             try:
                 return super().write(content)  # type: ignore[arg-type]
@@ -32,18 +32,18 @@ class _Descriptor(io.FileIO):
 
 
 class _Stream(io.TextIOWrapper):
-    """A text stream without a binary one below it: click would write UTF-8 there where the encoding is ASCII."""
+    """A text stream without a binary buffer: click would write UTF-8 to it even if the encoding is ASCII."""
 
     buffer = None  # type: ignore[assignment]
     descriptor: _Descriptor
 
 
 def open_standard_streams() -> None:
-    """Make standard output and error such that printing to them raises nothing; call it before anything is printed.
+    """Replace standard output and error so that printing never raises; call it before anything is printed.
 
-    Streams that are no longer the process's own, as under a test runner, are left as they are.
+    Streams that no longer belong to the process, as under a test runner, are not changed.
     """
-    for descriptor in _STANDARD_INPUT_OUTPUT_ERROR:  # a closed one would become that of the next file that is opened
+    for descriptor in _STANDARD_INPUT_OUTPUT_ERROR:  # the next opened file would take the number of a closed one
         try:
             os.fstat(descriptor)
         except OSError:
@@ -52,7 +52,7 @@ def open_standard_streams() -> None:
 
 
 def lost_output() -> OSError | None:
-    """Why standard output could not be written, if it was not because its reader has gone."""
+    """Return why standard output could not be written, or None; a closed pipe is not an error."""
     stream = sys.stdout
     if not isinstance(stream, _Stream):
         return None
@@ -62,11 +62,11 @@ def lost_output() -> OSError | None:
 
 
 def _opened(stream: TextIO | None, descriptor: int) -> TextIO:
-    if stream is None:  # it was closed when Python started
+    if stream is None:  # closed when Python started
         return Path(os.devnull).open("w", encoding="utf-8")
     if type(stream) is not io.TextIOWrapper or stream.fileno() != descriptor:
         return stream
-    if os.name != "posix":  # a Windows console has a writer of its own
+    if os.name != "posix":  # a Windows console has its own writer
         stream.reconfigure(errors="replace")
         return stream
     stream.flush()

@@ -33,21 +33,24 @@ def sensors(
     file: Annotated[
         Path | None, typer.Option("--study", help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md.")
     ] = None,
-    joint: Annotated[str, typer.Option("--joint", help="Which joint; needed where there are several.")] = "",
-    speed: Annotated[float | None, typer.Option("--speed", help="Of the load at the contact [m/s].")] = None,
-    stiffness: Annotated[float | None, typer.Option("--stiffness", help="Of the obstacle [N/m].")] = None,
+    joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
+    speed: Annotated[float | None, typer.Option("--speed", help="Load speed at contact [m/s].")] = None,
+    stiffness: Annotated[float | None, typer.Option("--stiffness", help="Obstacle stiffness [N/m].")] = None,
     lever: Annotated[
-        float | None, typer.Option("--lever", help="Rotary axis, arm, robot: from the axis to the contact [m].")
+        float | None,
+        typer.Option("--lever", help="Rotary axis, arm, robot: distance from the axis to the contact [m]."),
     ] = None,
     drive_stiffness: Annotated[
-        float | None, typer.Option("--drive-stiffness", help="Of the drive at the load [N/m, N m/rad].")
+        float | None, typer.Option("--drive-stiffness", help="Drive stiffness at the load [N/m, N m/rad].")
     ] = None,
-    factor: Annotated[float, typer.Option("--k", help="Seen: beyond k sigma of its noise and its resolution.")] = 5.0,
+    factor: Annotated[
+        float, typer.Option("--k", help="Detection limit: k sigma of the noise plus the resolution.")
+    ] = 5.0,
     as_json: JsonOption = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A figure: .png, .svg, .pdf.")] = None,
     force: ForceOption = False,
 ) -> None:
-    """Which sensor sees an impact first, at which force, and what limits it (thesis figure 4.10, computed).
+    """Rank the sensors by when they detect an impact, with the force and the limiting factor (thesis figure 4.10).
 
     Example: cdtool study sensors -m sample_logs/gate/machine.toml --speed 0.2 --stiffness 5e5
     """
@@ -58,7 +61,7 @@ def sensors(
         from cdtool.report.plots.figures import SUFFIXES
 
         if output.suffix.lower() not in SUFFIXES:
-            raise UsageError(f"{output} is no name for a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+            raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
         refuse_foreign_figure(output, force=force)
     given = {
         "impact.speed": speed,
@@ -80,11 +83,11 @@ def sensors(
 
 @study.command("figures", epilog=statuses_words("study figures"))
 def figures(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")],
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw the thesis's figures of impacts again: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
+    """Draw the thesis's figures of impacts: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
 
     Example: cdtool study figures -o figures
     """
@@ -117,7 +120,7 @@ def _show(done: SensorStudy) -> None:
     rows = []
     for item in ranking.responses:
         time = NOT_SEEN if item.time is None else f"{1e3 * item.time:.1f}"
-        saving = "" if item.saving is None else f": {1e3 * item.saving:.1f} ms sooner"
+        saving = "" if item.saving is None else f": {1e3 * item.saving:.1f} ms earlier"
         cells = (item.sensor.name, item.sensor.place, number(item.threshold), item.sensor.unit, time)
         rows.append(
             (*cells, _newtons(item.force), _newtons(item.peak_so_far), item.limited_by, f"{item.remedy}{saving}")
@@ -125,13 +128,11 @@ def _show(done: SensorStudy) -> None:
     table(columns, rows)
     typer.echo()
     typer.echo(
-        f"seen: beyond {ranking.factor:g} sigma and the resolution, at the unluckiest sampling instants, "
-        "without the machine's own scatter"
+        f"seen: beyond {ranking.factor:g} sigma and the resolution, at the least favourable sampling instants, "
+        "without the machine's own variation"
     )
-    typer.echo(
-        f"if nobody stops the drive, the force reaches {ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms "
-        f"(looked at for {1e3 * case.window:g} ms)"
-    )
+    peak = f"{ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms"
+    typer.echo(f"if the drive is not stopped, the force reaches {peak} (analysed for {1e3 * case.window:g} ms)")
     typer.echo(ranking.rigidity.words)
     if done.waves:
         typer.echo(done.waves.words)

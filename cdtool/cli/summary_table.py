@@ -1,4 +1,4 @@
-"""The figures of a benchmark in the terminal, what became of its limits, and the exit status that follows."""
+"""The results of a benchmark in the terminal: tables, limits, and the exit status."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _HEADINGS = {
 
 
 def show_table(evaluated: Evaluated) -> None:
-    """The thesis's table 5.1 for each group, with what its figures have to be read beside."""
+    """Print the thesis's table 5.1 for each group, with the notes needed to read its numbers."""
     from cdtool.report.few_contacts import explained, latency_columns
 
     shown = latency_columns(evaluated.summaries)
@@ -41,7 +41,7 @@ def show_table(evaluated: Evaluated) -> None:
     columns += [(name, "right") for name in names]
     table(columns, [_row(item, shown) for item in evaluated.summaries])
     provenance = evaluated.results.provenance
-    # A mean and its spread are of the contacts detected.
+    # Mean and spread are those of the detected contacts.
     *most, last = (name for name in shown if name in ("median", "range", "P95"))
     with_misses = f"{', '.join(most)} and {last}" if most else last
     say(
@@ -52,11 +52,11 @@ def show_table(evaluated: Evaluated) -> None:
     if few:
         say(few)
     if provenance.get("watched_joints"):
-        say(f"joints watched, of all: {provenance['watched_joints']}")
+        say(f"joints monitored, of all: {provenance['watched_joints']}")
     for item in evaluated.results.calibration:
         say(
             f"{item.detector}: safety factor {item.safety_factor:.3g} for a budget of {item.budget}: "
-            f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) that it was set on"
+            f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) used to set it"
         )
     show_truth(evaluated)
     _show_bounds(evaluated)
@@ -79,7 +79,7 @@ def show_conclusion(evaluated: Evaluated) -> None:
 
 
 def _show_limits(evaluated: Evaluated) -> None:
-    """One line for each limit that is not met, and how many are."""
+    """Print one line per limit that is not met, and how many are met."""
     from cdtool.evaluation.limits import not_met
 
     limits = evaluated.results.limits
@@ -95,7 +95,7 @@ def _show_limits(evaluated: Evaluated) -> None:
 
 
 def finish(evaluated: Evaluated) -> None:
-    """End with the status that follows from the results' conclusion."""
+    """Exit with the status of the results' conclusion."""
     leave(evaluated.results.skipped, [Fact[name.upper()] for name in evaluated.results.conclusion.facts])
 
 
@@ -130,7 +130,7 @@ def _latency(item: Summary, column: LatencyColumn) -> str:
 
 
 def _range(item: Summary) -> str:
-    """Shortest and longest latency; a missed contact is later than all."""
+    """Return the shortest and longest latency; a missed contact counts as later than all."""
     ends = (quantile(item.min_ms), quantile(item.max_ms))
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
@@ -140,12 +140,12 @@ def _what(item: CalibrationResult) -> str:
 
 
 def _false_alarms(item: Summary) -> int | str:
-    """A dash where the detector could judge nothing."""
+    """Return the false alarms, or a dash if the detector could not assess anything."""
     return item.false_alarms if item.watched else "-"
 
 
 def interval(item: Interval) -> str:
-    """A figure with its interval, as 38.2 (36.0 to 41.1)."""
+    """Return a value with its interval, as 38.2 (36.0 to 41.1)."""
     if not math.isfinite(item.value):
         return quantile(item.value)
     if math.isnan(item.low) or math.isnan(item.high):
@@ -155,12 +155,12 @@ def interval(item: Interval) -> str:
 
 
 def quantile(value: float) -> str:
-    """A quantile; infinite where too many contacts were missed to reach it."""
+    """Return a quantile; infinite if too many contacts were missed to reach it."""
     return "not reached" if value == math.inf else number(value)
 
 
 def _show_bounds(evaluated: Evaluated) -> None:
-    """What few contacts and short hours do not show: the bounds of each group's rarest events."""
+    """Print upper bounds where a group shows no missed contact or no false alarm."""
     for group in evaluated.results.groups:
         items = [item for item in evaluated.summaries if item.group == group]
         clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
@@ -193,4 +193,4 @@ def _show_forces(results: Any) -> None:
         verdict = item.verdict.replace("_", " ")
         typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {verdict} ({plain(item.note)}){plain(reason)}")
     if results.forces:
-        typer.echo("force verdicts are evidence about recordings, not a certificate")
+        typer.echo("force verdicts are evidence about the recordings, not a certificate")

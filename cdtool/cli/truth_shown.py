@@ -1,4 +1,4 @@
-"""What the screen says of contacts whose onset was not seen or not recorded, and of latencies below zero."""
+"""Notes on contacts with an unseen or unrecorded onset, and on negative latencies."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cdtool.plain_text import counted
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
 
-# Beside a latency that came out below zero.
+# Shown next to a negative latency.
 NEGATIVE = "alarm before the onset, within its uncertainty: counted as 0"
 
 
 def show_truth(evaluated: Evaluated) -> None:
-    """One line for each group with contacts in progress at the start, and for each with negative latencies."""
+    """Print one line per group with contacts in progress at the start, and one per group with negative latencies."""
     for group in evaluated.results.groups:
         items = [item for item in evaluated.summaries if item.group == group]
         begun = max((item.in_progress for item in items), default=0)

@@ -38,7 +38,7 @@ def check_significance(level: float) -> None:
     >>> check_significance(0.05)
     """
     if not _LEAST_LEVEL <= level < 0.5:
-        hint = "a share of at least 0.000000001 and below 0.5, such as 0.05"
+        hint = "give a share of at least 0.000000001 and below 0.5, such as 0.05"
         raise UsageError(f"significance level is {level:g}", hint)
 
 

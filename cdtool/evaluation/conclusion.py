@@ -269,7 +269,7 @@ def _reasons(
                 text = f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"
                 yield plain(text)
     for each in missed:
-        why = "where a force profile is set" if each in forbidden else "and no limit says how many may be"
+        why = "where a force profile is set" if each in forbidden else "and no limit on misses is set"
         yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
     for each in blind:
         yield plain(f"{each.detector}, {each.group}: {_why_blind(results, each)}")
@@ -286,4 +286,4 @@ def _why_blind(results: Results, item: Summary) -> str:
     ]
     what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
     more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""
-    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'no reason is known'}{more}"
+    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'unknown reason'}{more}"

@@ -45,7 +45,7 @@ class Budget:
             count = exposure = math.nan
         rate = count / exposure if exposure else math.nan
         if found is None or not (0.0 < count < math.inf and 0.0 < exposure < math.inf and 1e-12 < rate < 1e12):
-            raise UsageError(f"false-alarm budget is '{text}'", "write 1/1000op (operations) or 0.1/h (hours)")
+            raise UsageError(f"false-alarm budget is '{text}'", "give 1/1000op (operations) or 0.1/h (hours)")
         return cls(count / exposure, "hour" if found[3].startswith("h") else "operation")
 
     def __str__(self) -> str:
@@ -147,6 +147,6 @@ def _by_count(detections: Sequence[Detection], activation: Activation, allowed: 
 
 def _just_above(factor: float) -> float:
     if factor == math.inf:
-        raise UsageError("no safety factor keeps the budget: the limits have no spread", "learn from more runs")
+        raise UsageError("no safety factor meets the budget: the limits have no spread", "learn from more runs")
     # Below 0 no sample left even the middle of the band: any factor keeps the budget.
     return max(factor * (1.0 + 1e-9), 1e-3)

@@ -67,7 +67,7 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
         if group != ALL and group not in groups:
             raise table.fault(key, f"unknown group '{group}'", nearest(group, [ALL, *groups]))
         if figure not in FIGURES:
-            raise table.fault(key, f"unknown figure '{figure}'", nearest(figure, FIGURES))
+            raise table.fault(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
         least, largest = _bounds(table, key)
         rules.append(LimitRule(key, full[detector], group, figure, least, largest))
     return tuple(rules)
@@ -94,8 +94,8 @@ def check_limits(
         meant = meant or [item for item in named if not item.operations]
         if not meant:
             raise ConfigurationError(
-                f"[limits] {rule.key}: there is no such figure in these results",
-                "a figure of contacts needs a group with contacts, and a detector that was run",
+                f"[limits] {rule.key}: not available in these results",
+                "a metric of contacts requires a group with contacts and a detector that was run",
             )
         found += [_check(rule, item, worst.get((item.detector, item.group))) for item in meant]
     return tuple(found)
@@ -161,14 +161,14 @@ def _split(table: Table, key: str) -> tuple[str, str, str]:
     if len(parts) == 2:
         return parts[0], ALL, parts[1]
     if len(parts) < 2:
-        raise table.fault(key, "does not name a metric", 'write "detector.group.metric", e.g. "*.stiff.p95_ms"')
+        raise table.fault(key, "does not name a metric", 'give "detector.group.metric", e.g. "*.stiff.p95_ms"')
     return parts[0], ".".join(parts[1:-1]), parts[-1]
 
 
 def _bounds(table: Table, key: str) -> tuple[float, float]:
     part = table.table(key)
     if "min" not in part and "max" not in part:
-        raise table.fault(key, "has no bound", "write { max = 50 }, { min = 1 } or both")
+        raise table.fault(key, "has no bound", "give { max = 50 }, { min = 1 } or both")
     least = part.number("min") if "min" in part else -math.inf
     largest = part.number("max") if "max" in part else math.inf
     part.finish()

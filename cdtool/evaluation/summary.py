@@ -17,6 +17,7 @@ from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
+from cdtool.plain_text import counted
 
 
 @dataclass(frozen=True)
@@ -98,9 +99,9 @@ class Summary:
     def why_undefined(self, figure: str) -> str:
         """Why a figure of this summary is NaN."""
         if figure in COUNTED_ALWAYS:
-            return "nothing was watched"
+            return "nothing was monitored"
         if not self.contacts and self.in_progress:
-            return f"{self.in_progress} of {self.in_progress} contacts had begun when the recording did"
+            return f"{counted(self.in_progress, 'contact', 'were')} in progress when the recording began"
         if not self.contacts:
             return "no recording of the group was scored"
         if self.contacts == self.not_assessable:
@@ -112,7 +113,7 @@ class Summary:
         interval = {"mean_ms_upper": self.mean, "median_ms_upper": self.median, "p95_ms_upper": self.p95}.get(figure)
         if interval and interval.reason:
             return interval.reason
-        return f"{self.detected} of {self.contacts} contacts detected: too few for it"
+        return f"{self.detected} of {self.contacts} contacts detected: too few for this limit"
 
 
 # What [limits] and reports may ask of a summary.

@@ -135,7 +135,7 @@ def _check_folder(target: Path, *, force: bool) -> None:
 
 def _check_parent(target: Path) -> None:
     if not target.parent.is_dir():
-        raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "make it first")
+        raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first")
     _check_writable(target, target.parent)
 
 

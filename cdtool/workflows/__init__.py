@@ -1,1 +1,1 @@
-"""What a command does, as plain functions that print nothing: a folder or a module for each, and what they share."""
+"""The work of each command as plain functions that print nothing: a folder or module per command, and shared steps."""

@@ -1,4 +1,4 @@
-"""The mapped channels of a log as `cdtool convert` writes them: as they were logged, in SI, held in memory."""
+"""The mapped channels of a log as `cdtool convert` writes them: as logged, in SI units, in memory."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from cdtool.ingest.reading import FoundParts, choose_format, read_as_logged
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
 
-# Rows of the longest clock that are handed on at once.
+# Rows of the longest clock per part.
 _ROWS = 1 << 16
 
 
 class ChannelRows:
-    """A recording's groups, the channels of one clock together, and their rows as often as they are asked for."""
+    """The groups of a recording (the channels of one clock) and their rows; `parts` can be called repeatedly."""
 
     def __init__(self, log: Path, machine_file: MachineFile) -> None:
         self._recording = read_as_logged(log, machine_file, unread="loss").recording
@@ -32,7 +32,7 @@ class ChannelRows:
         self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
 
     def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
-        """The rows of these groups, from one sample of the longest clock to another."""
+        """Yield the rows of these groups, part by part along the longest clock."""
         series = [[self._recording[column.name] for column in group.columns] for group in groups]
         times = [channels[0].time for channels in series]
         before = [0] * len(times)
@@ -51,10 +51,10 @@ class ChannelRows:
 
 
 def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelPieces:
-    """The channels of a log or of its folder of parts: in pieces where the format can, else in memory.
+    """Return the channels of a log or of its folder of parts: in pieces if the format supports it, else in memory.
 
-    A coarse clock is made a straight line as a whole, and the torque of a duty needs the speed beside it: they are held
-    in memory, too. Raises RecordingError or ConfigurationError.
+    Two cases are also read into memory: a coarse clock, which is fitted as one straight line, and the torque of a duty
+    cycle, which needs the speed. Raises RecordingError or ConfigurationError.
     """
     folder = FoundParts.of(log) if log.is_dir() else None
     files = (log,) if folder is None else folder.filled
@@ -69,7 +69,7 @@ def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelP
 
 
 def _mapped_logs(files: Sequence[Path], channels: ChannelMap) -> dict[Path, MappedLog]:
-    """Each file's mapped fields; none at all where the format of one of them has none that come in pieces."""
+    """Return the mapped fields of each file; empty if the format of one file cannot read mapped fields in pieces."""
     logs: dict[Path, MappedLog] = {}
     for path in files:
         log = mapped_log(choose_format(path), path, channels)

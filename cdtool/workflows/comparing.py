@@ -1,4 +1,4 @@
-"""Two builds against each other: what `cdtool compare` does."""
+"""Comparison of two builds: the work of `cdtool compare`."""
 
 from __future__ import annotations
 

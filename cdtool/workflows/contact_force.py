@@ -23,14 +23,14 @@ class ContactPoint:
 
     @classmethod
     def parse(cls, text: str) -> ContactPoint:
-        """From LINK:X,Y,Z; raises UsageError."""
+        """Return the point given as LINK:X,Y,Z; raises UsageError."""
         link, _, numbers = text.rpartition(":")
         try:
             x, y, z = (float(part) for part in numbers.split(","))
         except ValueError:
             x = y = z = np.nan
         if not link or not np.isfinite([x, y, z]).all():
-            raise UsageError(f"contact point is '{text}'", "LINK:X,Y,Z in m in the link's frame, e.g. link4:0,0.1,0.3")
+            raise UsageError(f"contact point is '{text}'", "give LINK:X,Y,Z in m in the link's frame: link4:0,0.1,0.3")
         return cls(link, (x, y, z))
 
     def __str__(self) -> str:
@@ -38,20 +38,20 @@ class ContactPoint:
 
 
 def contact_force(detection: Detection, machine: Machine, contact: ContactPoint) -> Series:
-    """The force (n, 3) [N], base axes, that the machine exerts at the point, on the signal's clock.
+    """Return the force (n, 3) [N], in base axes, that the machine exerts at the point, on the signal's clock.
 
-    Least squares of J_c' F = residual. NaN where the signal cannot be judged or the pose is missing. In a direction in
-    which the point cannot move, or does so only with a joint that is not watched, it is 0. Raises UsageError where the
-    signal is no contact torque of all joints, ConfigurationError for an unknown link.
+    Least-squares solution of J_c' F = residual. NaN where the signal is not assessable or the pose is missing. The
+    force is 0 in a direction in which the point cannot move, or moves only with a joint that is not monitored. Raises
+    UsageError if the signal is not the contact torque of all joints, ConfigurationError for an unknown link.
     """
     signal, recording = detection.statistic, detection.operation.recording
     if not has_links(machine):
-        raise UsageError(f"machine '{machine.name}' has no links to touch", "a planar_arm or urdf_robot is needed")
+        raise UsageError(f"machine '{machine.name}' has no links", "use a planar_arm or urdf_robot")
     if signal.joints != recording.joints or signal.unit != machine.force_unit or not _estimates(detection.detector):
         able = [name for name in DETECTORS.names() if _estimates(name)]
         raise UsageError(
-            f"{detection.detector} of {', '.join(signal.joints)} is no contact torque of all joints",
-            f"{', '.join(able[:-1])} or {able[-1]} of all joints",
+            f"{detection.detector} of {', '.join(signal.joints)} is not the contact torque of all joints",
+            f"use {', '.join(able[:-1])} or {able[-1]} of all joints",
         )
     position = previous_value(recording["position"], signal.time)
     known = np.isfinite(position).all(axis=1) & signal.valid.all(axis=1)
@@ -61,13 +61,13 @@ def contact_force(detection: Detection, machine: Machine, contact: ContactPoint)
 
 
 def _estimates(detector: str) -> bool:
-    """Return whether a detector's signal is the contact torque; a plug-in whose class says nothing counts as one."""
+    """Whether a detector's signal is the contact torque; assumed for a plug-in whose class does not state it."""
     return bool(getattr(DETECTORS.load(detector), "contact_torque", True))
 
 
 @dataclass(frozen=True)
 class ForceSummary:
-    """The estimated force's magnitude [N]: at the first alarm (NaN without one), and its largest with its time [s]."""
+    """Magnitude of the estimated force [N]: at the first alarm (NaN without one), and its maximum with the time [s]."""
 
     contact: ContactPoint
     operation: str
@@ -77,7 +77,7 @@ class ForceSummary:
 
 
 def summarise_force(detection: Detection, machine: Machine, contact: ContactPoint) -> ForceSummary:
-    """Magnitude of the estimated force at the first alarm and at its largest; raises as `contact_force` does."""
+    """Return the magnitude of the estimated force at the first alarm and its maximum; raises as `contact_force`."""
     force = contact_force(detection, machine, contact)
     size = np.linalg.norm(force.values, axis=1)
     alarms = detection.verdict.alarms

@@ -1,4 +1,4 @@
-"""Running one detector over one log."""
+"""Run one detector over one log."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
 @dataclass(frozen=True)
 class Detected:
-    """A log, what the detector says of each of its operations, and the contacts where the log has ground truth.
+    """A log, the detector's result for each of its operations, and the contacts if the log has ground truth.
 
-    `matchings` hold each operation's alarms against its contacts, in the order of `detections`. `threshold` says in
-    words what was held against the signal, `activation` is what raised the alarms. `learned`: the signature was learned
-    from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
-    `normals`: what impact-free runs look like, or why that is not known.
-    `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
-    `not_scored` names contacts without an onset, `warnings` are about the log itself, `notes` about the signature file.
-    `onset` says how the onset is found on the load cell.
+    `matchings` match each operation's alarms with its contacts, in the order of `detections`. `threshold` describes
+    the threshold, `activation` how a signal outside it becomes an alarm. `learned`: the signature was learned from this
+    log, so the absence of alarms is no evidence. `window`: how long after its onset a contact may be detected [s].
+    `normals`: the normal motion of impact-free runs, or why it is unknown.
+    `contact_rows` contains, for each of `detections`, the rows of these contacts as written by `cdtool benchmark`.
+    `not_scored` names contacts without an onset, `warnings` concern the log itself, `notes` the signature file.
+    `onset` describes how the onset is found on the load cell.
     """
 
     recording: Recording
@@ -62,7 +62,7 @@ class Detected:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The names of the signal's columns: the joints that are watched."""
+        """Return the names of the signal's columns: the monitored joints."""
         return self.detections[0].statistic.joints if self.detections else self.recording.joints
 
 
@@ -106,7 +106,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     machine_file = options.machine_file()
     signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
     if (signature is None) == (not limit):
-        raise UsageError("one threshold is needed: a signature or a limit", "give --signature FILE or --limit VALUE")
+        raise UsageError("give either a signature or a limit", "give --signature FILE or --limit VALUE")
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
@@ -116,7 +116,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
         if joints:
-            raise UsageError("joints belong to a limit", "a signature watches the joints that it was learned for")
+            raise UsageError("joints require a limit", "a signature monitors the joints that it was learned for")
         thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
@@ -124,7 +124,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         notes = notes_on(stored)
     else:
         if detector is None:
-            raise UsageError("a limit belongs to a detector", "give --detector NAME; see cdtool list detectors")
+            raise UsageError("a limit requires a detector", "give --detector NAME; see cdtool list detectors")
         instance = machine_file.detector(detector)
         check_joints(joints, machine_file.machine)
         thresholds = (Limit.given(limit),)
@@ -132,7 +132,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
     stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
-        described += ", with another activation than that of the file"
+        described += ", with an activation different from the file's"
     recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges)
     rules = options.rules or ScoringRules()
     hold = max(HOLD, rules.window)
@@ -162,7 +162,7 @@ detect = by_keywords(DetectionOptions, detect_log)
 
 
 def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
-    """As `cdtool benchmark` scores it; raises RecordingError where it left the log out."""
+    """Return the detection as `cdtool benchmark` scores it; raises RecordingError if it leaves the log out."""
     scored = benchmark.score(log)
     matched = scored.matched
     judged = (
@@ -171,7 +171,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         else []
     )
     if scored.log is None or matched is None or not judged:
-        reason = scored.skipped[0].reason if scored.skipped else "no operation could be judged"
+        reason = scored.skipped[0].reason if scored.skipped else "no operation is assessable"
         raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
     return Detected(
         scored.log,
@@ -192,13 +192,13 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
 
 
 def contact_of(found: Detected, alarm: Alarm) -> Contact | None:
-    """The contact that an alarm belongs to: in whose window it lies, or that still presses when it comes."""
+    """Return the contact that an alarm belongs to: by its window, or because the contact lasts until the alarm."""
     spans = windows(found.contacts, found.window)
     return next((span[0] for span in reversed(spans) if belongs(alarm.time, [span])), None)
 
 
 def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
-    """What an alarm of a contact is that did not detect it: another joint's, the same one's again, or too late."""
+    """Describe an alarm of a contact that did not detect it: another joint's, a repeated or a late one."""
     matches = [item for matching in found.matchings for item in matching.matches if item.contact == contact]
     first = next((item.alarm for item in matches if item.alarm), None)
     if contact.in_progress:
@@ -213,7 +213,7 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
 
 
 def why_no_contact(found: Detected, alarm: Alarm) -> str:
-    """Why an alarm that belongs to no contact has no latency: no ground truth, none any more, or it is a false one."""
+    """Explain why an alarm without a contact has no latency: no ground truth, ground truth ended, or a false alarm."""
     channel = next((name for name in GROUND_TRUTH if name in found.recording), None)
     if channel is None:
         absent = absent_truth(found.recording)
@@ -221,10 +221,10 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
     series = found.recording[channel]
     present = series.time[np.isfinite(series.values[:, 0])]
     if channel != "event" and (not len(present) or alarm.time > present[-1]):
-        ends = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
+        ends = f"ends at {present[-1]:.3f} s" if len(present) else "has no samples"
         return f"{'load cell' if channel == 'force' else channel} {ends}"
     if channel == "force" and len(present) > 1:
         k = int(np.searchsorted(present, alarm.time))
         if k > 0 and present[k] - present[k - 1] > longest_step(present):
-            return f"not known: load-cell samples are missing from {present[k - 1]:.3f} to {present[k]:.3f} s"
+            return f"unknown: load-cell samples are missing from {present[k - 1]:.3f} to {present[k]:.3f} s"
     return "no contact"

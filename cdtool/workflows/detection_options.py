@@ -1,4 +1,4 @@
-"""How one detector runs over a log: the settings that `cdtool.detect` and `cdtool.explain` take."""
+"""Settings to run one detector over a log, used by `cdtool.detect` and `cdtool.explain`."""
 
 from __future__ import annotations
 
@@ -53,18 +53,18 @@ class DetectionOptions:
     rules: ScoringRules | None = None
 
     def prepared(self) -> PreparedBenchmark | None:
-        """Return the benchmark, read and learned, or None; raises UsageError for settings given beside it."""
+        """Return the benchmark, read and learned, or None; raises UsageError for settings combined with it."""
         if self.benchmark is None:
             return None
         by_hand = self.limit or self.joints or self.operations != "whole" or self.activation or self.rules
         if self.machine is not None or by_hand:
-            raise UsageError("settings are given together with a benchmark file", "all of them come from there")
+            raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
         if isinstance(self.benchmark, PreparedBenchmark):
             return self.benchmark
         return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
 
     def machine_file(self) -> MachineFile:
-        """Return the machine file, read; raises UsageError where none is given."""
+        """Return the machine file, read; raises UsageError if none is given."""
         if isinstance(self.benchmark, PreparedBenchmark):
             return self.benchmark.setup.machine_file
         if self.machine is None:

@@ -1,4 +1,4 @@
-"""Which channels a detector reads on a machine."""
+"""Channels that a detector reads on a machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from cdtool.machine_file import MachineFile
 
 
 def inputs_of(detector: str, machine_file: MachineFile) -> tuple[str, ...]:
-    """The channels that a detector reads: a model of coupled joints needs the pose as well."""
+    """Return the channels that a detector reads; a model of coupled joints also needs the pose."""
     needs: tuple[str, ...] = machine_file.detector(detector).needs
     posed = machine_file.machine.coupled and "speed" in needs and "position" not in needs
     return (*needs, "position") if posed else needs

@@ -1,4 +1,4 @@
-"""Explaining what one detector said of one log: every alarm, and every contact without one."""
+"""Explain every alarm and every missed contact of one detector in one log."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cdtool.workflows.keyword_options import by_keywords
 
 @dataclass(frozen=True)
 class Explained:
-    """What the detector said of a log, and for each of its `detections` the explanations in order of time."""
+    """The detector's results for a log, and for each of its `detections` the explanations in order of time."""
 
     found: Detected
     explanations: tuple[tuple[Explanation, ...], ...]
 
     @property
     def events(self) -> list[tuple[Detection, Explanation]]:
-        """Every explanation with its detection."""
+        """Return every explanation with its detection."""
         pairs = zip(self.found.detections, self.explanations, strict=True)
         return [(detection, item) for detection, items in pairs for item in items]
 

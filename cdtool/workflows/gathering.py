@@ -1,4 +1,4 @@
-"""The rows of many logs, gathered: by a benchmark of detectors, or of alarms that came from elsewhere."""
+"""Gather the rows of many logs, for detectors and for external alarms."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from cdtool.workflows.detector_inputs import inputs_of
 
 
 class Gathering:
-    """The rows of a benchmark, log by log in the order of the file, and the traces that are kept.
+    """The rows of a benchmark, log by log in the order of the file, and the selected traces.
 
-    `names` are the detectors; `learned` has the hashes of the logs learned from, with their names; `normals` is what
-    these look like.
+    `names` are the detectors; `learned` maps the hashes of the logs learned from to their names; `normals` is their
+    normal motion.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Gathering:
         self.scored: list[Scored] = []
         self.skipped: list[Skipped] = []
         self.findings: list[Skipped] = [Skipped(str(setup.path), words) for words in setup.migrated]
-        # By detector: the unit of what was held against its limits, which need not be that of its signal.
+        # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
         self._sweep = SweepRows(factors, HOLDOUT)
@@ -59,7 +59,7 @@ class Gathering:
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
 
     def add(self, group: str, scored: Scored) -> None:
-        """Take one log's rows; raises ConfigurationError where it was learned from, under whatever name."""
+        """Add one log's rows; raises ConfigurationError if the same log, under any name, was learned from."""
         self._logs += 1
         self.skipped += scored.skipped
         self.findings += scored.findings
@@ -81,11 +81,11 @@ class Gathering:
 
     @property
     def traces(self) -> tuple[Trace, ...]:
-        """The traces that are kept."""
+        """Return the selected traces."""
         return self._choice.kept()
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
-        """All of it; raises RecordingError where no log could be scored."""
+        """Return all results; raises RecordingError if no log could be scored."""
         if not self._exposure:
             first = self.skipped[0] if self.skipped else None
             reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
@@ -114,13 +114,13 @@ class Gathering:
         before = self._scored.setdefault(recording.sha256, recording.recording) if recording.sha256 else ""
         if before and before != recording.recording:
             raise ConfigurationError(
-                f"{self.setup.path}: {recording.recording} and {before} hold the same bytes", "score a log once"
+                f"{self.setup.path}: {recording.recording} and {before} have identical content", "score each log once"
             )
         if recording.sha256 and recording.sha256 in self.learned:
             raise ConfigurationError(
-                f"{self.setup.path}: {recording.recording} holds the same bytes as {self.learned[recording.sha256]}, "
-                "which is learned from",
-                "a recording may be in [learn] or scored, not both",
+                f"{self.setup.path}: {recording.recording} has the same content as {self.learned[recording.sha256]}, "
+                "which is used for learning",
+                "use a recording either in [learn] or for scoring",
             )
 
 
@@ -148,7 +148,7 @@ def _offer(choice: TraceChoice, number: int, judged: Judged, setup: BenchmarkFil
 
 
 def _explained(detection: Detection, matching: Matching, setup: BenchmarkFile, normals: NormalMotions) -> list[str]:
-    """Why each alarm came and each contact was missed; nothing of alarms that came from elsewhere."""
+    """Return why each alarm was raised and each contact missed; empty for external alarms."""
     if detection.threshold is None:
         return []
     inputs = inputs_of(detection.detector, setup.machine_file)

@@ -1,4 +1,4 @@
-"""What is in a log: channels, units, rates, gaps and all findings; and why a clock is missing or doubtful."""
+"""The content of a log: channels, units, rates, gaps and findings, and why a clock is missing or doubtful."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChannelInfo:
-    """One channel or column: how many samples, how fast, from where to where."""
+    """One channel or column: number of samples, rate and range."""
 
     name: str
     unit: str
@@ -45,9 +45,9 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class Info:
-    """A log: without a machine file its columns as they stand, with one its channels on the load side.
+    """A log: its columns as they are in the file, or with a machine file its channels on the load side.
 
-    `dialect` is how a table of text is written, as `[csv]` of a machine file; empty for other formats.
+    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats.
     """
 
     source: str
@@ -110,7 +110,7 @@ def _survey(log: Path) -> Info:
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
-    """A column by its figures; those of a table are on the table's clock."""
+    """Return a column with its statistics; the columns of a table share the table's clock."""
     known, samples = figures.columns[column.name], figures.rows(column.name)
     clock = table_clock if column.time is None else figures.clocks[figures.clock_of[column.name]]
     timed = clock is not None and clock.rows > 0
@@ -174,7 +174,7 @@ def _clock_doubts(
     reread: Reread,
     clock: TableClock | None,
 ) -> list[Finding]:
-    """Of a table the columns that are named as clocks and are none, and that there is no clock; of topics coarse ones.
+    """Return doubts about clocks: unusable clock columns of a table, a missing clock, and coarse clocks of topics.
 
     `figures` are those of the columns, `clocks` those of the topics' own clocks.
     """
@@ -212,7 +212,7 @@ def _named_ones(
 
 
 def _doubt(steps: Distribution) -> str:
-    """What is odd about steps between stamps, empty where nothing is."""
+    """Return the problem with the steps between stamps, or an empty text."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
         return f"all of its {steps.count + 1} stamps are the same: the clock stands still"

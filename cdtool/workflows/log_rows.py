@@ -1,4 +1,4 @@
-"""All columns of a log as `cdtool convert` writes them: groups, and their rows in the order of time, piece by piece."""
+"""All columns of a log as `cdtool convert` writes them: groups, and their rows in order of time, piece by piece."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from cdtool.recording import FloatArray
 
 @dataclass(frozen=True)
 class _Pick:
-    """A column that is written and the log's that it is, or (`element`) is one element of."""
+    """A column to write, with the log's column that it is, or (`element`) of which it is one element."""
 
     column: Column
     source: Column
     element: int | None = None
 
     def of(self, piece: Piece) -> FloatArray:
-        """Its values in a piece."""
+        """Return its values in a piece."""
         values = values_of(piece, self.source)
         return values if self.element is None else np.ascontiguousarray(values[:, self.element])
 
 
 class LogRows:
-    """A log, in one file or parts, read piece by piece: its groups, and their rows as often as they are asked for.
+    """A log, in one file or in parts, read piece by piece: its groups and their rows; `parts` can be called repeatedly.
 
-    A table's clock is guessed, since some containers need one. Topics with the same times, to the bit, are one group.
+    The clock of a table is guessed, since some containers need one. Topics with bit-identical times form one group.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,14 +53,14 @@ class LogRows:
         self._add_groups(_each_once(picks))
 
     def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
-        """The rows of these groups, from the first on."""
+        """Yield the rows of these groups from the beginning."""
         clocks = {group.name: [self._clock_name(pick) for pick in self._picks[group.name]] for group in groups}
         columns: dict[str, list[Column]] = {}
         for group in groups:
             for pick, clock in zip(self._picks[group.name], clocks[group.name], strict=True):
                 if group.timed:
                     columns.setdefault(clock, []).append(pick.source)
-        # A guessed clock says nothing of where the file has it beside others.
+        # A guessed clock has no known position among the columns of the file.
         late = np.inf if len(groups) > 1 and any(group.is_table for group in groups) else self._figures.late
         if columns:
             pieces = by_time(self._timed(columns), columns, late, self._figures.sorted)
@@ -83,7 +83,7 @@ class LogRows:
         return Part(pieces[0].time, tuple(pick.of(piece) for pick, piece in zip(picks, pieces, strict=True)))
 
     def _timed(self, columns: dict[str, list[Column]]) -> Iterator[Piece]:
-        """The log's pieces, those of a table with the times that its clock says."""
+        """Yield the log's pieces; those of a table get the times of its clock."""
         clock = self._clock
         keys = {column.name for some in columns.values() for column in some}
         for piece in self._figures.pieces(keys if clock is None else {*keys, clock.column}):
@@ -100,7 +100,7 @@ class LogRows:
         for members in clocks.values():
             self._add(members, self._clock_of(members[0]), is_table=False)
         digests = self._figures.digests
-        # A column that is the clock of others is written with them.
+        # A column that is the clock of others is written together with them.
         rest = [p for p in picks if p.source.time is None and digests[p.source.name].digest() not in clocks]
         for rows in dict.fromkeys(self._clock_of(pick).rows for pick in rest):
             members = [pick for pick in rest if self._clock_of(pick).rows == rows]
@@ -123,13 +123,13 @@ class LogRows:
 
 
 def _opened(found: Format, path: Path, keys: Collection[str] | None) -> Pieces:
-    """A file's pieces, with exact times where the format rounds them and cdtool itself converted the file."""
+    """Return a file's pieces; times are exact if cdtool converted the file, even if the format rounds them."""
     exact: Callable[[Path], Pieces] | None = getattr(found, "exact_pieces", None)
     return read_pieces(found, path, keys) if exact is None else exact(path)
 
 
 def _without_units(columns: Collection[Column]) -> list[tuple[Column, Column]]:
-    """`torque [N m]` as `torque`, where no other column is called so: the unit is kept beside the name."""
+    """Rename `torque [N m]` to `torque` if no other column has that name; the unit is stored separately."""
     count = Counter(split_unit(column.name)[0] for column in columns)
     short = {column.name: split_unit(column.name)[0] for column in columns if column.unit is not None}
     plain = {name: name if count[base] > 1 else base for name, base in short.items()}
@@ -137,7 +137,7 @@ def _without_units(columns: Collection[Column]) -> list[tuple[Column, Column]]:
 
 
 def _each_once(picks: Sequence[_Pick]) -> list[_Pick]:
-    """Every column under a name of its own: `a/b` beside `a.b` is `a.b (2)`, for a container would hold only one."""
+    """Give each column a unique name: `a/b` next to `a.b` becomes `a.b (2)`, since a container would store only one."""
     taken = {pick.column.name for pick in picks}
     found: dict[str, _Pick] = {}
     for pick in picks:
@@ -149,7 +149,7 @@ def _each_once(picks: Sequence[_Pick]) -> list[_Pick]:
 
 
 def _split(column: Column, source: Column) -> list[_Pick]:
-    """A topic's array as a column an element; names that no container takes for groups or for numbers."""
+    """Split a topic's array into one column per element, with names that no container treats as groups or numbers."""
     name = column.name.lstrip("/").replace("/", ".")
     name = f"column_{name}" if name.isdigit() else name
     if column.values.ndim == 1:

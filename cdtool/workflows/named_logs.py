@@ -1,4 +1,4 @@
-"""The logs that a benchmark file names: of groups, of campaigns and test points, and in its label file."""
+"""The logs named in a benchmark file: in groups, campaigns and test points, and in its label file."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from cdtool.workflows.runs import find_logs, shown_path
 
 
 def logs_of(table: Table, base: Path) -> tuple[Path, ...]:
-    """The files that `logs` names below `base`; raises ConfigurationError for no match and for other keys."""
+    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys."""
     logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
     table.finish()
     return logs
 
 
 def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, str]:
-    """Which campaign or test point each of the `scored` logs belongs to, however its path is written.
+    """Return the campaign or test point of each of the `scored` logs, independent of how its path is written.
 
-    Raises ConfigurationError for a log that is not scored, or that belongs to two.
+    Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
     """
     known = {path.resolve(): path for path in scored}
     found: dict[Path, str] = {}
     for name in table.values:
         if not name.strip():
-            raise table.fault(name, "has no name", "a name is needed")
+            raise table.fault(name, "has no name", "give it a name")
         for log in logs_of(table.table(name), base):
             path = known.get(log.resolve())
             if path is None:
-                raise table.fault(name, f"names {log}, which no group of [impacts] scores", "name logs that are scored")
+                raise table.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")
             if found.get(path, name) != name:
-                raise table.fault(name, f"names {log}, which '{found[path]}' does too", "a log belongs to one")
+                raise table.fault(name, f"names {log}, which is also in '{found[path]}'", "list each log once")
             found[path] = name
     return found
 
 
 def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None:
-    """The label file, each row of which has to be about one of the `scored` logs; None where none is named.
+    """Return the label file, whose rows must all be about one of the `scored` logs; None without a file.
 
-    Raises ConfigurationError with the row that fits none, or with the file's name that fits several.
+    Raises ConfigurationError for a row that matches no log, or for a file name that matches several.
     """
     if "labels" not in onset:
         return None
@@ -52,7 +52,7 @@ def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None
     for name, recording in by_recording(path, labels.contacts, set(recordings)).items():
         if recording is None:
             raise ConfigurationError(
-                f"{labels.lines[name][0]}: '{name}' is none of the recordings that are scored",
-                f"write a path below the benchmark file, such as {recordings[0]}, or take the row out",
+                f"{labels.lines[name][0]}: '{name}' is not a scored recording",
+                f"give a path relative to the benchmark file, such as {recordings[0]}, or remove the row",
             )
     return labels

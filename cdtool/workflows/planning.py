@@ -1,4 +1,4 @@
-"""How large a test must be before it is made: what `cdtool plan` does."""
+"""Size of a test, calculated in advance: the work of `cdtool plan`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cdtool.workflows.keyword_options import by_keywords
 
 @dataclass(frozen=True)
 class Need:
-    """So many impacts, recordings, operations or hours, with so many misses or false alarms `allowed` in them."""
+    """A number of impacts, recordings, operations or hours, with `allowed` misses or false alarms among them."""
 
     amount: float
     unit: str
@@ -37,7 +37,7 @@ class Need:
 
 @dataclass(frozen=True)
 class Answer:
-    """What one question needs, in words and as figures."""
+    """The answer to one question, in words and as numbers."""
 
     question: Literal["difference", "missed", "false alarms"]
     words: str
@@ -46,7 +46,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Measured:
-    """A standard deviation [ms] to plan with: given, or measured on the contacts that `source` names."""
+    """A standard deviation [ms] to plan with: given, or measured on the contacts described by `source`."""
 
     std: float
     source: str = ""
@@ -55,7 +55,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Plan:
-    """The answers in the order of the questions; `measured` where a difference was asked for."""
+    """The answers in the order of the questions; `measured` if a difference was given."""
 
     answers: tuple[Answer, ...]
     measured: Measured | None = None
@@ -144,8 +144,8 @@ def answer(questions: Questions) -> Plan:
         answers.append(_false_alarms(Budget.parse(questions.false_alarms_at_most), counts, level))
     if not answers:
         raise UsageError(
-            "nothing is asked",
-            "ask with --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most 1/1000op (or 0.1/h)",
+            "there is no question",
+            "give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most 1/1000op (or 0.1/h)",
         )
     return Plan(tuple(answers), measured if difference_ms is not None else None)
 
@@ -156,11 +156,11 @@ plan = by_keywords(Questions, answer)
 def measured_std(
     results: str | Path | Results, detectors: Sequence[str] = (), group: str = "", *, unpaired: bool = False
 ) -> Measured:
-    """The standard deviation [ms] of the paired differences of two detectors, or of the latencies where `unpaired`.
+    """Return the standard deviation [ms] of the paired differences of two detectors, or of latencies if `unpaired`.
 
-    By recording or campaign, see `spread_of`; of two detectors unpaired, the root of the mean square. `detectors` by
-    full or short names, `group` where there are several. Raises UsageError for an unknown name, a wrong number of
-    detectors or fewer than two recordings; RecordingError where the file is none.
+    By recording or campaign, see `spread_of`; for two detectors unpaired, the root of the mean square. `detectors` are
+    full or short names; `group` is required if there are several. Raises UsageError for an unknown name, a wrong number
+    of detectors or fewer than two recordings; RecordingError if the file is not a results file.
     """
     known = results if isinstance(results, Results) else read_results(Path(results))
     names = _detectors(known, detectors, unpaired)
@@ -171,7 +171,7 @@ def measured_std(
         words = f"the latencies of {' and '.join(names)}"
     else:
         samples = [[(a.recording, _difference_of(a, rows[1][key])) for key, a in rows[0].items() if key in rows[1]]]
-        words = f"{' less '.join(names)}"
+        words = f"{' minus '.join(names)}"
     spreads = tuple(_spread(known, sample, words, chosen) for sample in samples)
     std = math.sqrt(sum(item.std**2 for item in spreads) / len(spreads))
     cluster = "campaign" if any(item.campaign for item in known.recordings if item.group == chosen) else "recording"
@@ -181,15 +181,15 @@ def measured_std(
 
 def _difference(difference: float, std: Measured, unpaired: bool, power: float, level: float) -> Answer:
     count = (impacts_for_unpaired if unpaired else impacts_for_difference)(difference, std.std, power, level)
-    # Where recordings hold several contacts, the spread is that of recordings.
+    # If recordings contain several contacts, the spread is that of recordings.
     grouped = any(item.clusters < item.n for item in std.spreads)
     unit = "recordings or campaigns" if grouped else "impacts"
-    each = " in each of two sets" if unpaired else ", each judged by both"
+    each = " in each of two sets" if unpaired else ", each scored for both"
     like = f"{each}, with as many contacts in each as measured" if grouped else each
     of = "within a set" if unpaired else "of the differences"
     source = f", measured: {std.source}" if std.source else ""
     words = (
-        f"to see a difference of {difference:g} ms with {100.0 * power:g} % power "
+        f"to detect a difference of {difference:g} ms with {100.0 * power:g} % power "
         f"(standard deviation {of} {std.std:.3g} ms{source}): {count} {unit}{like}"
     )
     return Answer("difference", words, (Need(count, unit, "see"),))
@@ -210,7 +210,7 @@ def _false_alarms(budget: Budget, counts: Sequence[int], level: float) -> Answer
     unit = f"{budget.per}s"
 
     def whole(exposure: float) -> float:
-        # Operations cannot be parted; hours are told to three digits, never too few.
+        # Operations are whole; hours are rounded up to three digits.
         step = 1.0 if budget.per == "operation" else 10.0 ** (math.floor(math.log10(exposure)) - 2)
         return float(f"{math.ceil(exposure / step - 1e-9) * step:.12g}")
 
@@ -221,7 +221,7 @@ def _false_alarms(budget: Budget, counts: Sequence[int], level: float) -> Answer
     words = (
         f"a budget of {budget} false alarms: to set a safety factor for it, "
         f"{counted(needed.amount, f'impact-free {budget.per}')} to learn from; "
-        f"to show that it is kept, {digits(shown[0].amount)} others without a false alarm{rest}"
+        f"to show that it is met, {digits(shown[0].amount)} others without a false alarm{rest}"
     )
     return Answer("false alarms", words, (needed, *shown))
 
@@ -234,7 +234,7 @@ def _share(text: str) -> float:
     except ValueError:
         share = math.nan
     if not 0.0 < share < 1.0:
-        raise UsageError(f"missed share is '{text}'", "write 5% or 0.05: above 0 and below 1")
+        raise UsageError(f"missed share is '{text}'", "give 5% or 0.05: above 0 and below 1")
     return share
 
 
@@ -244,21 +244,21 @@ def _detectors(results: Results, names: Sequence[str], unpaired: bool) -> list[s
     full |= {name: name for name in results.detectors}
     for name in names:
         if full.get(name) not in results.detectors:
-            raise UsageError(f"the results hold no detector '{name}'", nearest(name, results.detectors))
+            raise UsageError(f"detector '{name}' is not in the results", nearest(name, results.detectors))
     wanted, words = ((1, 2), "one detector or two") if unpaired else ((2,), "two detectors")
     found = list(dict.fromkeys(full[name] for name in names))
     if len(found) not in wanted:
-        raise UsageError(f"{len(found)} detectors are named", f"name {words} of {', '.join(results.detectors)}")
+        raise UsageError(f"{len(found)} detectors are given", f"give {words} of {', '.join(results.detectors)}")
     return found
 
 
 def _group(results: Results, name: str) -> str:
-    """The group named, or the only one with contacts."""
+    """Return the given group, or the only one with contacts."""
     known = [group for group in results.groups if any(item.group == group for item in results.scored_contacts)]
     if not name and len(known) == 1:
         return known[0]
     if name not in known:
-        raise UsageError(f"no contacts in a group '{name}'" if name else "no group is named", nearest(name, known))
+        raise UsageError(f"group '{name}' has no contacts" if name else "no group is given", nearest(name, known))
     return name
 
 
@@ -279,14 +279,14 @@ def _spread(results: Results, sample: Sequence[tuple[str, float | None]], what: 
     if math.isnan(found.std):
         raise UsageError(
             f"{what}: detected contacts in {found.clusters} recordings or campaigns of {group}",
-            "a standard deviation needs at least 2",
+            "at least 2 are required for a standard deviation",
         )
     return found
 
 
 def _counted(spread: Spread, of: int, cluster: str) -> str:
-    """How the contacts are clustered, and how many are not in it."""
-    clusters = f"one a {cluster}" if spread.n == spread.clusters else f"in {spread.clusters} {cluster}s"
+    """Describe how the contacts are clustered, and how many are left out."""
+    clusters = f"one per {cluster}" if spread.n == spread.clusters else f"in {spread.clusters} {cluster}s"
     without = f", {of - spread.n} missed or not assessable left out" if of > spread.n else ""
     return f"{spread.n} contacts, {clusters}{without}"
 

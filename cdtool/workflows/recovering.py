@@ -1,4 +1,4 @@
-"""What is left of a damaged MCAP file as a clean one, and what was lost, said in the file itself."""
+"""Recover a damaged MCAP file into a clean one that also records what was lost."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _RECORD = "cdtool.recovered"
 
 @dataclass(frozen=True)
 class Recovered:
-    """A file that was written: its messages, those of them that no CRC covers, those left out as none does.
+    """The file written: its messages, how many of them have no CRC, and how many without a CRC were left out.
 
-    `findings` are about the source. `whole`: nothing was lost and nothing left out.
+    `findings` concern the source. `whole`: nothing was lost and nothing left out.
     """
 
     source: str
@@ -37,7 +37,7 @@ class Recovered:
 
     @property
     def whole(self) -> bool:
-        """All that the source should hold is in the output."""
+        """Whether the output contains everything that the source should contain."""
         return not self.left_out and all(finding.severity != "loss" for finding in self.findings)
 
 
@@ -88,7 +88,7 @@ def recover(
 
     _check_names(source, output, force)
     if not Mcap().sniff(source) and source.suffix.lower() != ".mcap":
-        raise RecordingError(f"{source}: is not an MCAP file", "other formats have no checksums to recover by")
+        raise RecordingError(f"{source}: is not an MCAP file", "only MCAP files have checksums to recover by")
     surveyed = Log(source, strict=False)
     for _ in surveyed.pieces():
         pass
@@ -97,7 +97,7 @@ def recover(
         raise RecordingError(f"{source}: no message can be recovered: {findings[0]}", "copy the file again")
     if surveyed.unverified == surveyed.count and not unverified:
         raise RecordingError(
-            f"{source}: no checksum covers any of its {surveyed.count} messages",
+            f"{source}: none of its {surveyed.count} messages has a checksum",
             "--unverified keeps them, marked as such",
         )
     kept = surveyed.unverified if unverified else 0
@@ -127,21 +127,21 @@ def _write(
         if progress:
             progress(log.count, result.messages + result.left_out)
     if log.unverified != result.unverified + result.left_out:
-        raise RecordingError(f"{source}: changed while it was read", "wait until its recorder has closed it")
+        raise RecordingError(f"{source}: changed while it was read", "wait until the recorder has closed it")
     _copy_extras(log, clean)
     lost = [str(finding) for finding in result.findings if finding.severity == "loss"]
     told = {
         "source_sha256": _digest(source),
         "messages": str(result.messages),
         "lost": "\n".join(lost) or "nothing",
-        "unverified": f"{result.unverified} messages kept in chunks without a checksum, {result.left_out} left out",
+        "unverified": f"{result.unverified} messages in chunks without a checksum, {result.left_out} left out",
     }
     clean.add_metadata(Metadata(_RECORD, told))
     clean.finish()
 
 
 def _copy_extras(log: Log, clean: CleanFile) -> None:
-    """Attachments and metadata that are whole; they carry the checksums that they had, or none."""
+    """Copy intact attachments and metadata; their checksums are kept, missing ones stay missing."""
     from cdtool.formats.mcap.container.attachments import attachment_index
     from cdtool.formats.mcap.container.file_bytes import FileBytes
     from cdtool.formats.mcap.container.records import PREFIX, Attachment, Metadata
@@ -162,11 +162,11 @@ def _check_names(source: Path, output: Path, force: bool) -> None:
     if not os.access(source, os.R_OK):
         raise RecordingError(f"{source}: cannot be read", "check the file's permissions")
     if output.suffix.lower() != ".mcap":
-        raise UsageError(f"{output}: is not the name of an MCAP file", "let it end in .mcap")
+        raise UsageError(f"{output}: must end in .mcap", "choose another name")
     if not output.parent.is_dir():
-        raise UsageError(f"{output}: no folder {output.parent}", "make it first")
+        raise UsageError(f"{output}: no folder {output.parent}", "create the folder first")
     if output.exists() and output.samefile(source):
-        raise UsageError(f"{output}: is the file to recover from", "write to another one")
+        raise UsageError(f"{output}: is the file to recover", "choose another name")
     if output.exists() and not force:
         raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
 

@@ -1,4 +1,4 @@
-"""A benchmark's results again, from their file."""
+"""Read a benchmark's results from their file."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from cdtool.evaluation.traces.trace import Trace
 
 
 def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]:
-    """The results with their statistics, the traces kept beside them, and a note where there are none.
+    """Return the results with their statistics, their traces, and a note if there are no traces.
 
-    Raises RecordingError where either file is damaged.
+    Raises RecordingError if either file is damaged.
     """
     path = Path(results)
     evaluated = evaluate(read_results(path))
     beside = traces_path(path)
     if not beside.exists():
-        return evaluated, (), f"{beside} is missing: no figures over time"
+        return evaluated, (), f"{beside} is missing: no plots over time"
     return evaluated, read_traces(beside, read_text(path, RecordingError, most=MOST_JSON)), ""

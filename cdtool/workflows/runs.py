@@ -1,4 +1,4 @@
-"""From file names to operations: globs, reading many recordings, cutting them, naming what was left out."""
+"""From file names to operations: resolve globs, read and cut recordings, and report what was left out."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
-# How the reason begins of a log that is used although part of it is lost.
+# Prefix of the reason for a log that is used although part of it is lost.
 DAMAGED = "damaged, used as far as it goes: "
-# Called after each piece of work with what is done and how much there is.
+# Called after each piece of work with the amount done and the total.
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Runs:
-    """The operations of some logs, what was left out, findings worth telling, and the plausible ranges of channels."""
+    """The operations of some logs, what was left out, findings to report, and the plausible ranges of channels."""
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
@@ -42,13 +42,13 @@ class Runs:
 
 
 def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
-    """Files that the patterns name below `base`, each once and in order; raises ConfigurationError for no match."""
+    """Return the files that the patterns name below `base`, each once, in order; ConfigurationError for no match."""
     found: dict[Path, None] = {}
     for pattern in patterns:
         path = base / pattern
         matches = [path] if path.is_file() else sorted(_glob(path))
         if not matches:
-            raise ConfigurationError(f"{key}: nothing matches '{pattern}' in {base}", "check the path")
+            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", "check the path")
         found.update(dict.fromkeys(matches))
     return list(found)
 
@@ -56,7 +56,7 @@ def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
 def in_order(
     work: Callable[[Item], Made], items: Sequence[Item], jobs: int, progress: Progress | None
 ) -> Iterator[Made]:
-    """`work` of each item, in order whatever `jobs` is; kernels and parsers run without the interpreter lock."""
+    """Yield `work` of each item, in order for any `jobs`; kernels and parsers run without the interpreter lock."""
     if jobs <= 1:
         for i, item in enumerate(items, 1):
             yield work(item)
@@ -64,7 +64,7 @@ def in_order(
                 progress(i, len(items))
         return
     with ThreadPoolExecutor(jobs) as pool, _cancelling(pool):
-        # No more than that many are on their way: what was made waits for whoever takes it, and needs memory.
+        # At most this many are in progress: finished results wait for the caller and need memory.
         ahead = deque(pool.submit(work, item) for item in items[: 2 * jobs])
         for i in range(1, len(items) + 1):
             made = ahead.popleft().result()
@@ -77,7 +77,7 @@ def in_order(
 
 @contextmanager
 def _cancelling(pool: ThreadPoolExecutor) -> Iterator[None]:
-    """Where the block ends early, work that was not begun is not waited for."""
+    """Cancel work that has not begun if the block ends early."""
     try:
         yield
     except BaseException:
@@ -125,7 +125,7 @@ def load_operations(
     base: Path | None = None,
     ranges: PlausibleRanges | None = None,
 ) -> tuple[Recording, list[Operation]]:
-    """One log's recording, named by its path below `base`, and its operations; raises CdtoolError, naming the file."""
+    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file."""
     recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
     return recording, operations_of(recording, how)
 
@@ -138,15 +138,15 @@ def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
     if not recording.channels:
-        raise RecordingError(f"{path}: no channel is mapped", "write [channels] in the machine file")
+        raise RecordingError(f"{path}: no channel is mapped", "add [channels] to the machine file")
     return recording
 
 
 @dataclass(frozen=True)
 class RunReading:
-    """How impact-free logs are read: cut by `operations`, without contacts by the `onset` rule, named below `base`.
+    """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
-    `jobs` logs are read at once; `progress` is called after each.
+    `jobs` logs are read in parallel; `progress` is called after each.
     """
 
     operations: str
@@ -160,16 +160,16 @@ class RunReading:
 def load_runs(
     paths: Sequence[Path], machine_file: MachineFile, reading: RunReading, ranges: PlausibleRanges | None = None
 ) -> Runs:
-    """Return the operations of many impact-free logs; one that cannot be read is left out and named, the others go on.
+    """Return the operations of many impact-free logs; a log that cannot be read is left out and reported.
 
-    So is a log that is given twice or holds the bytes of another one, and an operation in which the load cell shows
-    a contact. Values that no sensor gives are masked: those outside of the plausible `ranges`,
-    which are learned from all these logs where none are given.
+    Also left out: a log that is given twice or has the content of another one, and an operation in which the load cell
+    shows a contact. Values that no sensor can measure are masked: those outside the plausible `ranges`, which are
+    learned from all these logs if none are given.
     """
     rule, base, jobs = reading.onset or OnsetRule(), reading.base, reading.jobs
     paths, repeated = _each_once(paths)
     operations: list[Operation] = []
-    skipped = [Skipped(shown_path(path, base), "given more than once: counts once") for path in repeated]
+    skipped = [Skipped(shown_path(path, base), "given more than once, used once") for path in repeated]
     findings: list[Skipped] = []
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
@@ -200,7 +200,7 @@ def load_runs(
         recording, parts = loaded
         first = by_bytes.setdefault(recording.digest, recording.name) if recording.digest else recording.name
         if first != recording.name:
-            skipped.append(Skipped(recording.name, f"holds the same bytes as {first}: counts once"))
+            skipped.append(Skipped(recording.name, f"has the same content as {first}: used once"))
             continue
         contacts = contacts_shown(recording, rule)
         free, touched = without_contacts(parts, contacts)
@@ -213,7 +213,7 @@ def load_runs(
 
 
 def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
-    """Return the paths without those that name a file again, and these."""
+    """Return the paths without repetitions, and the repetitions."""
     once: dict[Path, Path] = {}
     repeated: list[Path] = []
     for path in paths:
@@ -223,31 +223,31 @@ def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
 
 
 def unread(path: Path, base: Path | None, fault: CdtoolError) -> Skipped:
-    """A log that could not be used, named as results name it; its reason does not name it again."""
+    """Return the entry of a log that could not be used; its reason does not repeat the name."""
     return Skipped(shown_path(path, base), str(fault).removeprefix(f"{path}: "))
 
 
 def shown_path(path: Path, base: Path | None = None) -> str:
-    """How results name a log: its path below `base`, else as given; with forward slashes on every system."""
+    """Return the name of a log in results: its path below `base`, else as given; with forward slashes everywhere."""
     if base is not None and path.is_relative_to(base):
         return path.relative_to(base).as_posix()
     return path.as_posix()
 
 
 def check_joints(joints: Sequence[str], machine: Machine) -> None:
-    """Raise UsageError, before anything is read, where one of the joints to watch is not the machine's."""
+    """Raise UsageError for a joint that the machine does not have, before any log is read."""
     for joint in joints:
         if joint not in machine.joints:
             raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
 
 
 def lost(recording: Recording) -> list[Skipped]:
-    """What could not be read of a recording that is used nevertheless: to be told like what was left out."""
+    """Return the losses in a recording that is used nevertheless, reported like left-out logs."""
     return [Skipped(recording.name, f"{DAMAGED}{item}") for item in recording.findings if item.severity == "loss"]
 
 
 def absent_truth(recording: Recording) -> list[Finding]:
-    """The notes about ground truth that the machine file maps and the log does not hold."""
+    """Return the notes about ground truth that the machine file maps but the log does not contain."""
     from cdtool.formats.column_names import ABSENT
 
     return [
@@ -260,8 +260,7 @@ def absent_truth(recording: Recording) -> list[Finding]:
 def _glob(path: Path) -> Iterator[Path]:
     root = Path(path.anchor) if path.is_absolute() else Path()
     pattern = str(path.relative_to(root)) if path.is_absolute() else str(path)
-    # As in a shell: a name that begins with a dot is matched only where it is written out. Files that are not whole
-    # yet have such names.
+    # As in a shell, a name that begins with a dot must be matched explicitly. Incomplete files have such names.
     written_out = set(path.parts)
     return (
         match

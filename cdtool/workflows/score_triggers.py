@@ -1,4 +1,4 @@
-"""Alarms of any controller or program, scored like those of a detector: the rows of a trigger file."""
+"""Score the alarms of any controller or program from a trigger file like those of a detector."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from cdtool.workflows.benchmark.scoring import Scored, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import Progress, in_order, shown_path
 
-# A trigger counts as held for this long [s], and another within it as the same.
+# A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
 _CLOCK_RATE = 1000.0
-_STRANGER = "the benchmark file does not score it: its rows are left out"
+_STRANGER = "not scored by the benchmark file: its rows are left out"
 
 
 @dataclass(frozen=True)
 class Score:
-    """The results with their statistics, the traces kept for figures, and the files that were read."""
+    """The results with their statistics, the selected traces, and the files that were read."""
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
@@ -126,8 +126,8 @@ def score(
 def _unlisted(
     given: TriggerFile, said: Mapping[str, Mapping[str, Triggered]], known: Collection[str], listed_only: bool
 ) -> list[Skipped]:
-    """How many recordings a detector has no row for, and what became of them."""
-    became = "left out" if listed_only else "taken as watched without an alarm"
+    """Return how many recordings have no row for a detector, and how they are counted."""
+    became = "left out" if listed_only else "counted as monitored without an alarm"
     found = []
     for detector, by_name in said.items():
         missing = sorted(set(known) - set(by_name))
@@ -139,7 +139,7 @@ def _unlisted(
 
 
 def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock: str) -> list[Skipped]:
-    """Rows about times in which nothing was recorded: mostly those of another clock."""
+    """Report rows at times without a recording, mostly times on another clock."""
     if scored.recording is None or scored.recording.recording not in said:
         return []
     name, item = scored.recording.recording, said[scored.recording.recording]
@@ -151,17 +151,17 @@ def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock:
     if not outside:
         return []
     words = (
-        f"{detector}: {len(outside)} of {counted(len(rows), 'row')} in no operation, the first at {outside[0]:.3f} s"
+        f"{detector}: {len(outside)} of {counted(len(rows), 'row')} outside all operations, first at {outside[0]:.3f} s"
     )
     first, last = spans[0][0], spans[-1][1]
     if any(not first <= at <= last for at in outside):
         other = "recording" if clock == "source" else "source"
-        words += f"; recorded is {first:.3f} to {last:.3f} s: another clock? try --clock {other}"
+        words += f"; the recording is from {first:.3f} to {last:.3f} s: another clock? try --clock {other}"
     return [Skipped(name, words)]
 
 
 def _detection(operation: Operation, detector: str, said: Triggered, shift: float) -> Detection:
-    """The triggers as a signal that is 1 while one is held, against a limit of one half."""
+    """Return the triggers as a signal that is 1 while a trigger is held, with a limit of one half."""
     recording = operation.recording
     time = recording.start + np.arange(math.floor(recording.duration * _CLOCK_RATE) + 1) / _CLOCK_RATE
     values, status = np.zeros((len(time), 1)), np.full((len(time), 1), Status.VALID, dtype=np.uint8)
@@ -175,15 +175,15 @@ def _detection(operation: Operation, detector: str, said: Triggered, shift: floa
     signal = Signal(time, values, status, "1", joints=WHOLE_MACHINE)
     band = Band(np.full_like(values, -np.inf), np.full_like(values, 0.5))
     outcome: Any = "alarm" if alarms else ("no alarm" if signal.valid.any() else "not_assessable")
-    reason = "" if signal.valid.any() else "the trigger file says so"
+    reason = "" if signal.valid.any() else "stated in the trigger file"
     return Detection(
         operation, detector, signal, band, Verdict(outcome, alarms, reason, crossings, _released(alarms, crossings))
     )
 
 
 def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[float, ...]:
-    """When each trigger is released [s]: it is held for a while after the last one that belongs to it."""
-    after = [*(item.time for item in alarms[1:]), math.inf][: len(alarms)]  # there may be none
+    """Return when each trigger is released [s]: a fixed time after its last repetition."""
+    after = [*(item.time for item in alarms[1:]), math.inf][: len(alarms)]  # may be empty
     return tuple(
         max(item.time for item in crossings if alarm.time <= item.time < end) + _HELD
         for alarm, end in zip(alarms, after, strict=True)

@@ -1,4 +1,4 @@
-"""benchmarks/delay_bound.py: Lorden's bound on closed forms, and Page's sum against it."""
+"""benchmarks/delay_bound.py: Lorden's bound on closed forms, and Page's sum compared with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PERIOD = 1e-3
 
 
 def loaded() -> dict[str, Any]:
-    """The script's names; it looks for its neighbours in its own folder."""
+    """The script's names; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(BENCHMARKS))
     try:
@@ -71,7 +71,7 @@ def test_the_divergence_of_noise_alone_stays_about_zero():
     assert np.cumsum(0.5 * responses.mean(axis=0) ** 2)[-1] == pytest.approx(100.0, rel=0.2)
 
 
-def test_the_divergence_of_a_known_response_comes_out_of_its_noise():
+def test_the_divergence_of_a_known_response_is_recovered_from_its_noise():
     shape = np.linspace(0.0, 2.0, 300)
     responses = shape + np.random.default_rng(4).standard_normal((50, 300))
     assert summed_divergence(responses)[-1] == pytest.approx(np.sum(shape**2) / 2.0, rel=0.1)
@@ -94,7 +94,7 @@ def test_a_response_begins_at_the_first_sample_from_the_onset_on_and_ends_with_t
     assert after_onset(signal, 7.0e-3, 2, side) == pytest.approx([sign * 7, sign * 8])
 
 
-def test_samples_that_cannot_be_judged_are_no_response():
+def test_samples_that_are_not_assessable_are_not_a_response():
     assert np.isnan(after_onset(innovations(np.ones(10), Status.GAP), 0.0, 4, 1)).all()
 
 

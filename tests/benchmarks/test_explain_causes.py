@@ -1,4 +1,4 @@
-"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py tries five and 100 alarms."""
+"""Alarms with known causes on two simulated machines; benchmarks/explain_causes.py uses five and 100 alarms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "explain_causes.py"
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:
@@ -37,7 +37,7 @@ def test_causes_and_first_movers_of_a_dozen_alarms_are_right(script):
     assert causes >= 11 and first >= 11, [(item.case.cause, item.cause, item.first) for item in told]
 
 
-def test_a_score_below_the_bar_ends_with_1(script, capsys):
+def test_a_score_below_the_bar_exits_with_1(script, capsys):
     (case,) = script.score(70, 1)
     wrong = script.Told(script.replace(case.case, cause="lost samples"), case.explanation)
     assert not script.report(70, [wrong])

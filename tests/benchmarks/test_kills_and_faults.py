@@ -13,12 +13,12 @@ import typer.main
 from cdtool.cli.app import app
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-# What a command's parameters are called that name what it writes.
+# Names of parameters of commands for output files.
 WRITTEN = {"output", "plot"}
 
 
 def commands() -> set[str]:
-    """Every command with a parameter for what it writes, and the one that writes into the file that it reads."""
+    """Every command with a parameter for its output, and the one that changes the file it reads."""
     found = {"signature update"}
     for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
         for subname, item in getattr(command, "commands", {"": command}).items():

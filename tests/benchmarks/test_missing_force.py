@@ -1,4 +1,4 @@
-"""Missing load-cell samples on a dozen drawn contacts; benchmarks/missing_force.py tries 200."""
+"""Missing load-cell samples on a dozen random contacts; benchmarks/missing_force.py uses 200."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "missing_force.py"
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:
@@ -28,14 +28,14 @@ def script() -> ModuleType:
     return module
 
 
-def test_no_hole_gives_a_wrong_onset_without_a_mark_or_a_pass_that_nobody_saw(script):
+def test_no_hole_causes_an_unmarked_wrong_onset_or_an_unmeasured_pass(script):
     counts, wrong = script.score(31, 12, 12)
     assert wrong == []
     assert sum(count.marked for count in counts.values()) > 10
     assert counts["single samples"].passes > 5 and counts["single samples"].marked == 0
 
 
-def test_what_is_wrong_is_found(script, monkeypatch, capsys):
+def test_wrong_answers_are_reported(script, monkeypatch, capsys):
     monkeypatch.setattr(script, "is_wrong", lambda found, _: found.hole > 0.0)
     monkeypatch.setattr(sys, "argv", ["missing_force.py", "--seeds", "31", "--contacts", "3", "--faults", "6"])
     assert script.main() == 1

@@ -75,7 +75,7 @@ def test_words_that_are_replaced_and_numbers_that_are_added_are_printed(status, 
         ("contacts.csv", "33.5", "33.50", "its content"),
     ],
 )
-def test_a_number_that_is_gone_is_named_and_ends_with_1(status, name, old, new, gone):
+def test_a_number_that_is_gone_is_named_and_exits_with_1(status, name, old, new, gone):
     code, out = status(name, old, new)
     assert code == 1 and f"GONE {gone}" in out
 

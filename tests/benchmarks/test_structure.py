@@ -1,4 +1,4 @@
-"""benchmarks/structure.py on small packages that are written here, and on the logs that it makes."""
+"""benchmarks/structure.py on small generated packages, and on its own generated logs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _numbers = itertools.count()
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it looks for its neighbours in its own folder."""
+    """The script as a module; it imports modules from its own folder."""
     kept = list(sys.path)
     sys.path.insert(0, str(SCRIPT.parent))
     try:
@@ -38,7 +38,7 @@ def script() -> ModuleType:
 
 @pytest.fixture
 def package(tmp_path: Path) -> Callable[..., Path]:
-    """Writes a package of files by their paths below it, where PKG stands for its name."""
+    """Write a package of files by their paths below it, where PKG stands for its name."""
 
     def write(files: Mapping[str, str], name: str = "pkg") -> Path:
         root = tmp_path / name
@@ -58,7 +58,7 @@ def imported(script: ModuleType, root: Path) -> set[tuple[str, str, str]]:
     return {(item.importer, item.imported, item.kind) for item in script.imports_of(script.modules_of(root))}
 
 
-def test_an_import_is_found_wherever_it_stands_and_however_it_is_written(script, package):
+def test_an_import_is_found_at_any_position_in_any_form(script, package):
     root = package(
         {
             "a.py": "from typing import TYPE_CHECKING\nfrom pkg import b\nif TYPE_CHECKING:\n    from pkg.c import C\n",
@@ -96,7 +96,7 @@ def test_cycles_are_groups_of_modules_that_reach_one_another(script, package):
     assert script.cycles(imports, every) == [["pkg.a", "pkg.b", "pkg.c"], ["pkg.x", "pkg.y"]]
 
 
-def test_a_single_caller_is_the_only_one_and_stands_in_the_same_folder(script, package):
+def test_a_single_caller_is_the_only_one_and_in_the_same_folder(script, package):
     root = package(
         {
             "sub/__init__.py": "from pkg.sub import of_the_package\nTABLE = {'one': 'pkg.sub.registered:One'}\n",
@@ -246,7 +246,7 @@ READING = {
 def calls(
     script: ModuleType, package: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., list[tuple[str, str, str]]]:
-    """The calls that reading by the package above makes."""
+    """The calls made when the package above reads."""
 
     def record(utility: str = "", method: str = "") -> list[tuple[str, str, str]]:
         root = package(READING, f"made_for_walk_{next(_numbers)}")

@@ -1,4 +1,4 @@
-"""benchmarks/time_bounds.py: what the tests note, and what is said of it."""
+"""benchmarks/time_bounds.py: the times recorded by tests, and their report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_time_is_noted_where_a_file_is_named_and_nowhere_else(tmp_path, monkey
     assert line["test"].endswith("::test_a_time_is_noted_where_a_file_is_named_and_nowhere_else")
 
 
-def test_of_each_test_the_time_nearest_to_its_bound_counts_the_worst_first(script):
+def test_the_time_nearest_to_its_bound_counts_and_the_worst_is_first(script):
     noted = [("a", 1.0, 5.0), ("b", 4.0, 3.0), ("a", 2.0, 5.0), ("a", 1.9, 4.0)]
     told = script.longest({"test": test, "seconds": seconds, "bound": bound} for test, seconds, bound in noted)
     assert told == [("b", 4.0, 3.0), ("a", 1.9, 4.0)]
@@ -45,7 +45,7 @@ def test_every_file_that_notes_times_is_run(script):
 
 
 @pytest.mark.parametrize(("seconds", "status"), [(4.0, 0), (6.0, 1)])
-def test_a_broken_bound_ends_with_1(script, monkeypatch, capsys, seconds, status):
+def test_a_violated_bound_exits_with_1(script, monkeypatch, capsys, seconds, status):
     class Done:
         returncode = 0
 

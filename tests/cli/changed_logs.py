@@ -12,7 +12,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_logs" / "gate"
 
 
 def changed(source: Path, target: Path, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> None:
-    """A copy of a log with `change(time [s], force [N])` as its load cell."""
+    """Return a copy of a log with `change(time [s], force [N])` as its load cell."""
     lines = source.read_text(encoding="utf-8").splitlines()
     rows = [line.split(",") for line in lines[1:]]
     time, force = (np.array([float(row[k]) for row in rows]) for k in (0, 5))
@@ -24,7 +24,7 @@ def changed(source: Path, target: Path, change: Callable[[np.ndarray, np.ndarray
 
 
 def folder_of(folder: Path, hits: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]], more: str = "") -> Path:
-    """A benchmark of one detector on changed copies of one impact, hold-outs as they are or drifting."""
+    """Return a benchmark of one detector on changed copies of one impact; hold-outs unchanged or drifting."""
     shutil.copy(SAMPLES / "machine.toml", folder)
     for name, change in hits.items():
         group = "holdout" if name.startswith("free") else "stiff"

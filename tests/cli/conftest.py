@@ -1,4 +1,4 @@
-"""A folder of simulated gate recordings, made once by the command itself."""
+"""A folder of simulated gate recordings, written once by the command itself."""
 
 from __future__ import annotations
 

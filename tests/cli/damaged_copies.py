@@ -1,4 +1,4 @@
-"""Copies of a recording with values, stamps and rows damaged."""
+"""Copies of a recording with damaged values, stamps and rows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def damaged(
     without: range = range(0),
     shifted: Callable[[int, float], float] | None = None,
 ) -> Path:
-    """Write a copy of a CSV log: cells by column and row replaced, rows left out, stamps moved by `shifted`."""
+    """Write a copy of a CSV log: cells by column and row replaced, rows removed, stamps changed by `shifted`."""
     head, *lines = log.read_text(encoding="utf-8").splitlines()
     names, rows = head.split(","), [line.split(",") for line in lines]
     for (name, row), text in (cells or {}).items():

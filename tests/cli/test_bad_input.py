@@ -1,4 +1,4 @@
-"""Bad input: one clear line naming file, row or key and the next step; no traceback; the other files go on."""
+"""Bad input: one clear line with file, row or key and the next step; no traceback; other files are processed."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def test_a_bad_file_is_one_line_with_its_name_and_a_next_step(detect, tmp_path, 
     assert done.status == 2, done
     assert done.out == "" and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert all(word in done.err for word in words), done.err
-    assert done.err.rstrip().endswith(")"), done.err  # the next step stands in brackets
+    assert done.err.rstrip().endswith(")"), done.err  # the next step is in brackets
 
 
-def test_the_other_files_go_on_and_the_end_says_which_were_left_out(detect, tmp_path, gate_folder):
+def test_other_files_are_processed_and_the_last_line_counts_those_left_out(detect, tmp_path, gate_folder):
     bad = written(tmp_path / "bad.csv", "")
     done = detect(bad, gate_folder / "stiff" / "01.csv", tmp_path / "none.csv")
     assert done.status == 3
@@ -75,7 +75,7 @@ def test_a_folder_instead_of_a_file_is_named(detect, gate_folder):
     assert done.status == 2 and "folder" in done.err
 
 
-def test_backward_and_repeated_time_is_told_and_the_rest_is_used(detect, tmp_path, good, gate_folder):
+def test_backward_and_repeated_time_is_reported_and_the_rest_used(detect, tmp_path, good, gate_folder):
     lines = [*good[:3001], good[2500], *good[3001:4001], good[4000], *good[4001:]]
     path = written(tmp_path / "time.csv", "\n".join(lines) + "\n")
     told = cdtool("info", path, "-m", gate_folder / "machine.toml").out
@@ -85,7 +85,7 @@ def test_backward_and_repeated_time_is_told_and_the_rest_is_used(detect, tmp_pat
     assert done.status == 0 and "alarm" in done.out
 
 
-def test_missing_values_are_told_and_do_not_blind_the_detector(detect, tmp_path, good, gate_folder):
+def test_missing_values_are_reported_and_the_detector_continues(detect, tmp_path, good, gate_folder):
     lines = list(good)
     for k in range(1000, 7000, 20):
         cells = lines[k].split(",")
@@ -97,13 +97,13 @@ def test_missing_values_are_told_and_do_not_blind_the_detector(detect, tmp_path,
     assert done.status == 0 and "alarm" in done.out
 
 
-def test_a_channel_without_any_value_is_not_assessable_not_quiet(detect, tmp_path, good):
+def test_a_channel_without_values_is_not_assessable(detect, tmp_path, good):
     lines = [good[0], *(",".join([*line.split(",")[:4], "nan", *line.split(",")[5:]]) for line in good[1:])]
     done = detect(written(tmp_path / "blind.csv", "\n".join(lines) + "\n"))
     assert done.status == 3 and "not assessable" in done.out and "missing samples" in done.out
 
 
-def test_a_half_written_last_line_is_dropped_and_told(detect, tmp_path, good, gate_folder):
+def test_an_incomplete_last_line_is_dropped_and_reported(detect, tmp_path, good, gate_folder):
     path = written(tmp_path / "half.csv", "\n".join(good)[:-20])
     told = cdtool("info", path, "-m", gate_folder / "machine.toml")
     assert told.status == 3 and "loss: the last line" in told.out
@@ -111,7 +111,7 @@ def test_a_half_written_last_line_is_dropped_and_told(detect, tmp_path, good, ga
     assert done.status == 3 and "alarm" in done.out and "last line" in done.err
 
 
-def test_a_truncated_mcap_file_gives_what_lies_before_the_cut_and_status_3(detect, tmp_path):
+def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_path):
     arguments = ("simulate", "gate", "--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 5)
     assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
     whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
@@ -128,7 +128,7 @@ def test_an_unknown_unit_in_the_machine_file_lists_the_known_ones(gate_folder, t
     assert done.status == 2 and "channels.speed.unit" in done.err and "did you mean rpm" in done.err
 
 
-def test_names_from_files_cannot_command_the_terminal(detect, tmp_path):
+def test_names_from_files_cannot_control_the_terminal(detect, tmp_path):
     evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
     written(evil, "")
     done = detect(evil)
@@ -136,7 +136,7 @@ def test_names_from_files_cannot_command_the_terminal(detect, tmp_path):
     assert "\x1b" not in done.err and "\u202e" not in done.err
 
 
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, gate_folder, feekf_signature):
+def test_a_folder_that_cannot_be_created_is_one_line(tmp_path, gate_folder, feekf_signature):
     blocked = written(tmp_path / "file", "in the way")
     done = cdtool("simulate", "gate", "--free", 1, "-o", blocked / "gate")
     assert done.status == 2 and done.err.count("\n") == 1 and "file" in done.err
@@ -146,7 +146,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, gate_folder, feekf_s
     assert done.status == 2 and done.err.count("\n") == 1 and "file" in done.err
 
 
-def test_a_wrong_signature_is_told_once_however_many_logs_there_are(tmp_path, gate_folder):
+def test_a_wrong_signature_is_reported_once_for_many_logs(tmp_path, gate_folder):
     logs = sorted((gate_folder / "stiff").glob("*.csv"))
     done = cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", tmp_path / "none.json")
     assert done.status == 2 and done.err.count("\n") == 1 and "no such file" in done.err

@@ -1,4 +1,4 @@
-"""Robots described wrongly: one clear line, status 2, no traceback, and never a silent permutation of joints."""
+"""Wrong robot descriptions: one clear line, status 2, no traceback, and never a silent permutation of joints."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def refused(log: Path, machine: Path) -> str:
     return done.err
 
 
-def test_the_robot_as_it_is_runs_though_its_meshes_are_missing(log, tmp_path):
+def test_the_unchanged_robot_runs_without_its_meshes(log, tmp_path):
     done = cdtool("detect", log, "-m", described(tmp_path), "-d", "gm", "--limit", "1e6")
     assert done.status == 0 and "no alarm" in done.out
 
 
-def test_a_urdf_that_lacks_a_joint_of_the_log_names_it_and_the_nearest(log, tmp_path):
+def test_a_joint_missing_from_the_urdf_is_named_with_the_nearest(log, tmp_path):
     told = refused(log, described(tmp_path, joints=("pan", "lift", "elbo", "reach", "wrist", "tool")))
     assert "'elbo'" in told and "did you mean elbow" in told and "joint_map" in told
 
@@ -70,7 +70,7 @@ def test_joints_of_the_urdf_that_are_not_logged_must_be_locked(log, tmp_path):
 
 def test_a_wrong_number_of_columns_names_the_key(log, tmp_path):
     told = refused(log, described(tmp_path, torque='"f0", "f1", "f2"'))
-    assert "channels.torque.columns: names 3 columns (6 are needed: one a joint)" in told
+    assert "channels.torque.columns: names 3 columns (give 6: one per joint)" in told
 
 
 def test_a_negative_mass_names_the_link(log, tmp_path):
@@ -78,7 +78,7 @@ def test_a_negative_mass_names_the_link(log, tmp_path):
     assert "link3" in told and "mass" in told
 
 
-def test_a_urdf_that_is_none_names_the_file(log, tmp_path):
+def test_an_invalid_urdf_is_reported_with_its_file(log, tmp_path):
     assert "six.urdf" in refused(log, described(tmp_path, "<robot name='x'><link"))
     machine = described(tmp_path)
     (tmp_path / "six.urdf").unlink()
@@ -106,6 +106,6 @@ def test_joints_in_another_order_in_the_messages_are_mapped_by_name(tmp_path):
     assert mixed.status == 0 and mixed.out.splitlines()[1:] == straight
 
 
-def test_joints_that_the_messages_name_otherwise_are_an_error(tmp_path):
+def test_joints_with_other_names_in_the_messages_are_an_error(tmp_path):
     told = refused(states(tmp_path, tuple(f"j{i}" for i in range(6)), list(range(6))), described(tmp_path))
     assert "name j0, j1" in told and "not 'pan' of machine.joints" in told and "joint_map" in told

@@ -1,4 +1,4 @@
-"""Logs that a benchmark file or a label file names: each has to be one that is scored, and only once."""
+"""Logs named in a benchmark file or a label file must be scored, and only once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ONSET = '[onset]\nlabels = "labels.csv"\n'
 
 @pytest.fixture
 def read(gate_folder: Path, tmp_path: Path):
-    """read(*tables): the benchmark file of these tables beside the logs of the gate."""
+    """read(*tables): the benchmark file with these tables for the logs of the gate."""
     for name in ("free", "stiff", "soft", "holdout", "machine.toml"):
         (tmp_path / name).symlink_to(gate_folder / name)
 
@@ -36,7 +36,7 @@ def read(gate_folder: Path, tmp_path: Path):
 @pytest.mark.parametrize("row", ["stiff/1.csv,5.0,5.2\n", "free/01.csv,,\n"])
 def test_a_label_that_fits_no_scored_recording_is_refused_with_its_line(read, row):
     name = row.split(",")[0]
-    with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is none of the recordings .* scored"):
+    with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is not a scored recording"):
         read(LEARN, STIFF, ONSET, labels=f"02.csv,5.0,5.2\n{row}")
 
 
@@ -53,16 +53,16 @@ def test_a_label_outside_the_recording_is_left_out_with_its_line(read):
     assert "onset:" in done.out and "label file labels.csv" in done.out
 
 
-def test_a_recording_labelled_without_a_contact_is_told_where_to_write_one(read):
+def test_a_recording_labelled_without_a_contact_gets_a_hint_where_to_add_one(read):
     read(LEARN, STIFF, ONSET, labels="stiff/01.csv,,\nstiff/02.csv,5.0,5.2\n")
     (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
     done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
     (line,) = [line for line in done.err.splitlines() if "no contact found" in line]
-    assert "labels.csv line 2 names none" in line and "start_s" in line and "above_n" not in line
+    assert "labels.csv line 2 does not list one" in line and "start_s" in line and "above_n" not in line
 
 
 @pytest.mark.parametrize("table", ["points", "campaigns"])
-def test_another_spelling_of_a_path_is_the_same_log(read, table):
+def test_different_spellings_of_a_path_are_the_same_log(read, table):
     folder = read.folder.name
     setup = read(PROFILE, LEARN, STIFF, f'[{table}.a]\nlogs = ["../{folder}/stiff/*.csv"]\n')
     assert set(getattr(setup, table)) == set(setup.impacts["stiff"].logs)
@@ -71,22 +71,25 @@ def test_another_spelling_of_a_path_is_the_same_log(read, table):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[points.a]\nlogs = ["soft/*.csv"]\n', r"points\.a: names .*soft/01\.csv, which no group of \[impacts\]"),
+        (
+            '[points.a]\nlogs = ["soft/*.csv"]\n',
+            r"points\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]",
+        ),
         (
             '[campaigns.a]\nlogs = ["soft/*.csv"]\n',
-            r"campaigns\.a: names .*soft/01\.csv, which no group of \[impacts\]",
+            r"campaigns\.a: names .*soft/01\.csv, which is not in a group of \[impacts\]",
         ),
         ('[points.""]\nlogs = ["stiff/*.csv"]\n', r"points\.: has no name"),
         ('[campaigns." "]\nlogs = ["stiff/*.csv"]\n', r"campaigns\. : has no name"),
-        ('[impacts.""]\nlogs = ["soft/*.csv"]\n', r"impacts\.: is no name of a group"),
-        ('[impacts." "]\nlogs = ["soft/*.csv"]\n', r"impacts\. : is no name of a group"),
-        ('[impacts."*"]\nlogs = ["soft/*.csv"]\n', r"impacts\.\*: is no name of a group"),
+        ('[impacts.""]\nlogs = ["soft/*.csv"]\n', r"impacts\.: is not a valid group name"),
+        ('[impacts." "]\nlogs = ["soft/*.csv"]\n', r"impacts\. : is not a valid group name"),
+        ('[impacts."*"]\nlogs = ["soft/*.csv"]\n', r"impacts\.\*: is not a valid group name"),
         ('[impacts.again]\nlogs = ["soft/*.csv", "stiff/01.csv"]\n', r"stiff/01\.csv is scored in stiff and in again"),
         ('[impacts.again]\nlogs = ["soft/*.csv", "free/../soft/01.csv"]\n', r"soft/01\.csv is scored twice in again"),
         ('[holdout]\nlogs = ["stiff/*.csv"]\n', r"stiff/01\.csv is scored in stiff and in holdout"),
     ],
 )
-def test_a_log_or_name_that_would_do_nothing_or_count_twice_is_refused(read, text, said):
+def test_an_unscored_log_an_empty_name_and_a_repeated_log_are_refused(read, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read(PROFILE, LEARN, STIFF, text)
 
@@ -94,7 +97,9 @@ def test_a_log_or_name_that_would_do_nothing_or_count_twice_is_refused(read, tex
 def test_a_campaign_may_name_logs_of_the_hold_out_and_a_point_may_not(read):
     setup = read(PROFILE, LEARN, STIFF, HOLDOUT, '[campaigns.a]\nlogs = ["holdout/*.csv"]\n')
     assert len(setup.campaigns) == 2
-    with pytest.raises(ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which no group of \[impacts\]"):
+    with pytest.raises(
+        ConfigurationError, match=r"points\.a: names .*holdout/01\.csv, which is not in a group of \[impacts\]"
+    ):
         read(PROFILE, LEARN, STIFF, HOLDOUT, '[points.a]\nlogs = ["holdout/*.csv"]\n')
 
 

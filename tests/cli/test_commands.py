@@ -1,4 +1,4 @@
-"""The commands as a user meets them: what they print, write and return."""
+"""The commands from a user's view: what they print, write and return."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.command import cdtool, one_line
 
 
 @pytest.mark.parametrize("command", STATUSES_OF)
-def test_every_help_holds_an_example_and_ends_with_0(command):
+def test_every_help_contains_an_example_and_exits_with_0(command):
     done = cdtool(*command.split(), "--help")
     assert done.status == 0
     assert "Example: cdtool" in one_line(done.out)
@@ -29,7 +29,7 @@ def test_the_version_is_shown():
     assert cdtool("--version").out.strip() == f"cdtool {__version__}"
 
 
-def test_an_unknown_command_or_option_ends_with_2():
+def test_an_unknown_command_or_option_exits_with_2():
     for arguments in (("detects",), ("info", "--machines", "x"), ("simulate",), ("benchmark",)):
         assert cdtool(*arguments).status == 2
 
@@ -59,14 +59,14 @@ def test_info_finds_an_accelerometer_that_is_mounted_the_other_way_round(gate_fo
     assert "wrong scale" in done.out and "may hold g" in done.out
 
 
-def test_info_of_several_logs_goes_on_after_a_bad_one(gate_folder, tmp_path):
+def test_info_continues_after_a_bad_log(gate_folder, tmp_path):
     (tmp_path / "empty.csv").write_text("")
     done = cdtool("info", tmp_path / "empty.csv", gate_folder / "stiff" / "01.csv")
     assert done.status == 3 and "empty.csv" in done.err and "i_motor" in done.out
     assert cdtool("info", tmp_path / "empty.csv").status == 2
 
 
-def test_learning_writes_a_signature_file_and_tells_its_class(feekf_signature, gate_folder, tmp_path):
+def test_learning_writes_a_signature_file_and_shows_its_class(feekf_signature, gate_folder, tmp_path):
     values = json.loads(feekf_signature.read_text())
     assert values["detector"]["name"] == "friction_ekf" and values["unit"] == "N s/m"
     assert len(values["runs"]) == 11 and all(len(run["sha256"]) == 64 for run in values["runs"])
@@ -78,7 +78,7 @@ def test_learning_writes_a_signature_file_and_tells_its_class(feekf_signature, g
     ]
 
 
-def test_too_few_runs_end_with_2_and_say_how_many_are_missing(gate_folder, tmp_path):
+def test_too_few_runs_exit_with_2_and_the_number_missing(gate_folder, tmp_path):
     logs = sorted((gate_folder / "free").glob("*.csv"))[:7]
     arguments = ("learn-signature", *logs, "-m", gate_folder / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")
     done = cdtool(*arguments)
@@ -119,7 +119,7 @@ def test_a_stray_run_of_another_speed_is_left_out_and_the_others_are_learned(gat
     assert len(json.loads((tmp_path / "s.json").read_text())["runs"]) == 11
 
 
-def test_detecting_an_impact_tells_time_and_latency_and_draws(gate_folder, feekf_signature, tmp_path):
+def test_detecting_an_impact_shows_time_and_latency_and_draws(gate_folder, feekf_signature, tmp_path):
     plot = tmp_path / "out.png"
     arguments = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
     done = cdtool("detect", gate_folder / "stiff" / "01.csv", *arguments, "--plot", plot)
@@ -152,19 +152,19 @@ def test_a_signature_of_other_gains_is_refused(gate_folder, feekf_signature, tmp
     assert done.status == 2 and "minimum_speed" in done.err
 
 
-def test_a_log_of_another_speed_is_judged_as_long_as_it_may_be_a_contact(gate_folder, feekf_signature, tmp_path):
+def test_a_log_at_another_speed_is_assessable_while_it_may_be_a_contact(gate_folder, feekf_signature, tmp_path):
     write_at_half_speed(gate_folder, tmp_path / "slow.csv")
     done = cdtool("detect", tmp_path / "slow.csv", "-m", gate_folder / "machine.toml", "-s", feekf_signature)
-    # The class that it fitted while it began to move judges it for 1 s more; from then on nothing does, and it says so.
+    # The class that matched at the start of the motion applies for 1 s more; then none applies, which is reported.
     said = " ".join(done.out.split())
     assert done.status == 0 and re.search(r"1\.9\d to 8\.20 s \(0\.18\d? to 1\.45 m\) other speed", said)
 
 
-def test_a_log_that_was_learned_from_is_told_and_shows_nothing(gate_folder, feekf_signature):
+def test_a_log_that_was_learned_from_is_reported_as_no_evidence(gate_folder, feekf_signature):
     machine = ("-m", gate_folder / "machine.toml", "-s", feekf_signature)
     learned = cdtool("detect", gate_folder / "free" / "01.csv", *machine)
-    assert learned.status == 0 and "the signature was learned from it" in learned.err
-    assert "learned from it" not in cdtool("detect", gate_folder / "holdout" / "01.csv", *machine).err
+    assert learned.status == 0 and "the signature was learned from this log" in learned.err
+    assert "learned from this log" not in cdtool("detect", gate_folder / "holdout" / "01.csv", *machine).err
 
 
 def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path):
@@ -187,7 +187,7 @@ def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path)
     assert {"report.html", "report.md", "junit.xml", "contacts.csv", "results.json", "latency.png", "amoc.png"} <= names
 
 
-def test_reports_are_made_again_from_the_results_alone(gate_folder, tmp_path):
+def test_reports_are_written_again_from_the_results_only(gate_folder, tmp_path):
     folder = tmp_path / "first"
     assert cdtool("benchmark", gate_folder / "benchmark.toml", "-o", folder).status == 0
     done = cdtool("report", folder / "results.json", "-o", tmp_path / "again.html", "-o", tmp_path / "again.json")
@@ -220,7 +220,7 @@ def test_a_report_without_traces_says_so_and_a_damaged_file_is_one_line(gate_fol
     assert broken.status == 2 and broken.err.count("\n") == 1 and "not a results file" in broken.err
 
 
-def test_a_broken_limit_ends_with_1_before_what_was_left_out(gate_folder, tmp_path):
+def test_a_violated_limit_exits_with_1_before_left_out_logs(gate_folder, tmp_path):
     (gate_folder / "stiff" / "broken.csv").write_text("nothing\n")
     try:
         text = (gate_folder / "benchmark.toml").read_text()
@@ -254,7 +254,7 @@ def benchmark_with(gate_folder: Path, tmp_path: Path, old: str, new: str) -> Pat
     return path
 
 
-def test_a_run_that_is_learned_and_scored_is_refused(gate_folder, tmp_path):
+def test_a_run_that_is_both_learned_from_and_scored_is_refused(gate_folder, tmp_path):
     path = benchmark_with(gate_folder, tmp_path, '["GATE/holdout/*.csv"]', '["GATE/holdout/*.csv", "GATE/free/01.csv"]')
     done = cdtool("benchmark", path)
     assert done.status == 2 and "learned from and scored" in done.err and "01.csv" in done.err
@@ -273,7 +273,7 @@ def test_an_impact_log_without_contact_is_left_out_by_name(gate_folder, tmp_path
     [
         ('"pi", "feekf"', '"pii", "feekf"', ("pii", "pi")),
         ("[learn]", "[lern]", ("learn", "missing")),
-        ('"GATE/stiff/*.csv"', '"GATE/stif/*.csv"', ("impacts.stiff.logs", "nothing matches")),
+        ('"GATE/stiff/*.csv"', '"GATE/stif/*.csv"', ("impacts.stiff.logs", "no file matches")),
         ("above_n = 20.0", "above_n = -1", ("onset.above_n", "above 0")),
         ("back_to_n = 8.0", "back_to_n = 30.0", ("onset.back_to_n", "more than above_n")),
         ("above_n", "above", ("onset.above", "above_n")),
@@ -293,7 +293,7 @@ def test_an_unknown_output_is_refused_before_any_work(gate_folder, tmp_path):
     assert done.status == 2 and ".json" in done.err
 
 
-def test_listing_tells_detectors_with_gains_units_and_defaults():
+def test_the_list_shows_detectors_with_gains_units_and_defaults():
     entries = {entry["name"]: entry for entry in json.loads(cdtool("list", "detectors", "--json").out)}
     assert list(entries) == DETECTORS.names()
     assert entries["momentum"]["short_name"] == "gm"
@@ -330,14 +330,14 @@ def test_mcap_and_csv_of_the_same_run_give_the_same_alarm(gate_folder, feekf_sig
     assert alarms[0] == pytest.approx(alarms[1], abs=1.5e-3)
 
 
-def test_output_to_a_closed_pipe_ends_quietly():
+def test_output_to_a_closed_pipe_is_not_an_error():
     code = "import sys; from cdtool.cli.app import main; sys.argv = ['cdtool', 'list', 'detectors']; main()"
     command = f'{sys.executable} -c "{code}" | true'
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert "Traceback" not in done.stderr
 
 
-def test_the_help_keeps_what_stands_in_brackets():
+def test_the_help_shows_text_in_brackets():
     assert "above this [N]" in one_line(cdtool("detect", "--help").out)
 
 

@@ -1,4 +1,4 @@
-"""`cdtool compare` shows few contacts as `cdtool benchmark` does, and says so where it is given one file twice."""
+"""`cdtool compare` shows few contacts as `cdtool benchmark` does, and reports a file compared with itself."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.command import cdtool
 
 @pytest.fixture(scope="module")
 def results(gate_folder, tmp_path_factory):
-    """Results of two contacts a group, and the same with every latency of the first half as long again."""
+    """Results of two contacts per group, and the same with every latency of the first half 50 % longer."""
     path = tmp_path_factory.mktemp("results") / "old.json"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "gm,pt", "-o", path)
     assert done.status == 0, done.err
@@ -23,7 +23,7 @@ def results(gate_folder, tmp_path_factory):
     return path, new, done.out
 
 
-def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(results, tmp_path):
+def test_fewer_than_ten_contacts_show_a_median_with_its_range(results, tmp_path):
     old, new, shown = results
     target = tmp_path / "compare.md"
     done = cdtool("compare", old, new, "-o", target, "--json")
@@ -34,7 +34,7 @@ def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(r
     for row in rows:
         for item in (item for item in row["questions"] if item["figure"] == "latency_ms"):
             values = latencies[row["detector"], row["group"]]
-            assert item["old"] == pytest.approx(sum(values) / 2)  # of two the median is the mean
+            assert item["old"] == pytest.approx(sum(values) / 2)  # the median of two values is their mean
             assert item["ranges"][0] == [min(values), max(values)]
     screen = cdtool("compare", old, new).out
     reason = "Fewer than 10 contacts detected: median and range, no mean, std or P95."
@@ -43,7 +43,7 @@ def test_fewer_than_ten_contacts_are_a_median_with_its_range_as_in_a_benchmark(r
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_a_file_compared_with_itself_or_a_copy_is_called_so(results, tmp_path, copied):
+def test_a_file_compared_with_itself_or_a_copy_is_reported_as_identical(results, tmp_path, copied):
     old = results[0]
     other = old
     if copied:
@@ -51,5 +51,5 @@ def test_a_file_compared_with_itself_or_a_copy_is_called_so(results, tmp_path, c
         other.write_bytes(old.read_bytes())
     done = cdtool("compare", old, other)
     assert done.status == 0
-    assert done.out.splitlines()[-1].endswith(": both files hold the same results")
+    assert done.out.splitlines()[-1].endswith(": both files contain the same results")
     assert "too few" not in done.out and "would have been" not in done.out

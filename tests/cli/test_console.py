@@ -1,4 +1,4 @@
-"""What every command shares in a terminal: lines that fit it, and an end by Ctrl-C that is said."""
+"""Common terminal output of the commands: lines that fit, and a message for Ctrl-C."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from tests.command import cdtool
 
 
 @pytest.mark.parametrize("place", ["cdtool.workflows.detection.detect_log", "cdtool.cli.app.app"])
-def test_ctrl_c_ends_with_130_and_one_line(gate_folder, place):
+def test_ctrl_c_exits_with_130_and_one_line(gate_folder, place):
     log = gate_folder / "stiff" / "01.csv"
     with mock.patch(place, side_effect=KeyboardInterrupt):
         done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert (done.status, done.out, done.err) == (130, "", "interrupted\n")
 
 
-def test_sentences_keep_to_100_columns_in_a_pipe_and_places_have_a_unit(gate_folder, feekf_signature):
+def test_sentences_fit_100_columns_in_a_pipe_and_positions_have_a_unit(gate_folder, feekf_signature):
     logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv"]
     done = cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
-    sentences = done.out[done.out.index("not judged") :]
+    sentences = done.out[done.out.index("not assessable in") :]
     assert all(len(line) <= 100 or " " not in line.strip() for line in sentences.splitlines())
     told = " ".join(sentences.split())
     assert " m) no limit known here" in told and "e-" not in told
 
 
-def test_names_are_not_cut_where_lines_end(capsys):
+def test_names_are_not_split_at_line_ends(capsys):
     name = "stiff-03-of-the-second-campaign/" + 90 * "x"
-    console.say(f"not judged in {name}: 12 %")
+    console.say(f"not assessable in {name}: 12 %")
     assert name in capsys.readouterr().out
 
 
-def test_the_figures_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_folder: Path, tmp_path: Path):
+def test_the_results_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_folder: Path, tmp_path: Path):
     (tmp_path / "benchmark.toml").write_text(
         f'machine = "{gate_folder / "machine.toml"}"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
         f'[learn]\nlogs = ["{gate_folder}/free/0[123].csv"]\n[impacts.stiff]\nlogs = ["{gate_folder}/stiff/01.csv"]\n',
@@ -57,13 +57,13 @@ def test_the_figures_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_f
     ],
     ids=["gzip", "zstd", "ZIP or Excel"],
 )
-def test_a_packed_log_or_a_workbook_is_told_how_to_become_one(gate_folder, tmp_path, head, step):
+def test_a_packed_log_or_a_workbook_gets_a_hint_how_to_convert_it(gate_folder, tmp_path, head, step):
     (tmp_path / "log.csv").write_bytes(head + bytes(range(256)) * 4)
     done = cdtool("detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert done.status == 2 and step in done.err
 
 
-def test_a_long_list_of_known_names_is_not_cut_in_a_name(capsys):
+def test_a_long_list_of_known_names_is_cut_between_names(capsys):
     known = read_force_limits()
     console.print_error(UsageError("a" * 200, nearest("yard", known)))
     line = capsys.readouterr().err.strip()

@@ -1,4 +1,4 @@
-"""An impact log among the impact-free ones is left out by name; a label file or a level by hand decides otherwise."""
+"""An impact log among the impact-free ones is left out by name, unless a label file or a manual level accepts it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHOWN = "the load cell shows a contact of "
 
 @pytest.fixture(scope="module")
 def mixed(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of 3 impact-free logs in which an impact has been put away wrongly, a hold-out with another."""
+    """A folder of 3 impact-free logs with an impact added by mistake, and a hold-out with another."""
     folder = tmp_path_factory.mktemp("mixed")
     copies = {"free/01.csv": "free/01.csv", "free/02.csv": "free/02.csv", "free/03.csv": "free/03.csv"}
     copies |= {"stiff/01.csv": "free/04.csv", "holdout/01.csv": "holdout/01.csv", "stiff/02.csv": "holdout/02.csv"}
@@ -48,7 +48,7 @@ def benchmark_of(mixed: Path, more: str = "") -> Path:
     return file
 
 
-def test_it_is_not_learned_from_and_named_with_force_and_time(mixed, tmp_path):
+def test_a_log_with_a_contact_is_left_out_with_force_and_time(mixed, tmp_path):
     done = learn(mixed, tmp_path / "s.json")
     assert done.status == 3
     (line,) = [line for line in done.err.splitlines() if line.startswith("left out:")]
@@ -64,11 +64,11 @@ def test_it_is_not_learned_from_and_named_with_force_and_time(mixed, tmp_path):
     assert updated.status == 2 and SHOWN in updated.err
 
 
-def test_a_level_by_hand_lets_it_pass(mixed, tmp_path):
+def test_a_level_set_by_hand_accepts_it(mixed, tmp_path):
     assert "forward at 0.201 m/s     4" in learn(mixed, tmp_path / "s.json", "--onset-above", 1e6).out
 
 
-def test_a_benchmark_leaves_it_out_of_what_is_learned_and_of_the_hold_out(mixed):
+def test_a_benchmark_leaves_it_out_of_learning_and_hold_out(mixed):
     results = api.benchmark(benchmark_of(mixed)).results
     assert [item.recording for item in results.skipped] == ["free/04.csv", "holdout/02.csv"]
     assert all(item.reason.startswith(SHOWN) for item in results.skipped)
@@ -77,7 +77,7 @@ def test_a_benchmark_leaves_it_out_of_what_is_learned_and_of_the_hold_out(mixed)
     assert (holdout.recordings, holdout.operations) == (1, 1)
 
 
-def test_a_label_file_that_names_a_hold_out_is_believed(mixed):
+def test_a_label_file_that_names_a_hold_out_takes_precedence(mixed):
     (mixed / "labels.csv").write_text("recording,start_s,end_s\nholdout/02.csv,,\n", encoding="utf-8")
     results = api.benchmark(benchmark_of(mixed, '[onset]\nlabels = "labels.csv"\n')).results
     assert [item.recording for item in results.skipped] == ["free/04.csv"]
@@ -98,14 +98,14 @@ def test_a_load_cell_that_reads_in_steps_coarser_than_its_noise_shows_no_contact
 
 @given(seed=st.integers(0, 999), step=st.floats(0.1, 5.0))
 @settings(max_examples=40, deadline=None)
-def test_and_a_contact_of_ten_steps_is_seen_by_it(seed, step):
+def test_a_contact_of_ten_steps_is_found_by_a_coarse_load_cell(seed, step):
     reading = np.random.default_rng(seed).normal(0.0, 0.3, 4000)
     reading[2000:2200] += 10.0
     (found,) = contacts_shown(cell(step * np.round(reading)), OnsetRule())
     assert found.start == pytest.approx(2.0, abs=0.003)
 
 
-def test_a_log_without_ground_truth_or_with_a_dead_cell_shows_none():
+def test_a_log_without_ground_truth_or_with_a_dead_cell_shows_no_contact():
     assert contacts_shown(cell(np.zeros(4000)), OnsetRule()) == ()
     assert contacts_shown(cell(np.full(4000, np.nan)), OnsetRule()) == ()
     quiet = cell(np.zeros(4000))

@@ -1,4 +1,4 @@
-"""`cdtool convert` as a user meets it."""
+"""`cdtool convert` from a user's view."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.command import cdtool
 LOGS = Path(__file__).parents[2] / "sample_logs"
 
 
-def test_a_converted_log_is_read_with_the_machine_file_beside_it(tmp_path):
+def test_a_converted_log_is_read_with_its_new_machine_file(tmp_path):
     machine = LOGS / "gate/machine.toml"
     out = tmp_path / "run.mcap"
     done = cdtool("convert", LOGS / "gate/stiff/03.csv", out, "-m", machine)
@@ -25,7 +25,7 @@ def test_a_converted_log_is_read_with_the_machine_file_beside_it(tmp_path):
     assert alarms[0] and [item["time_s"] for item in alarms[0]] == pytest.approx([item["time_s"] for item in alarms[1]])
 
 
-def test_a_truncated_log_is_converted_as_far_as_it_goes_and_ends_with_3(tmp_path):
+def test_a_truncated_log_is_converted_up_to_the_cut_with_status_3(tmp_path):
     data = (LOGS / "gate/stiff/01.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) * 2 // 3])
     done = cdtool("convert", tmp_path / "cut.mcap", tmp_path / "out.mcap", "-m", LOGS / "gate/machine.toml")

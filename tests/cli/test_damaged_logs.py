@@ -1,4 +1,4 @@
-"""A log of which a part is lost was not left out: it is used as far as it goes, and said to be damaged."""
+"""A partly lost log is not left out: its intact part is used, and it is reported as damaged."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.command import cdtool
 
 @pytest.fixture
 def cut(gate_folder: Path, tmp_path: Path):
-    """cut(seconds): the first seconds of an impact log, its last line cut off."""
+    """cut(seconds): the first seconds of an impact log, with an incomplete last line."""
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
 
     def make(seconds: float, name: str = "cut.csv") -> Path:
@@ -24,25 +24,25 @@ def cut(gate_folder: Path, tmp_path: Path):
     return make
 
 
-def test_detect_says_that_a_cut_log_is_damaged_and_used(cut, gate_folder):
+def test_detect_reports_a_truncated_log_as_damaged_and_used(cut, gate_folder):
     done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert done.status == 3 and " alarm " in done.out
     assert "loss: " in done.err and "cut.csv: the last line" in done.err
     assert "left out" not in done.err and done.err.endswith("done, but 1 log is damaged\n")
 
 
-def test_what_was_left_out_and_what_is_damaged_are_counted_apart(cut, gate_folder, tmp_path):
+def test_left_out_and_damaged_logs_are_counted_separately(cut, gate_folder, tmp_path):
     (tmp_path / "empty.csv").touch()
     machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     done = cdtool("detect", tmp_path / "empty.csv", cut(1e9), cut(1e9, "too.csv"), *machine)
     assert done.status == 3 and done.err.endswith("done, but 1 item was left out and 2 logs are damaged\n")
 
 
-def test_an_alarm_after_the_load_cell_s_last_sample_is_told_why_it_has_no_latency(gate_folder, tmp_path):
+def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(gate_folder, tmp_path):
     machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     whole = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine)
     (row,) = [line for line in whole.out.splitlines() if " alarm " in line]
-    ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log counts ms
+    ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log is in ms
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
     place = lines[0].split(",").index("load_cell")
     cells = [line.split(",") for line in lines[1:]]
@@ -58,7 +58,7 @@ def test_an_alarm_after_the_load_cell_s_last_sample_is_told_why_it_has_no_latenc
     assert f"the load cell ends at {last:.3f} s, the log at " in line and "holdout" not in line
 
 
-def test_a_false_alarm_is_told_to_belong_to_no_contact(gate_folder):
+def test_a_false_alarm_is_shown_with_no_contact(gate_folder):
     done = cdtool(
         "detect", gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 20
     )
@@ -76,7 +76,7 @@ def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cu
 
 
 def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:
-    """A benchmark of that log beside a whole one, on 3 impact-free logs."""
+    """A benchmark of that log and an intact one, learned from 3 impact-free logs."""
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/02.csv", "machine.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(gate_folder / name, tmp_path / name)

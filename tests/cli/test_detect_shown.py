@@ -1,4 +1,4 @@
-"""What `cdtool detect` says of an alarm that detected no contact: one more of the same contact, or one without any."""
+"""`cdtool detect` on an alarm without a detection: a repeated alarm of the same contact, or one without a contact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ONSET = 5.0
 
 
 def detected(bursts: Sequence[tuple[int, float, float]], pressed: float = 0.4) -> Detected:
-    """Two joints whose torque leaves its limit in `bursts` (joint, from s, to s); the load cell is pressed from 5 s."""
+    """Two joints whose torque exceeds its limit in `bursts` (joint, from s, to s), with a contact from 5 s."""
     time = np.arange(0.0, 10.0, 2e-3)
     torque = np.zeros((len(time), 2))
     for joint, start, end in bursts:
@@ -48,7 +48,7 @@ def whys(found: Detected, capsys: pytest.CaptureFixture[str]) -> list[str]:
     return [line.strip() for line in capsys.readouterr().out.splitlines() if " alarm " in line]
 
 
-def test_the_second_joints_alarm_in_a_contact_is_of_that_contact(capsys):
+def test_an_alarm_of_a_second_joint_belongs_to_the_same_contact(capsys):
     found = detected([(0, 5.05, 5.3), (1, 5.15, 5.35)])
     first, second = whys(found, capsys)
     signal, limit, latency = first.split()[-3:]
@@ -59,17 +59,17 @@ def test_the_second_joints_alarm_in_a_contact_is_of_that_contact(capsys):
     assert [item["why_no_contact"] for item in row["alarms"]] == [None, None]
 
 
-def test_the_same_joint_again_while_the_contact_presses_is_of_that_contact(capsys):
+def test_a_repeated_alarm_during_a_contact_belongs_to_it(capsys):
     found = detected([(0, 5.05, 5.1), (0, 5.8, 5.9)])
     assert whys(found, capsys)[1].endswith("same contact, shoulder again")
 
 
-def test_an_alarm_after_the_window_while_the_contact_still_presses_is_late_for_it(capsys):
+def test_an_alarm_after_the_window_during_the_contact_is_late(capsys):
     found = detected([(0, 6.6, 6.9)], pressed=3.0)
     assert "contact at 5.000 s, more than 1 s after its onset" in whys(found, capsys)[0]
 
 
-def test_an_alarm_far_from_any_contact_stays_one_without_contact(capsys):
+def test_an_alarm_far_from_any_contact_belongs_to_none(capsys):
     found = detected([(0, 5.05, 5.3), (1, 8.0, 8.2)])
     assert whys(found, capsys)[1].endswith("no contact")
     (row,) = as_rows([(None, found)], {})

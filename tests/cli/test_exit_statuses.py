@@ -1,4 +1,4 @@
-"""Every command is driven into each status that it can have; the list of them is the code's own."""
+"""Every command is tested for each of its exit statuses, from the list in the code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LATENCIES = [40.0 + 0.1 * i for i in range(30)]
 
 
 class Folder:
-    """Files that drive a command into a status."""
+    """Files that cause each status of a command."""
 
     def __init__(self, path: Path, gate: Path, signature: Path) -> None:
         self.path, self.gate, self.signature = path, gate, signature
@@ -62,7 +62,7 @@ class Folder:
         return path
 
     def profiles(self, stiff_until_s: float) -> str:
-        """A profile that every contact keeps; that of the group stiff ends only at that time."""
+        """A profile met by every contact; that of the group stiff ends at the given time."""
         step = '{{ from_s = {0}, at_most_n = 1e6, name = "{1}" }}'
         easy, late = step.format(0.0, "first"), step.format(stiff_until_s, "second")
         text = f'[easy]\ntitle = "t"\nsource = "s"\nsteps = [{easy}]\n'
@@ -208,20 +208,20 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
 }
 
 
-def test_every_status_of_every_command_is_driven_and_no_other():
+def test_every_status_of_every_command_is_tested_and_no_other():
     driven = {name: {status for command, status in DRIVEN if command == name} for name, _ in DRIVEN}
     assert driven == {name: set(map(int, of)) for name, of in STATUSES_OF.items()}
 
 
 @pytest.mark.parametrize(("command", "status"), DRIVEN, ids=[f"{name}-{status}" for name, status in DRIVEN])
-def test_a_command_ends_with_the_status_it_is_driven_into(command, status, files):
+def test_a_command_exits_with_the_expected_status(command, status, files):
     done = DRIVEN[command, status](files)
     assert done.status == status, done.err
     assert "Traceback" not in done.err
     assert bool(done.err) or status in (0, 1, 4) or command == "recover"
 
 
-def test_where_several_apply_a_wrong_limit_comes_before_a_violation_and_that_before_a_loss(files):
+def test_a_wrong_limit_takes_priority_over_a_violation_and_that_over_a_loss(files):
     holdout = '[holdout]\nlogs = ["holdout/01.csv", "empty.csv"]\n'
     assert _score(files, holdout).status == 3
     assert _score(files, holdout + VIOLATED).status == 1
@@ -233,7 +233,7 @@ def test_where_several_apply_a_wrong_limit_comes_before_a_violation_and_that_bef
     assert done.status == 3 and "force profile not assessable for 1 of 2 contacts" in done.out
 
 
-def test_a_log_that_could_not_be_assessed_at_all_ends_with_3_and_the_reason(files):
+def test_a_log_that_is_not_assessable_exits_with_3_and_the_reason(files):
     lines = files.log.read_text(encoding="utf-8").splitlines()
     place = lines[0].split(",").index("motor_torque") if "motor_torque" in lines[0] else 1
     rows = [line.split(",") for line in lines[1:]]

@@ -1,4 +1,4 @@
-"""`cdtool explain` as a user meets it."""
+"""`cdtool explain` from a user's view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def explain(gate_folder: Path) -> Callable[..., Outcome]:
 
 
 def margins(text: str) -> list[list[float]]:
-    """The rows of numbers of the tables that are printed."""
+    """The number rows of the printed tables."""
     rows = [line.split() for line in text.splitlines()]
     return [[float(cell) for cell in row] for row in rows if row and all(is_number(cell) for cell in row)]
 
@@ -39,39 +39,39 @@ def is_number(text: str) -> bool:
         return False
 
 
-def test_the_help_holds_an_example():
+def test_the_help_contains_an_example():
     done = cdtool("explain", "--help")
     assert done.status == 0 and "Example: cdtool explain" in one_line(done.out)
 
 
-def test_a_detected_contact_is_told_with_joint_limit_margins_and_what_moved_first(explain, feekf_signature, tmp_path):
+def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_mover(explain, feekf_signature, tmp_path):
     plot = tmp_path / "why.svg"
     done = explain("stiff/01.csv", "-s", feekf_signature, "--plot", plot)
     assert done.status == 0 and done.err == ""
     told = " ".join(done.out.split())
     assert "ms after the contact (onset at" in told and "load cell)" in told
-    assert "gate: above its upper limit" in told and "needs 9 consecutive samples outside" in told
+    assert "gate: above its upper limit" in told and "debounce: 9 consecutive samples outside" in told
     assert "Moved first: acceleration down" in told
-    assert "Likely cause: a contact: speed of gate" in told and "N where" in told
-    assert "Compared with 11 impact-free runs at the same place of the motion." in told
+    assert "Likely cause: a contact: speed of gate" in told and "N (normal:" in told
+    assert "Compared with 11 impact-free runs at the same position in the motion." in told
     assert "References:" in told and "reference_speed within the usual range" in told
     assert "speed down" in told and "speed" not in told.partition("Within their usual range")[2].partition(".")[0]
     rows = margins(done.out)
     assert [row[1] for row in rows if row[0] != 0.0] == pytest.approx([-100, -50, -20, -10, -5, 0])
     for _, _, signal, limit, margin, share in rows:
-        assert margin == pytest.approx(limit - signal, abs=1.1)  # four digits of each are printed
+        assert margin == pytest.approx(limit - signal, abs=1.1)  # both are printed with four digits
         assert (margin < 0.0) == (share > 100.0)
     assert max(map(len, done.out.splitlines())) <= 100
     assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
 
 
-def test_a_missed_contact_is_told_with_how_near_it_came(explain):
+def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
     done = explain("soft/02.csv", "-d", "pi", "--limit", "30")
     told = " ".join(done.out.split())
     assert done.status == 0
-    assert "missed: no alarm in the 1000 ms that were watched" in told
-    assert "from its limit of" in told and "For 9 consecutive samples it stood at" in told
-    assert "The first that pure_inertia reads: acceleration" in told
+    assert "missed: no alarm within 1000 ms" in told
+    assert "from its limit of" in told and "For 9 consecutive samples it was at" in told
+    assert "First input of pure_inertia: acceleration" in told
     assert max(map(len, done.out.splitlines())) <= 100
 
 
@@ -84,13 +84,13 @@ def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
     assert "from onset" not in told and "to alarm" in told
 
 
-def test_a_quiet_log_says_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
+def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
     done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
-    assert done.status == 0 and "no alarm, and no contact without one" in " ".join(done.out.split())
+    assert done.status == 0 and "no alarm and no missed contact" in " ".join(done.out.split())
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
+def test_the_json_is_strict_and_contains_every_number(explain):
     done = explain("soft/01.csv", "-d", "pi", "--limit", "30", "--json")
     values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
     (missed,) = values["missed"]
@@ -105,7 +105,7 @@ def test_the_json_has_every_figure_and_nothing_that_is_no_json(explain):
     assert missed["not_compared_because"] == "limits set by hand" and missed["compared_with_runs"] == 0
 
 
-def test_the_json_has_the_cause_and_what_every_channel_was_compared_with(explain, feekf_signature):
+def test_the_json_has_the_cause_and_the_comparison_of_every_channel(explain, feekf_signature):
     (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
     cause = alarm["likely_cause"]
     assert cause["kind"] == "contact" and cause["transient"] is None and cause["lost"] is None
@@ -117,14 +117,14 @@ def test_the_json_has_the_cause_and_what_every_channel_was_compared_with(explain
             assert abs(item["value"] - item["normal_mean"]) > 3.0 * item["normal_spread"]
 
 
-def test_a_signature_file_of_before_says_how_to_learn_what_is_normal(explain, feekf_signature, tmp_path):
+def test_an_older_signature_file_gets_a_hint_to_relearn_it(explain, feekf_signature, tmp_path):
     values = json.loads(feekf_signature.read_text())
     del values["normal_motion"]
     old = tmp_path / "old.json"
     old.write_text(json.dumps({**values, "schema_version": 3}))
     told = " ".join(explain("stiff/01.csv", "-s", old).out.split())
-    assert "Nothing to compare with: the signature file holds no normal motion" in told
-    assert "learn it again with cdtool learn-signature" in told
+    assert "No impact-free runs to compare with: the signature file has no normal motion" in told
+    assert "relearn it with cdtool learn-signature" in told
     assert "usual range" not in told
 
 
@@ -138,7 +138,7 @@ def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_
     assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(0.008)
 
 
-def test_the_debounce_that_is_given_is_the_one_that_is_told(explain):
+def test_the_given_debounce_is_the_one_shown(explain):
     for debounce in (1, 4):
         done = explain("stiff/01.csv", "-d", "gm", "--limit", "250", "--debounce", debounce, "--json")
         (alarm,) = json.loads(done.out)["alarms"]
@@ -159,13 +159,13 @@ def test_an_arm_is_explained_joint_by_joint():
     (alarm,) = json.loads(done.out)["alarms"]
     assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
     assert alarm["moved"][0]["channel"] == "acceleration"
-    assert "position" in alarm["detector_reads"]  # the model of coupled links needs the pose
+    assert "position" in alarm["detector_reads"]  # a model of coupled links requires the pose
 
 
 @pytest.mark.parametrize(
     ("log", "arguments", "words"),
     [
-        ("stiff/01.csv", ("--limit", "250"), ("a limit belongs to a detector",)),
+        ("stiff/01.csv", ("--limit", "250"), ("a limit requires a detector",)),
         ("stiff/01.csv", ("-d", "gm"), ("a signature or a limit",)),
         ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
         ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
@@ -173,10 +173,10 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "from 1 to")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
-        # The figure's folder is looked at before the log is.
-        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "make")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is watched")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is watched")),
+        # The figure's folder is checked before the log.
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "create")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),
         ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
     ],
 )
@@ -187,14 +187,14 @@ def test_bad_input_is_one_line_and_status_2(explain, log, arguments, words):
     assert all(word in done.err for word in words), done.err
 
 
-def test_a_log_of_which_a_part_is_lost_is_explained_and_ends_with_3(gate_folder, feekf_signature, tmp_path):
+def test_a_partly_lost_log_is_explained_with_status_3(gate_folder, feekf_signature, tmp_path):
     half = tmp_path / "half.csv"
     half.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes()[:-20])
     done = cdtool("explain", half, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
     assert done.status == 3 and "alarm at" in done.out and "last line" in done.err
 
 
-def test_names_from_files_cannot_command_the_terminal(explain, gate_folder, tmp_path):
+def test_names_from_files_cannot_control_the_terminal(explain, gate_folder, tmp_path):
     evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
     evil.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes())
     done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", "250")
@@ -235,7 +235,7 @@ def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatc
     assert module.columns_to_fill() == width
 
 
-def test_a_pipe_gets_100_columns_whatever_the_terminal_has(monkeypatch):
+def test_a_pipe_gets_100_columns_for_any_terminal(monkeypatch):
     from cdtool.cli import console as module
 
     monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
@@ -255,7 +255,7 @@ def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feek
     assert one != other and other == pytest.approx(one, rel=0.05)
 
 
-def test_a_benchmark_explains_its_events_against_the_runs_it_learned_from(gate_folder):
+def test_a_benchmark_compares_its_events_with_the_runs_learned_from(gate_folder):
     done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
     told = [line for trace in done.traces for panel in trace.panels for line in panel.why]
     assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]

@@ -1,4 +1,4 @@
-"""What is wrong with a log itself is reported alike by every command, once, as what it is."""
+"""Findings on a log are the same in every command, and reported once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.command import cdtool
 
 
 @pytest.mark.parametrize(("value", "what"), [("1e306", "outside the possible range"), ("inf", "infinite")])
-def test_a_masked_value_is_counted_once_as_what_it_is(gate_folder, tmp_path, value, what):
+def test_a_masked_value_is_counted_once(gate_folder, tmp_path, value, what):
     cells = {("i_motor", 700): value, ("i_motor", 701): "nan"}
     log = damaged(gate_folder / "stiff" / "01.csv", tmp_path / "damaged.csv", cells)
     done = cdtool("info", log, "-m", gate_folder / "machine.toml")
@@ -22,12 +22,12 @@ def test_a_masked_value_is_counted_once_as_what_it_is(gate_folder, tmp_path, val
 
 
 def _of(text: str, word: str) -> set[str]:
-    """What is said of one log in lines that begin with a word, without the log's name."""
+    """The lines about one log that begin with a word, without the log's name."""
     lines = (line for line in text.splitlines() if line.startswith(f"{word}: "))
     return {line.removeprefix(f"{word}: ").partition(".csv: ")[2] or line.removeprefix(f"{word}: ") for line in lines}
 
 
-def test_info_detect_explain_and_learning_report_the_same_about_a_log(gate_folder, tmp_path, feekf_signature):
+def test_info_detect_explain_and_learning_report_the_same_findings(gate_folder, tmp_path, feekf_signature):
     cells = {("i_motor", row): "nan" for row in range(500, 560)}
     cells |= {("t", row): "399" for row in range(400, 403)}
     cells |= {("i_motor", 700): "1e306"}
@@ -73,7 +73,7 @@ def test_info_names_a_contact_in_progress_that_detect_does_not_score(gate_folder
 
 
 @pytest.mark.parametrize("rows", [1, 100, 3000])
-def test_a_clock_that_leaps_is_no_question_of_units(gate_folder, tmp_path, rows):
+def test_a_leap_of_the_clock_is_not_reported_as_wrong_units(gate_folder, tmp_path, rows):
     def leaps(row: int, stamp: float) -> float:
         return stamp + (100_000.0 if row >= 7200 - rows else 0.0)
 
@@ -82,7 +82,7 @@ def test_a_clock_that_leaps_is_no_question_of_units(gate_folder, tmp_path, rows)
     assert "warning: time: 1 gap after" in done.out and "check the units" not in done.out
 
 
-def test_wrong_units_are_found_beside_a_leap_of_the_clock(gate_folder, tmp_path):
+def test_wrong_units_are_found_together_with_a_leap_of_the_clock(gate_folder, tmp_path):
     machine = tmp_path / "machine.toml"
     text = (gate_folder / "machine.toml").read_text(encoding="utf-8")
     machine.write_text(text.replace('"n_motor", unit = "rpm"', '"n_motor", unit = "rad/s"'), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Hostile input of every kind to the real command: one line, a documented exit status, no traceback, bounded memory."""
+"""Hostile input of every kind: one line, a documented exit status, no traceback, bounded memory."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GATE = ROOT / "sample_logs" / "gate"
 MACHINE = (GATE / "machine.toml").read_text(encoding="utf-8")
 SECONDS, MIB = 5.0, 300
 LONGEST_LINE = 300
-# Prints, last on stderr, the seconds and the peak memory [KiB] of a command beyond what importing all of it takes.
+# Prints last, on stderr, the seconds and peak memory [KiB] of a command, minus those for importing all of it.
 CHILD = """
 import resource, sys, time
 from cdtool.cli.app import main
@@ -57,7 +57,7 @@ class Ended:
 
 
 def measured(*arguments: object, **environment: str) -> Ended:
-    """The command in a process of its own."""
+    """Run the command in a separate process."""
     done = subprocess.run(
         [sys.executable, "-c", CHILD, *map(os.fsencode, map(str, arguments))],
         capture_output=True,
@@ -73,7 +73,7 @@ def measured(*arguments: object, **environment: str) -> Ended:
 
 
 def refused(*arguments: object, words: Sequence[str] = ()) -> Ended:
-    """The command, which must end in one error line, with status 2, and without the memory."""
+    """Run the command, which must exit with one error line, with status 2, and within the memory limit."""
     done = measured(*arguments)
     assert "Traceback" not in done.err, done.err
     assert done.status == 2, done
@@ -103,7 +103,7 @@ LOG = GATE / "stiff" / "03.csv"
 
 
 def benchmark_text() -> str:
-    """The sample benchmark file, its paths absolute."""
+    """The sample benchmark file with absolute paths."""
     text = (GATE / "benchmark.toml").read_text(encoding="utf-8").replace("machine.toml", str(GATE / "machine.toml"))
     return re.sub(r'"([a-z]+/\*)', rf'"{GATE}/\1', text)
 
@@ -119,10 +119,10 @@ TOML_BOMBS = {
     "a table of 20000 parts": ("[" + ".".join("a" * 20_000) + "]", ("a key of more than 32 parts",)),
     "300000 keys": ("\n".join(f"a{i}.b = 1" for i in range(300_000)), ("more than 50000 keys",)),
     "400000 arrays": ("\n".join("[[a]]" for _ in range(400_000)), ("more than",)),
-    "a text that does not end": ('a = """' + '\\"""' * 900_000, ("a text begins at line 1 and does not end",)),
+    "a text that does not end": ('a = """' + '\\"""' * 900_000, ("a text that begins at line 1 is not terminated",)),
     "half a million escapes": ('a = "' + '\\"' * 500_000 + '"', ("more than",)),
-    "5 MiB": ("#" * 5 * 2**20, ("has 5 MiB, at most 4 are read",)),
-    "no UTF-8": (b"\xff\xfe\x00", ("no UTF-8 text",)),
+    "5 MiB": ("#" * 5 * 2**20, ("has 5 MiB; at most 4 are read",)),
+    "no UTF-8": (b"\xff\xfe\x00", ("not UTF-8 text",)),
 }
 
 
@@ -143,7 +143,7 @@ def test_every_toml_file_is_loaded_within_the_same_bounds(tmp_path, arguments):
 
 
 @pytest.mark.parametrize("scale", ["7" * 400, "1e400", "nan", "-inf"], ids=["400 digits", "1e400", "nan", "-inf"])
-def test_a_scale_that_no_number_holds_names_its_key(tmp_path, scale):
+def test_a_scale_out_of_range_is_reported_with_its_key(tmp_path, scale):
     machine = machine_of(tmp_path, **{'"g", scale = -1': f'"g", scale = {scale}'})
     refused("info", LOG, "-m", machine, words=("channels.acceleration.scale",))
 
@@ -171,8 +171,8 @@ def json_bombs() -> dict[str, tuple[bytes, tuple[str, ...]]]:
         "100000 objects": (b'{"a":' * 100_000, ("nested more than 64 deep",)),
         "an integer of 5000 digits": (b'{"schema_version": ' + b"7" * 5000 + b"}", ("5000 digits",)),
         "a number beyond the largest": (b'{"schema_version": 1e999}', ("1e999",)),
-        "NaN": (b'{"schema_version": NaN}', ("NaN is no number of JSON",)),
-        "no UTF-8": (b'{"a": "\xff"}', ("no UTF-8 text",)),
+        "NaN": (b'{"schema_version": NaN}', ("NaN is not a JSON number",)),
+        "no UTF-8": (b'{"a": "\xff"}', ("not UTF-8 text",)),
         "a text of a million quotes": (b'"' + b'\\"' * 1_000_000, ("damaged at line 1",)),
         "15 million lists": (b"[" + b"[]," * 15_000_000 + b"[]]", ("MiB of memory", "refused")),
         "no object": (b"[]", ()),
@@ -220,7 +220,7 @@ def test_traces_that_unpack_to_gigabytes_are_refused(bench, tmp_path, unit):
 
 
 def test_damaged_traces_are_one_line_wherever_they_are_damaged(bench, tmp_path):
-    """Each value of the file replaced by one of a wrong type, and the packed bytes cut and changed."""
+    """Replace each value of the file by one of a wrong type, and truncate and change the packed bytes."""
     good = json.loads(gzip.decompress((bench / "results.traces.json.gz").read_bytes()))
     random = np.random.default_rng(4)
     for wrong in (None, "x", -1, [], {}, [[]], 1e300, 2**62):
@@ -285,7 +285,7 @@ def test_a_hostile_urdf_is_refused_in_one_line(tmp_path, name):
     refused("info", LOG, "-m", robot(tmp_path, urdf), words=words)
 
 
-# --- Files that are none: devices, FIFOs, folders
+# --- Not regular files: devices, FIFOs, folders
 
 
 @pytest.mark.parametrize("kind", ["device", "FIFO", "folder"])
@@ -304,7 +304,7 @@ def test_a_hostile_urdf_is_refused_in_one_line(tmp_path, name):
     ],
     ids=["log", "machine", "benchmark", "signature", "results", "builds", "triggers", "show", "study"],
 )
-def test_what_is_no_file_is_refused_before_it_is_read(tmp_path, kind, arguments):
+def test_devices_and_pipes_are_refused_before_reading(tmp_path, kind, arguments):
     path = {"device": Path("/dev/zero"), "FIFO": tmp_path / "fifo", "folder": tmp_path / "folder"}[kind]
     if kind == "FIFO":
         os.mkfifo(path)
@@ -376,7 +376,7 @@ NUMBERS = ("99999999999999999999", "-99999999999999999999", "0", "-1", "nan", "1
 
 
 @pytest.mark.parametrize("value", NUMBERS, ids=lambda value: value[:24])
-def test_a_debounce_of_any_digits_is_one_line(value):
+def test_a_debounce_with_many_digits_is_one_line(value):
     done = cdtool("detect", LOG, "-m", GATE / "machine.toml", "-d", "gm", "--limit", "40", "--debounce", value)
     assert done.status == 2 and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert "debounce" in done.err and len(done.err) <= LONGEST_LINE + 1 and "Traceback" not in done.err
@@ -406,10 +406,10 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     done = cdtool("info", LOG, "-m", written(tmp_path / "machine.toml", text))
     assert done.status == 2 and done.err.count("\n") == 1
     assert len(done.err) == LONGEST_LINE + 1 and "…" in done.err and "\x1b" not in done.err
-    assert str(tmp_path)[:20] in done.err and "known: " in done.err  # the file is named, and the next step
+    assert str(tmp_path)[:20] in done.err and "known: " in done.err  # names the file and the next step
 
 
-def test_what_was_left_out_is_cut_as_well(tmp_path):
+def test_left_out_lines_are_cut_as_well(tmp_path):
     logs = [written(tmp_path / f"{'n' * 200}{i}.csv", "") for i in range(2)]
     arguments = ("-m", GATE / "machine.toml", "-d", "gm", "--limit", "40")
     done = cdtool("detect", LOG, *logs, *arguments)
@@ -421,7 +421,7 @@ def test_what_was_left_out_is_cut_as_well(tmp_path):
 
 
 def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A pipeline in bash; `cdtool` is the command. Its status is that of cdtool."""
+    """Run a pipeline in bash in which `cdtool` is the command; the status is that of cdtool."""
     program = f"{sys.executable} -c 'from cdtool.cli.app import main; main()'"
     return subprocess.run(
         ["bash", "-c", f'cdtool() {{ {program} "$@"; }}; {command}'],
@@ -446,7 +446,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
         "plan --difference-ms 5 --std-ms 3",
     ],
 )
-def test_a_reader_that_goes_leaves_no_traceback_and_the_status_as_it_is(arguments):
+def test_a_closed_pipe_causes_no_traceback_and_keeps_the_status(arguments):
     for command, shown in ((f"cdtool {arguments} | head -1", True), (f"cdtool {arguments} | true", False)):
         done = shell(f"{command}; echo ${{PIPESTATUS[0]}}")
         assert done.stderr == "", done.stderr
@@ -454,7 +454,7 @@ def test_a_reader_that_goes_leaves_no_traceback_and_the_status_as_it_is(argument
         assert shown == (len(done.stdout.splitlines()) > 1) or arguments.endswith("--help")
 
 
-def test_a_reader_that_goes_does_not_make_a_violated_limit_pass(tmp_path):
+def test_a_closed_pipe_does_not_hide_a_violated_limit(tmp_path):
     text = benchmark_text().replace("{ max = 40 }", "{ max = 1 }")
     benchmark = written(tmp_path / "benchmark.toml", text)
     done = shell(f"cdtool benchmark {benchmark} --detectors pi -o {tmp_path}/r.json | head -1; echo ${{PIPESTATUS[0]}}")
@@ -469,7 +469,7 @@ def test_closed_streams_do_not_change_what_a_command_does(tmp_path, closed):
     assert done.stdout.splitlines()[-1] == "0" and "Traceback" not in done.stderr, done
     done = shell(f"cdtool convert {LOG} {tmp_path}/out.csv {closed}; echo $?")
     assert done.stdout.splitlines()[-1] == "0"
-    lines = (tmp_path / "out.csv").read_text().splitlines()  # nothing printed went into the file
+    lines = (tmp_path / "out.csv").read_text().splitlines()  # no printed line is in the file
     assert all(line.startswith("# ") or re.fullmatch(r"[\w.,+\-]+", line) for line in lines)
 
 
@@ -506,7 +506,7 @@ def test_json_on_a_terminal_without_its_characters_is_the_same_json(tmp_path):
     assert narrow.isascii() and json.loads(narrow) == json.loads(plain) and "☃" in plain
 
 
-def test_memory_that_is_not_there_is_one_line(tmp_path):
+def test_missing_memory_is_one_line(tmp_path):
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (1_200 * 2**20,) * 2)
 

@@ -1,4 +1,4 @@
-"""What `info` and the other commands say first, and what they say of clocks that are none."""
+"""Order of findings in `info` and other commands, and findings on unusable clocks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def table(path, stamps):
     ],
     ids=["constant", "coarse", "half", "shuffled"],
 )
-def test_a_clock_that_is_none_is_reported(tmp_path, stamps, told):
+def test_an_unusable_clock_is_reported(tmp_path, stamps, told):
     done = cdtool("info", table(tmp_path / "log.csv", stamps))
     assert f"warning: {told}" in done.out and "no warnings" not in done.out
     assert "no column looks like a clock: rates, gaps and times are unknown" in done.out
@@ -45,7 +45,7 @@ def test_topics_whose_stamps_repeat_are_reported(tmp_path):
     assert any("of its stamps repeat: a coarse clock" in str(item) for item in info(path).findings)
 
 
-def test_a_good_clock_is_no_finding(tmp_path):
+def test_a_valid_clock_causes_no_finding(tmp_path):
     shown = info(table(tmp_path / "log.csv", [f"{0.01 * i:.2f}" for i in range(400)]))
     assert {item.severity for item in shown.findings} == {"note"}
 
@@ -64,7 +64,7 @@ def test_losses_come_first(tmp_path):
     assert shown == words
 
 
-def test_many_warnings_bury_no_loss_on_screen(capsys):
+def test_many_warnings_do_not_hide_a_loss_on_screen(capsys):
     warnings = [Skipped(f"free/{i:02d}.csv", f"time: the sample period varies by {i} % (std)") for i in range(46)]
     lost = [Skipped("free/07.csv", "damaged, used as far as it goes: time: 3 time stamps run backward")]
     print_skipped(lost, warnings)

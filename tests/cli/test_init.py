@@ -1,4 +1,4 @@
-"""`cdtool init`: what is guessed of simulated and of real logs; registered here, so that the test stands alone."""
+"""`cdtool init`: guesses from simulated and real logs; the command is registered here to keep the test independent."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_the_gates_table_is_guessed_with_its_signs_and_units(tmp_path):
     assert values["machine"]["type"] == "linear_axis" and values["machine"]["coordinates"] == "motor"
 
 
-def test_what_a_log_cannot_tell_is_marked_and_cannot_pass_for_a_value(tmp_path):
+def test_values_not_in_the_log_are_marked_placeholders(tmp_path):
     path = tmp_path / "machine.toml"
     text = init(LOGS / "gate/stiff/03.csv", path).text.splitlines()
     for key in ("load_mass = 0.0", "motor_inertia = 0.0", "transmission_ratio = 1.0"):
@@ -80,7 +80,7 @@ def test_an_arms_columns_are_grouped_by_joint_and_its_counts_are_scaled_by_its_s
 
 
 @needs_data("ur10e/link4.csv")
-def test_columns_without_names_are_told_by_their_course(tmp_path):
+def test_columns_without_names_are_recognised_by_their_values(tmp_path):
     channels = drafted(data("ur10e/link4.csv"), tmp_path)["channels"]
     assert channels["position"]["columns"] == [1, 2, 3, 4, 5, 6] and channels["speed"]["columns"] == [
         7,
@@ -94,7 +94,7 @@ def test_columns_without_names_are_told_by_their_course(tmp_path):
 
 
 @needs_data("emps/DATA_EMPS.mat")
-def test_a_drive_and_a_set_value_are_told_by_their_course(tmp_path):
+def test_a_drive_and_a_set_value_are_recognised_by_their_values(tmp_path):
     channels = drafted(data("emps/DATA_EMPS.mat"), tmp_path)["channels"]
     assert places(channels) == {"position": "qm", "torque": "vir", "reference_position": "qg"}
 
@@ -110,7 +110,7 @@ def test_of_175_columns_the_robots_are_found(tmp_path):
 
 
 @needs_data("mcap_samples/ur10_joint_states.mcap")
-def test_joints_bear_the_names_that_the_messages_give_them(tmp_path):
+def test_joints_have_the_names_in_the_messages(tmp_path):
     values = drafted(data("mcap_samples/ur10_joint_states.mcap"), tmp_path)
     assert values["machine"]["joints"][:2] == ["shoulder_pan_joint", "shoulder_lift_joint"]
 
@@ -133,7 +133,7 @@ def test_german_names_are_understood(tmp_path):
     assert values["machine"]["type"] == "rotary_axis" and values["channels"]["time"]["unit"] == "ms"
 
 
-def test_nothing_is_overwritten_unless_it_is_asked_for(tmp_path):
+def test_nothing_is_overwritten_without_force(tmp_path):
     path = tmp_path / "machine.toml"
     path.write_text("mine")
     with pytest.raises(UsageError, match=r"machine\.toml: already exists"):
@@ -143,11 +143,11 @@ def test_nothing_is_overwritten_unless_it_is_asked_for(tmp_path):
     assert path.read_text() != "mine"
 
 
-def test_a_log_that_tells_of_no_channel_gets_a_file_with_its_clock_and_its_columns_as_comments(tmp_path):
+def test_a_log_without_recognised_channels_gets_its_clock_and_columns_as_comments(tmp_path):
     log, path = tmp_path / "scope.csv", tmp_path / "machine.toml"
     log.write_text("TIME,CH1,CH2\n" + "".join(f"{k * 1e-3:.3f},{k % 3},{k % 7}\n" for k in range(300)))
     done = cdtool("init", log, "-o", path)
-    assert done.status == 0 and "no name or course tells" in done.err
+    assert done.status == 0 and "torque, speed or position" in done.err
     values = tomllib.loads(path.read_text())
     assert list(values["channels"]) == ["time"] and values["channels"]["time"]["column"] == "TIME"
     assert values["machine"]["load_mass"] == 0.0
@@ -157,10 +157,10 @@ def test_a_log_that_tells_of_no_channel_gets_a_file_with_its_clock_and_its_colum
     assert info(log, machine=path).channels
 
 
-def test_a_log_of_a_clock_alone_is_one_line(tmp_path):
+def test_a_log_with_only_a_clock_is_one_line(tmp_path):
     log = tmp_path / "clock.csv"
     log.write_text("t\n" + "".join(f"{k}\n" for k in range(30)))
-    with pytest.raises(RecordingError, match="no column of numbers beside a clock"):
+    with pytest.raises(RecordingError, match="no column of numbers apart from a clock"):
         init(log, tmp_path / "machine.toml")
     assert not (tmp_path / "machine.toml").exists()
 

@@ -1,4 +1,4 @@
-"""The progress of convert, recover and init: on a terminal, and only where it takes a while."""
+"""Progress of convert, recover and init: only on a terminal, and only for long tasks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.workflows.convert.kinds import table
 
 
 class Terminal:
-    """A stderr that says it is one, and keeps what is written."""
+    """A stderr that claims to be a terminal and records its output."""
 
     encoding = "utf-8"
 
@@ -34,20 +34,20 @@ class Terminal:
 
 
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """A terminal as stderr; no fixture, since pytest changes stderr behind those."""
+    """Replace stderr by a terminal; not a fixture, since pytest replaces stderr after fixtures."""
     made = Terminal()
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", made)
     return made
 
 
-def test_nothing_is_drawn_where_there_is_no_terminal(capsys):
+def test_nothing_is_drawn_without_a_terminal(capsys):
     with late_progress("converting", after=0.0) as advance:
         assert advance is None
     assert capsys.readouterr().err == ""
 
 
-def test_nothing_is_drawn_where_it_is_done_soon(monkeypatch):
+def test_nothing_is_drawn_for_a_short_task(monkeypatch):
     stderr = terminal(monkeypatch)
     with late_progress("converting", after=60.0) as advance:
         assert advance is not None
@@ -55,7 +55,7 @@ def test_nothing_is_drawn_where_it_is_done_soon(monkeypatch):
     assert stderr.text == ""
 
 
-def test_a_bar_comes_where_it_takes_longer_and_goes_at_the_end(monkeypatch):
+def test_a_bar_appears_for_a_long_task_and_disappears_at_the_end(monkeypatch):
     stderr = terminal(monkeypatch)
     with late_progress("converting", after=0.0) as advance:
         sleep(0.3)
@@ -63,10 +63,10 @@ def test_a_bar_comes_where_it_takes_longer_and_goes_at_the_end(monkeypatch):
         advance(3, 7)
         sleep(0.3)
     assert "converting" in stderr.text and "3/7" in stderr.text
-    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")  # the line is wiped
+    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")  # the line is cleared
 
 
-def test_an_error_in_the_block_comes_through_and_wipes_the_bar(monkeypatch):
+def test_an_error_in_the_block_is_raised_and_removes_the_bar(monkeypatch):
     stderr = terminal(monkeypatch)
     with pytest.raises(ValueError, match="mine"), late_progress("converting", after=0.0):
         sleep(0.3)

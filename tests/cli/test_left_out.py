@@ -1,4 +1,4 @@
-"""What is left out is counted once, whatever number of detectors leaves it out, and for the reason that it is."""
+"""A left-out log is counted once for any number of detectors, with its reason."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ def test_a_benchmark_names_each_run_that_is_left_out_once(gate_folder, tmp_path)
     assert done.status == 3 and done.err.endswith("done, but 2 items were left out\n")
     reasons = [(item["recording"], item["reason"]) for item in json.loads(target.read_text())["skipped"]]
     assert [name for name, _ in reasons] == ["twin.csv", "fast.csv"]
-    assert "holds the same bytes as" in reasons[0][1] and "runs forward at" in reasons[1][1]
+    assert "has the same content as" in reasons[0][1] and "runs forward at" in reasons[1][1]
 
 
-def test_a_file_that_is_named_twice_is_not_said_to_hold_the_bytes_of_another(gate_folder, tmp_path):
+def test_a_file_named_twice_is_not_reported_as_a_copy(gate_folder, tmp_path):
     free = sorted((gate_folder / "free").glob("*.csv"))
     again = free[0].parent / ".." / "free" / free[0].name
     machine = ("-m", gate_folder / "machine.toml")
     signature = tmp_path / "pi.json"
     done = cdtool("learn-signature", *free, free[0], again, *machine, "-d", "pi", "-o", signature)
-    assert done.status == 3 and "same bytes" not in done.err
-    assert f"left out: {free[0].as_posix()}: given more than once: counts once" in done.err
+    assert done.status == 3 and "same content" not in done.err
+    assert f"left out: {free[0].as_posix()}: given more than once, used once" in done.err
     new = gate_folder / "holdout" / "01.csv"
     done = cdtool("signature", "update", signature, new, new, *machine)
-    assert "1 run added" in done.out and "in the signature already" not in done.err
-    assert "given more than once: counts once" in done.err
+    assert "1 run added" in done.out and "already in the signature" not in done.err
+    assert "given more than once, used once" in done.err
     done = cdtool("signature", "update", signature, new, *machine)
-    assert "this run is in the signature already" in done.err
+    assert "this run is already in the signature" in done.err
 
 
-def test_too_few_runs_name_what_was_left_out_before(gate_folder, tmp_path):
+def test_too_few_runs_count_those_left_out_before(gate_folder, tmp_path):
     source = (gate_folder / "free" / "01.csv").read_bytes()
     copies = [tmp_path / f"copy_{number}.csv" for number in range(10)]
     for copy in copies:
@@ -58,14 +58,14 @@ def test_too_few_runs_name_what_was_left_out_before(gate_folder, tmp_path):
     machine = ("-m", gate_folder / "machine.toml")
     done = cdtool("learn-signature", *copies, *machine, "-d", "pi", "-o", tmp_path / "pi.json")
     assert done.status == 2 and "1 impact-free run of one class" in done.err
-    assert "left out before: 9 runs, first" in done.err and "counts once" in done.err
+    assert "left out before: 9 runs, first" in done.err and "used once" in done.err
 
 
-def test_a_reason_that_not_all_detectors_have_names_them():
+def test_a_reason_of_some_detectors_names_them():
     left_out = LeftOut()
     left_out.add("pure_inertia", [Skipped("a.csv", "no acceleration"), Skipped("b.csv", "another class")])
     left_out.add("momentum", [Skipped("b.csv", "another class")])
-    assert left_out.said_once() == [
+    assert left_out.combined() == [
         Skipped("a.csv", "pure_inertia: no acceleration"),
         Skipped("b.csv", "another class"),
     ]

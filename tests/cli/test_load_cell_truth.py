@@ -1,4 +1,4 @@
-"""The load cell as the truth, through the commands: in progress at the start, drift, negative latencies, forces."""
+"""The load cell as ground truth in the commands: contacts in progress, drift, negative latencies, forces."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_contact_in_progress_is_counted_and_named_in_every_output_and_scored_i
     assert all(item["onset_s"] is None for item in told["alarms"] if item["role"] == "in progress")
 
 
-def test_thirty_newtons_of_drift_change_no_figure_and_are_reported(tmp_path):
+def test_thirty_newtons_of_drift_change_no_result_and_are_reported(tmp_path):
     file = folder_of(tmp_path, {"a": lambda _, force: force, "b": drifting, "free_1": drifting})
     done = cdtool("benchmark", file, "-o", tmp_path / "results.json")
     assert "stiff/b.csv: force: the reading at rest shifted by 27.1 N before the contact at 6.266 s" in done.err
@@ -71,7 +71,7 @@ def test_thirty_newtons_of_drift_change_no_figure_and_are_reported(tmp_path):
     assert drifted.rest_n == pytest.approx(26.8, abs=2.0)
 
 
-def test_a_drifting_load_cell_shows_no_contact_in_what_is_learned_from(tmp_path):
+def test_a_drifting_load_cell_shows_no_contact_in_runs_to_learn_from(tmp_path):
     for i in range(1, 4):
         changed(SAMPLES / "free" / f"0{i + 2}.csv", tmp_path / "free" / f"{i}.csv", drifting)
     logs = sorted((tmp_path / "free").glob("*.csv"))
@@ -101,7 +101,7 @@ def test_a_negative_latency_is_0_and_flagged_everywhere(tmp_path):
     assert values[0]["contacts"][0]["clipped"] is True
 
 
-def test_the_force_at_the_alarm_is_a_magnitude_as_the_peak_is(tmp_path):
+def test_the_force_at_the_alarm_is_a_magnitude_like_the_peak(tmp_path):
     def pulled_first(time: np.ndarray, force: np.ndarray) -> np.ndarray:
         return np.where((time > 6.26) & (time < 6.4), -200.0, force)
 

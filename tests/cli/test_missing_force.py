@@ -1,4 +1,4 @@
-"""Load-cell samples that are missing at a contact, through the commands: no pass, no latency without a mark."""
+"""Missing load-cell samples during a contact, in the commands: no pass, and no unmarked latency."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def benchmark(folder: Path, change, more: str = MORE):
 
 
 @pytest.mark.parametrize("begin, end", [(-0.003, 0.186), (0.0, 0.17)])
-def test_a_hole_over_the_onset_gives_no_pass_and_no_latency_without_a_mark(tmp_path, begin, end):
+def test_a_hole_over_the_onset_prevents_a_pass_and_marks_the_latency(tmp_path, begin, end):
     file, done, results = benchmark(tmp_path, without(begin, end))
     hole = 1e3 * (end - begin) + 1
     (row,) = results.contacts
@@ -61,7 +61,7 @@ def test_a_hole_over_the_onset_gives_no_pass_and_no_latency_without_a_mark(tmp_p
     assert row.latency_ms <= true_latency <= row.latency_ms + 1e3 * row.onset_uncertainty_s + 1.0
     (force,) = results.forces
     assert force.verdict == "not_assessable" and f"{row.onset_hole_ms:.0f} ms" in force.reason
-    # Limits that hold for what was seen only are not met, and so the status is 1; without them it is 3.
+    # Limits on partly measured contacts are not met, so the status is 1; without limits it is 3.
     outcomes = {item.figure: item.outcome for item in results.limits}
     assert outcomes == {
         "max_ms": "not_assessable",
@@ -93,7 +93,7 @@ def test_a_hole_over_the_onset_gives_no_pass_and_no_latency_without_a_mark(tmp_p
         assert told.status == 3 and contact["onset_hole_ms"] == row.onset_hole_ms
 
 
-def test_a_hole_over_the_peak_gives_no_pass_and_a_reason_with_its_length(tmp_path):
+def test_a_hole_over_the_peak_prevents_a_pass_with_its_length_as_reason(tmp_path):
     profile = '[force]\nprofile = "yard"\nlimits = "force.toml"\n'
     _, done, results = benchmark(tmp_path, without(0.07, 0.19), profile)
     (row,), (force,) = results.contacts, results.forces
@@ -104,7 +104,7 @@ def test_a_hole_over_the_peak_gives_no_pass_and_a_reason_with_its_length(tmp_pat
     assert "is not assessable by yard: dynamic: load-cell samples are missing for 121 ms" in done.err
 
 
-def test_a_violation_that_was_seen_stands_beside_a_hole(tmp_path):
+def test_a_measured_violation_counts_despite_a_hole(tmp_path):
     profile = '[force]\nprofile = "yard"\nlimits = "force.toml"\n'
     _, done, results = benchmark(tmp_path, without(-0.003, 0.08), profile)
     assert [item.verdict for item in results.forces] == ["fail"] and done.status == 1
@@ -120,7 +120,7 @@ def test_a_hole_as_long_as_the_window_leaves_no_latency(tmp_path):
     assert shown.status == 3 and "its onset is not known" in words and "after its onset" not in words
 
 
-def test_a_hole_over_the_whole_contact_is_named_where_no_contact_is_found(tmp_path):
+def test_a_hole_over_the_whole_contact_is_named_if_no_contact_is_found(tmp_path):
     (tmp_path / "force.toml").write_text(PROFILE, encoding="utf-8")
     file = folder_of(tmp_path, {"a": without(-0.1, 0.25), "b": lambda _, force: force})
     done = cdtool("benchmark", file)
@@ -143,7 +143,7 @@ def test_single_lost_samples_change_nothing(tmp_path):
     assert [row.onset_hole_ms for row in results.contacts] == [None]
 
 
-def test_a_contact_in_progress_is_no_contact_of_the_force_profile(tmp_path):
+def test_a_contact_in_progress_does_not_count_for_the_force_profile(tmp_path):
     (tmp_path / "high.toml").write_text(PROFILE.replace("yard]", "high]").replace("3000", "9000"), encoding="utf-8")
 
     def begun(time: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def test_a_contact_in_progress_is_no_contact_of_the_force_profile(tmp_path):
     assert "no load-cell force" not in done.out + done.err and done.status == 3
 
 
-def test_a_group_of_contacts_in_progress_alone_says_so(tmp_path):
+def test_a_group_with_only_contacts_in_progress_is_reported(tmp_path):
     (tmp_path / "force.toml").write_text(PROFILE, encoding="utf-8")
 
     def only_begun(time: np.ndarray, force: np.ndarray) -> np.ndarray:

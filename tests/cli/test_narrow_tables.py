@@ -1,4 +1,4 @@
-"""Tables in terminals of 60 and 80 columns: names and figures stay whole, and every column is shown."""
+"""Tables in terminals of 60 and 80 columns: names and numbers are not split, and every column is shown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS = [
 
 @pytest.fixture
 def terminal(monkeypatch, capsys):
-    """terminal(columns): print the table in a terminal so wide; returns its lines."""
+    """terminal(columns): print the table in a terminal of that width; return its lines."""
 
     def shown(columns: int, rows=ROWS) -> list[str]:
         monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
@@ -30,7 +30,7 @@ def terminal(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("columns", [60, 80, 200])
-def test_no_name_or_figure_is_broken_and_no_column_is_left_out(terminal, columns):
+def test_no_name_or_number_is_split_and_no_column_is_left_out(terminal, columns):
     lines = terminal(columns)
     assert max(map(len, lines)) <= columns
     text = "\n".join(lines)
@@ -39,7 +39,7 @@ def test_no_name_or_figure_is_broken_and_no_column_is_left_out(terminal, columns
     assert sum("inertial_momentum" in line for line in lines) == {60: 3, 80: 2, 200: 1}[columns]
 
 
-def test_a_name_that_is_longer_than_the_terminal_is_folded_and_whole(terminal):
+def test_a_name_longer_than_the_terminal_is_folded_without_loss(terminal):
     name = "x" * 150
     lines = terminal(60, [("stiff", name, "1", "2", "")])
     assert sum(line.count("x") for line in lines) % 150 == 0 and max(map(len, lines)) <= 60

@@ -1,6 +1,6 @@
-"""Files of earlier versions are read, with a line on what they have not, or refused with one that says how to migrate.
+"""Files of earlier versions are read with a note on missing data, or refused with a hint how to migrate.
 
-The files were written by the commands of an earlier version, from the gate of `cdtool simulate`.
+They were written by the commands of an earlier version, from the gate of `cdtool simulate`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def signature(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("command", ["detect", "detect --benchmark", "explain", "show", "check", "update"])
-def test_every_command_says_once_what_an_older_signature_file_has_not(command, gate_folder, signature):
+def test_every_command_reports_once_what_is_missing_from_an_older_signature_file(command, gate_folder, signature):
     machine, logs = ("-m", gate_folder / "machine.toml"), [gate_folder / "stiff" / f"0{i}.csv" for i in (1, 2)]
     new = gate_folder / "holdout" / "01.csv"
     arguments: tuple[object, ...] = {
@@ -40,22 +40,22 @@ def test_every_command_says_once_what_an_older_signature_file_has_not(command, g
     done = cdtool(*arguments)
     assert done.status == 0, done.err
     (line,) = [line for line in done.err.splitlines() if SAID in line]
-    assert line.startswith(f"note: {signature}: ") and "learn it again with cdtool learn-signature" in line
+    assert line.startswith(f"note: {signature}: ") and "relearn it with cdtool learn-signature" in line
     assert (done.out + done.err).count(SAID) == 1
 
 
-def test_an_older_file_stays_one_when_runs_are_added(gate_folder, signature):
+def test_adding_runs_does_not_migrate_an_older_file(gate_folder, signature):
     machine = ("-m", gate_folder / "machine.toml")
     assert cdtool("signature", "update", signature, gate_folder / "holdout" / "01.csv", *machine).status == 0
     assert json.loads(signature.read_text(encoding="utf-8"))["schema_version"] == 4
     assert SAID in cdtool("signature", "show", signature).err
 
 
-def test_a_file_of_this_version_says_nothing_of_versions(gate_folder, feekf_signature):
+def test_a_file_of_this_version_causes_no_note_on_versions(gate_folder, feekf_signature):
     assert "version" not in cdtool("signature", "show", feekf_signature).err
 
 
-def test_an_older_signature_gives_the_alarms_that_a_new_one_gives(gate_folder, signature, tmp_path):
+def test_an_older_signature_raises_the_same_alarms_as_a_new_one(gate_folder, signature, tmp_path):
     machine, log = ("-m", gate_folder / "machine.toml"), gate_folder / "stiff" / "01.csv"
     free = sorted((gate_folder / "free").glob("*.csv"))
     steps = ("--set", "position_step=0.05", "--set", "position_window=0.1")
@@ -72,14 +72,14 @@ def test_an_older_signature_gives_the_alarms_that_a_new_one_gives(gate_folder, s
     assert times[0] and times[0] == pytest.approx(times[1], abs=0.003)
 
 
-def test_results_of_version_2_are_read_and_compared_with_their_like(tmp_path):
+def test_results_of_version_2_are_read_and_compared_with_each_other(tmp_path):
     older = OLDER / "results_version_2.json"
     done = cdtool("report", older, "-o", tmp_path / "report.md")
     assert done.status == 0 and done.out.startswith("all 2 limits are met")
     assert cdtool("compare", older, older).status == 0
 
 
-def test_results_with_onsets_in_samples_are_refused_beside_new_ones_with_the_way_to_migrate(gate_folder, tmp_path):
+def test_results_with_onsets_in_samples_are_not_compared_with_new_ones(gate_folder, tmp_path):
     new = tmp_path / "new.json"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "pt", "-o", new)
     assert done.status == 0, done.err
@@ -93,7 +93,7 @@ def test_results_with_onsets_in_samples_are_refused_beside_new_ones_with_the_way
         assert f"run the benchmark of {which} again with this version" in done.err
 
 
-def test_results_of_version_1_are_refused_with_the_way_to_migrate(tmp_path):
+def test_results_of_version_1_are_refused_with_a_hint_to_migrate(tmp_path):
     values = json.loads((OLDER / "results_version_2.json").read_text(encoding="utf-8"))
     (tmp_path / "first.json").write_text(json.dumps({**values, "schema_version": 1}), encoding="utf-8")
     done = cdtool("report", tmp_path / "first.json")

@@ -1,4 +1,4 @@
-"""A log at another speed than was learned: every command names the speed that was measured and those learned."""
+"""A log at a speed that was not learned: every command names the measured and the learned speeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEASURED = re.compile(r"measured forward at ([\d.]+) m/s, learned forward at 0\.
 
 @pytest.fixture
 def at_speed(gate_folder: Path, tmp_path: Path):
-    """at_speed(factor, rows): an impact-free log whose speed is changed by a factor in these rows."""
+    """at_speed(factor, rows): an impact-free log with its speed multiplied by a factor in these rows."""
     log = gate_folder / "holdout" / "01.csv"
     head, *lines = log.read_text(encoding="utf-8").splitlines()
     names, columns = head.split(","), list(zip(*(line.split(",") for line in lines), strict=True))
@@ -45,7 +45,7 @@ def test_not_assessable_names_the_speed_measured_and_the_classes_learned(at_spee
 
 
 @pytest.mark.parametrize("verdict", ["alarm", "no alarm"])
-def test_an_alarm_or_none_beside_another_speed_names_them_as_well(at_speed, gate_folder, tmp_path, verdict):
+def test_a_partly_matching_speed_is_named_with_and_without_an_alarm(at_speed, gate_folder, tmp_path, verdict):
     log = at_speed(0.5, range(4000, 6000))
     signature = tmp_path / "pi.json"
     free = sorted((gate_folder / "free").glob("*.csv"))
@@ -62,13 +62,13 @@ def test_an_alarm_or_none_beside_another_speed_names_them_as_well(at_speed, gate
         assert MEASURED.search(shown)
 
 
-def test_a_log_at_the_learned_speed_says_nothing_of_speeds(gate_folder, feekf_signature):
+def test_a_log_at_the_learned_speed_causes_no_note_on_speeds(gate_folder, feekf_signature):
     machine = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
     done = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine, "--json")
     assert json.loads(done.out)[0]["other_speed"] is None
 
 
-def test_sections_that_were_not_judged_are_counted_beyond_those_shown(gate_folder, tmp_path, feekf_signature):
+def test_sections_not_assessable_are_counted_beyond_those_shown(gate_folder, tmp_path, feekf_signature):
     cells = {("i_motor", row + i): "nan" for row in range(2000, 7000, 500) for i in range(60)}
     log = damaged(gate_folder / "holdout" / "01.csv", tmp_path / "holes.csv", cells)
     machine = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)

@@ -1,4 +1,4 @@
-"""What `-o` may replace: a file of the kind that the command writes, told by what it holds; nothing else, ever."""
+"""`-o` may replace a file of the kind that the command writes, recognised by content, and no other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TEXT = "x"
 
 @pytest.fixture
 def folder(gate_folder: Path, tmp_path: Path) -> Path:
-    """A folder of its own: 3 logs to learn from, an impact, the machine file, a benchmark file."""
+    """A separate folder: 3 logs to learn from, an impact, the machine file, a benchmark file."""
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/01.csv", "machine.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(gate_folder / name, tmp_path / name)
@@ -36,7 +36,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", ["free/01.csv", "machine.toml", "benchmark.toml", "free/../machine.toml", "new.csv"])
-def test_a_signature_goes_into_a_name_in_json_only(folder, name):
+def test_a_signature_is_written_only_to_a_json_name(folder, name):
     before = bytes_of(folder)
     done = learn(folder, folder / name)
     assert done.status == 2 and "must end in .json" in done.err
@@ -44,12 +44,12 @@ def test_a_signature_goes_into_a_name_in_json_only(folder, name):
 
 
 @pytest.mark.parametrize("way", ["symlink_to", "hardlink_to"])
-def test_a_link_in_json_to_a_recording_is_no_way_round(folder, way):
+def test_a_json_link_to_a_recording_is_refused(folder, way):
     link = folder / "link.json"
     getattr(link, way)(folder / "free" / "01.csv")
     before = bytes_of(folder)
     done = learn(folder, link)
-    assert done.status == 2 and "link.json: already exists and holds no signature" in done.err
+    assert done.status == 2 and "link.json: already exists and contains no signature" in done.err
     assert bytes_of(folder) == before
 
 
@@ -72,17 +72,17 @@ def test_a_signature_replaces_a_signature(folder):
         ("build.xml", "JUnit report"),
     ],
 )
-def test_a_report_never_replaces_what_is_no_report(folder, name, kind):
+def test_a_report_never_replaces_another_file(folder, name, kind):
     path = folder / name
     if not path.exists():
         path.write_text(TEXT, encoding="utf-8")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "fine.json", "-o", path)
-    assert done.status == 2 and f"holds no {kind}" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and f"contains no {kind}" in done.err and done.err.count("\n") == 1
     assert bytes_of(folder) == before
 
 
-def test_a_folder_that_holds_a_recording_under_a_report_s_name_is_refused(folder):
+def test_a_folder_with_a_recording_under_a_report_s_name_is_refused(folder):
     shutil.copyfile(folder / "free" / "01.csv", folder / "stiff" / "contacts.csv")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", folder / "stiff")
@@ -90,13 +90,13 @@ def test_a_folder_that_holds_a_recording_under_a_report_s_name_is_refused(folder
     assert bytes_of(folder) == before
 
 
-def test_reports_are_written_anew_as_often_as_one_likes(folder):
+def test_reports_can_be_written_again_any_number_of_times(folder):
     targets = [
         word
         for name in ("r.json", "r.html", "r.md", "r.xml", "r.csv", "r.svg", "all")
         for word in ("-o", folder / name)
     ]
-    (folder / "r.csv").touch()  # an empty file holds nothing that could be lost
+    (folder / "r.csv").touch()  # an empty file has no content to lose
     first = cdtool("benchmark", folder / "benchmark.toml", *targets)
     assert first.status == 0, first.err
     written = bytes_of(folder)
@@ -130,7 +130,7 @@ def test_a_figure_or_traces_of_another_program_are_not_replaced_without_force(fo
     target = folder / (name if "traces" not in name else "r.json")
     before = bytes_of(folder)
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", target)
-    assert done.status == 2 and f"{name}: already exists and holds no" in done.err and "--force" in done.err
+    assert done.status == 2 and f"{name}: already exists and contains no" in done.err and "--force" in done.err
     assert bytes_of(folder) == before
     done = cdtool("benchmark", folder / "benchmark.toml", "-o", target, "--force")
     assert done.status == 0, done.err
@@ -151,12 +151,12 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
     for words in commands:
         plot.write_text(TEXT, encoding="utf-8")
         done = cdtool(*words)
-        assert done.status == 2 and "p.png: already exists and holds no figure of cdtool" in done.err, words
+        assert done.status == 2 and "p.png: already exists and contains no figure of cdtool" in done.err, words
         assert plot.read_text(encoding="utf-8") == TEXT
         assert [cdtool(*words, "--force").status, cdtool(*words).status] == [0, 0], words
 
 
-def test_a_folder_with_anything_but_a_report_keeps_it(folder):
+def test_other_files_in_a_report_folder_stay(folder):
     report = folder / "report"
     report.mkdir()
     (report / "notes.txt").write_text(TEXT, encoding="utf-8")
@@ -168,7 +168,7 @@ def test_a_folder_with_anything_but_a_report_keeps_it(folder):
     assert (report / "notes.txt").read_text(encoding="utf-8") == TEXT and (report / "report.html").exists()
 
 
-def test_a_report_folder_is_swapped_in_as_a_whole_and_what_is_no_longer_drawn_is_gone(folder):
+def test_a_report_folder_is_replaced_as_a_whole_without_outdated_figures(folder):
     report = folder / "report"
     assert cdtool("benchmark", folder / "benchmark.toml", "-o", report).status == 0
     shutil.copyfile(report / "latency.png", report / "triggers_of-last-year.png")
@@ -177,7 +177,7 @@ def test_a_report_folder_is_swapped_in_as_a_whole_and_what_is_no_longer_drawn_is
     assert not [name for name in bytes_of(folder) if ".cdtool-" in name]
 
 
-def test_force_never_reaches_what_the_command_reads(folder):
+def test_force_never_overwrites_an_input(folder):
     (folder / "stiff" / "01.csv").rename(folder / "stiff" / "contacts.csv")
     before = bytes_of(folder)
     for target in (folder / "stiff" / "contacts.csv", folder / "stiff"):
@@ -195,7 +195,7 @@ def test_a_dead_link_is_refused_before_any_work(folder):
     assert not (folder / "nowhere.json").exists()
 
 
-def test_dotfiles_are_no_logs_whatever_the_pattern(folder):
+def test_dotfiles_are_never_logs(folder):
     for name in ("free/.04.csv", "free/.cdtool-0123456789abcdef-0123456789abcdef.tmp", "stiff/.hidden/02.csv"):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(folder / "free" / "03.csv", folder / name)

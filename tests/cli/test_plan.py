@@ -1,4 +1,4 @@
-"""`cdtool plan`: how large a test must be."""
+"""`cdtool plan`: the required size of a test."""
 
 from __future__ import annotations
 
@@ -55,21 +55,21 @@ def source(tmp_path: Path) -> Path:
         (
             ("--false-alarms-at-most", "1/1000op"),
             "a budget of 1/1000op false alarms: to set a safety factor for it, 1000 impact-free operations to learn "
-            "from; to show that it is kept, 2996 others without a false alarm; 4744 with one false alarm allowed",
+            "from; to show that it is met, 2996 others without a false alarm; 4744 with one false alarm allowed",
         ),
         (
             ("--false-alarms-at-most", "0.1/h", "--allowed", "0"),
             "a budget of 1/10h false alarms: to set a safety factor for it, 10 impact-free hours to learn from; "
-            "to show that it is kept, 30 others without a false alarm",
+            "to show that it is met, 30 others without a false alarm",
         ),
         (
             ("--difference-ms", "5", "--std-ms", "8"),
-            "to see a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
-            "each judged by both",
+            "to detect a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
+            "each scored for both",
         ),
         (
             ("--difference-ms", "5", "--std-ms", "8", "--unpaired", "--power", "0.9"),
-            "to see a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
+            "to detect a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
             "each of two sets",
         ),
     ],
@@ -110,9 +110,9 @@ def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
     done = cdtool("plan", "--difference-ms", 1, "--from", source, "--detectors", "gm,pt", "--group", "stiff")
     std = float(np.std(np.subtract(FIRST, SECOND), ddof=1))
     assert done.out == (
-        f"to see a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, measured: "
-        f"momentum less pure_torque in stiff, 30 contacts, one a recording): {impacts_for_difference(1.0, std)} "
-        "impacts, each judged by both\n"
+        f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, "
+        "measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): "
+        f"{impacts_for_difference(1.0, std)} impacts, each scored for both\n"
     )
 
 
@@ -131,7 +131,7 @@ def test_unpaired_the_spread_is_that_of_the_latencies(source):
 def test_contacts_that_one_missed_are_left_out_and_counted():
     found = measured_std(earlier([MISSED, BLIND, *FIRST[2:]], [*SECOND[:2], MISSED, *SECOND[3:]]), ["gm", "pt"])
     assert found.std == pytest.approx(np.std(np.subtract(FIRST[3:], SECOND[3:]), ddof=1))
-    assert found.source.endswith("27 contacts, one a recording, 3 missed or not assessable left out")
+    assert found.source.endswith("27 contacts, one per recording, 3 missed or not assessable left out")
 
 
 def test_contacts_of_one_campaign_count_as_one():
@@ -143,54 +143,57 @@ def test_contacts_of_one_campaign_count_as_one():
     (answer,) = api.plan(difference_ms=5.0, std_ms=found).answers
     assert answer.needs[0].unit == "recordings or campaigns"
     assert answer.needs[0].amount == impacts_for_difference(5.0, found.std)
-    assert answer.words.endswith("each judged by both, with as many contacts in each as measured")
+    assert answer.words.endswith("each scored for both, with as many contacts in each as measured")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "nothing is asked (ask with --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
+        ((), "there is no question (give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
         (("--difference-ms", 5), "a difference of 5 ms without a standard deviation"),
         (("--difference-ms", 0, "--std-ms", 8), "difference is 0"),
         (("--difference-ms", 5, "--std-ms", 8, "--power", 1), "power is 1"),
         (("--difference-ms", 5, "--std-ms", 8, "--level", 0), "significance level is 0"),
-        (("--difference-ms", 5, "--std-ms", 8, "--from", "r.json"), "--std-ms and --from are given"),
-        (("--std-ms", 8), "--std-ms has nothing to act on (it goes with --difference-ms)"),
-        (("--missed-at-most", "5%", "--unpaired"), "--unpaired has nothing to act on"),
-        (("--missed-at-most", "5%", "--group", "stiff"), "--group has nothing to act on (it goes with --from)"),
-        (("--missed-at-most", "5%", "--detectors", "gm"), "--detectors has nothing to act on"),
-        (("--missed-at-most", "5%", "--from", "r.json"), "--from has nothing to act on"),
-        (("--difference-ms", 5, "--std-ms", 8, "--allowed", 2), "--allowed has nothing to act on"),
-        (("--missed-at-most", "5"), "missed share is '5' (write 5% or 0.05"),
+        (("--difference-ms", 5, "--std-ms", 8, "--from", "r.json"), "--std-ms and --from cannot be combined"),
+        (("--std-ms", 8), "--std-ms has no effect (use it with --difference-ms)"),
+        (("--missed-at-most", "5%", "--unpaired"), "--unpaired has no effect"),
+        (("--missed-at-most", "5%", "--group", "stiff"), "--group has no effect (use it with --from)"),
+        (("--missed-at-most", "5%", "--detectors", "gm"), "--detectors has no effect"),
+        (("--missed-at-most", "5%", "--from", "r.json"), "--from has no effect"),
+        (("--difference-ms", 5, "--std-ms", 8, "--allowed", 2), "--allowed has no effect"),
+        (("--missed-at-most", "5"), "missed share is '5' (give 5% or 0.05"),
         (("--missed-at-most", "five"), "missed share is 'five'"),
         (("--missed-at-most", "5%x"), "missed share is '5%x'"),
         (("--false-alarms-at-most", "often"), "false-alarm budget is 'often'"),
         (("--difference-ms", 5, "--from", "absent.json"), "absent.json: no such file"),
-        (("--difference-ms", 5, "--from", "results.json"), "0 detectors are named (name two detectors of momentum"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are named"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are named"),
-        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"), "no detector 'ptt'"),
+        (("--difference-ms", 5, "--from", "results.json"), "0 detectors are given (give two detectors of momentum"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are given"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are given"),
+        (
+            ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"),
+            "detector 'ptt' is not in the results",
+        ),
         (
             ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,pt", "--group", "stif"),
-            "no contacts in a group 'stif' (did you mean stiff?",
+            "group 'stif' has no contacts (did you mean stiff?",
         ),
     ],
 )
-def test_what_is_not_complete_ends_with_2_and_names_the_option(source, monkeypatch, arguments, message):
+def test_an_incomplete_question_exits_with_2_and_names_the_option(source, monkeypatch, arguments, message):
     monkeypatch.chdir(source.parent)
     done = cdtool("plan", *arguments)
     assert done.status == 2 and message in done.err and done.out == ""
 
 
-def test_a_spread_needs_two_recordings():
+def test_a_standard_deviation_requires_two_recordings():
     for outcomes in ([40.0], [MISSED] * 5):
-        with pytest.raises(UsageError, match="a standard deviation needs at least 2"):
+        with pytest.raises(UsageError, match="at least 2 are required"):
             measured_std(earlier(outcomes, outcomes), ["gm", "pt"])
 
 
-def test_a_group_has_to_be_named_where_there_are_several():
+def test_a_group_is_required_if_there_are_several():
     results = build({(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")})
-    with pytest.raises(UsageError, match=r"no group is named \(known: soft, stiff\)"):
+    with pytest.raises(UsageError, match=r"no group is given \(known: soft, stiff\)"):
         measured_std(results, ["gm", "pt"])
 
 
@@ -205,21 +208,21 @@ def test_only_the_contacts_of_the_group_named_count():
     }
 
 
-def test_whole_numbers_have_all_their_digits():
+def test_integers_are_shown_with_all_digits():
     done = cdtool("plan", "--false-alarms-at-most", "1/1000000op")
     assert "a budget of 1/1000000op false alarms" in done.out and "1000000 impact-free operations" in done.out
     assert "2995733 others" in done.out and "e+" not in done.out
     assert "e+" not in cdtool("plan", "--missed-at-most", "0.000001").out
 
 
-def test_one_operation_is_no_plural():
+def test_one_operation_is_singular():
     done = cdtool("plan", "--false-alarms-at-most", "1/op")
     assert "1 impact-free operation to learn from" in done.out
     assert "1 impact-free hour to learn from" in cdtool("plan", "--false-alarms-at-most", "1/h").out
 
 
 @pytest.mark.parametrize("command", ["plan", "compare"])
-def test_a_level_that_no_computer_number_tells_from_0_is_refused(source, command):
+def test_a_level_indistinguishable_from_0_is_refused(source, command):
     asked = ("--missed-at-most", "5%") if command == "plan" else (source, source)
     done = cdtool(command, *asked, "--level", "1e-300")
     assert done.status == 2 and "significance level is 1e-300" in done.err and "0.000000001" in done.err

@@ -18,7 +18,7 @@ from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 OF_THE_LOG = ("recording", "group", "detector")
-# What else may make numbers, all of it away from its default.
+# Other settings that affect numbers, all different from their defaults.
 SETTINGS = """
 joints = {joints}
 operations = "motion"
@@ -42,12 +42,12 @@ mass_before_cell_kg = {mass}
 
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
-    """Each command learns the threshold anew; here it is learned once for a file and a detector."""
+    """Learn the threshold once per file and detector instead of in each command."""
     monkeypatch.setattr(prepared_detector, "prepare_benchmark", cache(prepared_detector.prepare_benchmark))
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
-    """A copy of a sample's benchmark in which everything that makes numbers is other than the default."""
+    """Return a copy of a sample's benchmark in which every setting that affects numbers differs from its default."""
     base = SAMPLES / sample
     values = tomllib.loads((base / "benchmark.toml").read_text(encoding="utf-8"))
     gate = sample == "gate"
@@ -73,7 +73,7 @@ def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
 
 
 def rows_of(values: Any) -> dict[tuple[str, int], dict[str, Any]]:
-    """Contact rows by log and number, without what only a benchmark says of them."""
+    """Contact rows by log and number, without the fields that only a benchmark has."""
     found = {}
     for row in values:
         log = str(row.get("recording") or row["operation"].partition("#")[0])
@@ -129,12 +129,12 @@ def test_of_every_impact_of_the_sample_logs(sample, detector):
 
 
 @pytest.mark.parametrize(("sample", "detector"), [("gate", "gm"), ("arm/trial_1", "igm")])
-def test_with_every_setting_that_makes_numbers_away_from_its_default(sample, detector, tmp_path):
+def test_with_every_relevant_setting_changed_from_its_default(sample, detector, tmp_path):
     assert check(benchmark_with_other_settings(tmp_path, sample), detector) >= 6
 
 
-def test_the_options_by_hand_give_the_figures_of_the_file(tmp_path):
-    """As `detect` did with 80 ms beside 81 ms: the same levels, the same limit, the same latency."""
+def test_individual_options_give_the_results_of_the_file(tmp_path):
+    """The results of `detect` with individual options and with the file are the same: levels, limit, latency."""
     log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
     file = tmp_path / "benchmark.toml"
     file.write_text(
@@ -170,14 +170,16 @@ def test_the_options_by_hand_give_the_figures_of_the_file(tmp_path):
         ("--mass-before-cell", 0),
     ],
 )
-def test_a_setting_beside_the_benchmark_file_is_refused(command, option):
+def test_a_setting_together_with_the_benchmark_file_is_refused(command, option):
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
     assert done.status == 2
-    assert done.err.startswith(f"error: {'--latch' if option[0] == '--no-latch' else option[0]} is given together with")
+    assert done.err.startswith(
+        f"error: {'--latch' if option[0] == '--no-latch' else option[0]} cannot be combined with"
+    )
 
 
-def test_a_detector_has_to_be_named_where_the_file_names_several():
+def test_a_detector_is_required_if_the_file_has_several():
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
     assert done.status == 2 and "names 5 detectors (give --detector, one of pure_inertia" in done.err
@@ -187,7 +189,7 @@ def test_a_detector_has_to_be_named_where_the_file_names_several():
     assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
 
 
-def test_a_signature_of_all_joints_fits_a_benchmark_file_that_names_none(tmp_path):
+def test_a_signature_of_all_joints_fits_a_benchmark_file_without_joints(tmp_path):
     gate = Path(__file__).parents[2] / "sample_logs" / "gate"
     logs = sorted((gate / "free").iterdir())
     made = cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", tmp_path / "s.json")
@@ -196,13 +198,13 @@ def test_a_signature_of_all_joints_fits_a_benchmark_file_that_names_none(tmp_pat
     assert done.status == 0 and "alarm" in done.out, done.err
 
 
-def test_detect_and_explain_count_the_runs_learned_from_alike_and_name_those_left_out(tmp_path):
+def test_detect_and_explain_count_the_same_runs_and_name_those_left_out(tmp_path):
     gate = Path(__file__).parents[2] / "sample_logs" / "gate"
     shutil.copy(gate / "machine.toml", tmp_path)
     (tmp_path / "free").mkdir()
     for i in range(3, 8):
         shutil.copy(gate / "free" / f"0{i}.csv", tmp_path / "free")
-    # A stray run at half the speed, and a copy of another: neither is learned from.
+    # A stray run at half the speed and a copy of another run: neither is learned from.
     lines = (gate / "free" / "08.csv").read_text(encoding="utf-8").splitlines()
     rows = [line.split(",") for line in lines]
     slow = [rows[0], *([str(2 * int(row[0])), row[1], str(0.5 * float(row[2])), *row[3:]] for row in rows[1:])]

@@ -1,4 +1,4 @@
-"""`cdtool score`: triggers of any program get the figures that a detector's alarms would get, and nothing is silent."""
+"""`cdtool score`: external triggers get the same results as a detector's alarms, and problems are reported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUIET = "holdout/01.csv,,plc,\nholdout/02.csv,,plc,\n"
 
 @pytest.fixture(scope="module")
 def logs(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder's logs with a benchmark file that has nothing to learn from."""
+    """The folder's logs with a benchmark file without logs to learn from."""
     folder = tmp_path_factory.mktemp("score")
     for name in ("stiff", "soft", "holdout", "free", "machine.toml"):
         (folder / name).symlink_to(gate_folder / name)
@@ -37,7 +37,7 @@ def write_benchmark(folder: Path, more: str = "", name: str = "benchmark.toml") 
 
 @pytest.fixture(scope="module")
 def measured(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What the benchmark finds with two detectors."""
+    """The benchmark's results with two detectors."""
     path = tmp_path_factory.mktemp("measured") / "results.json"
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--detectors", "feekf,pi", "-o", path)
     assert done.status == 0, done.err
@@ -62,12 +62,12 @@ def onsets(measured: dict[str, Any]) -> dict[str, float]:
 
 
 def after(measured: dict[str, Any], seconds: float) -> str:
-    """A row for each contact: an alarm that long after its onset; and none in the hold-out."""
+    """Return a row per contact, with an alarm at that time after its onset; no rows for the hold-out."""
     rows = [f"{name},{onset + seconds!r},plc,\n" for name, onset in onsets(measured).items()]
     return "".join(rows) + QUIET
 
 
-def test_the_alarms_of_a_benchmark_get_the_same_figures_again(logs, measured):
+def test_the_alarms_of_a_benchmark_get_the_same_results_again(logs, measured):
     contacts = measured["contacts"]
     rows = "".join(f"{row['recording']},{row['alarm_s']!r},{row['detector']},\n" for row in contacts)
     quiet = QUIET.replace("plc", "friction_ekf") + QUIET.replace("plc", "pure_inertia")
@@ -83,7 +83,7 @@ def test_the_alarms_of_a_benchmark_get_the_same_figures_again(logs, measured):
     assert values["provenance"]["trigger_clock"] == "recording" and len(values["provenance"]["triggers_sha256"]) == 64
 
 
-def test_the_latency_is_the_trigger_less_the_onset_and_the_table_shows_it(logs, measured):
+def test_the_latency_is_trigger_minus_onset_and_shown_in_the_table(logs, measured):
     done = score(logs, after(measured, 0.05))
     assert done.status == 0 and done.err == ""
     (row,) = [line.split() for line in done.out.splitlines() if line.startswith("stiff ")]
@@ -108,10 +108,10 @@ def test_a_late_alarm_and_none_are_missed_contacts_at_the_end_of_the_window(logs
     assert outcomes["stiff/01.csv"] == outcomes["stiff/02.csv"] == outcomes["soft/02.csv"] == ("missed", None)
     assert outcomes["soft/01.csv"] == ("detected", pytest.approx(200.0))
     assert all(row["watched_ms"] == pytest.approx(1000.0, abs=300.0) for row in values["contacts"])
-    assert "plc: 1 of 6 recordings without a row: taken as watched without an alarm; first soft/02.csv" in err
+    assert "plc: 1 of 6 recordings without a row: counted as monitored without an alarm; first soft/02.csv" in err
 
 
-def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_exposure(logs, measured):
+def test_an_unassessable_section_over_a_contact_shortens_the_exposure(logs, measured):
     onset = onsets(measured)["stiff/01.csv"]
     others = after(measured, 0.05).replace(f"stiff/01.csv,{onset + 0.05!r},plc,\n", "")
     values, _ = scored(logs, f"stiff/01.csv,{onset - 0.5},plc,{onset + 1.5}\n" + others)
@@ -124,11 +124,11 @@ def test_a_blind_stretch_over_a_contact_is_not_assessable_and_shortens_the_expos
     assert next(row for row in part["contacts"] if row["recording"] == "stiff/01.csv")["outcome"] == "missed"
 
 
-def test_a_recording_that_is_blind_all_over_is_not_assessable_with_a_reason(logs, measured):
+def test_a_recording_without_assessable_time_is_not_assessable_with_a_reason(logs, measured):
     rows = "stiff/01.csv,0,plc,100\nstiff/02.csv,0,plc,100\n"
     values, _ = scored(logs, rows, "--listed-only", status=3)
     assert {row["outcome"] for row in values["contacts"]} == {"not_assessable"}
-    assert {row["reason"] for row in values["contacts"]} == {"the trigger file says so"}
+    assert {row["reason"] for row in values["contacts"]} == {"stated in the trigger file"}
 
 
 def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
@@ -148,7 +148,7 @@ def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
 
 
 def epoch_folder(folder: Path, logs: Path) -> float:
-    """Logs whose time column counts from 1970; gives the first stamp of stiff/01.csv [s]."""
+    """Logs with a time column since 1970; returns the first stamp of stiff/01.csv [s]."""
     (folder / "machine.toml").symlink_to(logs / "machine.toml")
     for name in ("stiff/01.csv", "soft/01.csv", "holdout/01.csv"):
         with (logs / name).open(encoding="utf-8", newline="") as stream:
@@ -160,7 +160,7 @@ def epoch_folder(folder: Path, logs: Path) -> float:
     return 1.7e9
 
 
-def test_triggers_on_the_source_clock_are_moved_and_on_the_wrong_clock_are_told(logs, measured, tmp_path):
+def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reported(logs, measured, tmp_path):
     origin = epoch_folder(tmp_path, logs)
     at = onsets(measured)
     times = {name: origin + at[name] + 0.045 for name in ("stiff/01.csv", "soft/01.csv")}
@@ -170,14 +170,14 @@ def test_triggers_on_the_source_clock_are_moved_and_on_the_wrong_clock_are_told(
     assert values["provenance"]["trigger_clock"] == "source"
     wrong, err = scored(tmp_path, rows, status=3)
     assert {row["outcome"] for row in wrong["contacts"]} == {"missed"}
-    assert "1 of 1 row in no operation" in err and "try --clock source" in err
+    assert "1 of 1 row outside all operations" in err and "try --clock source" in err
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
 def test_rows_of_recordings_that_are_not_scored_are_named_and_the_status_is_3(logs, measured):
     done = score(logs, after(measured, 0.05) + "stiff/99.csv,1.0,plc,\nfree/01.csv,2.0,plc,\n")
     assert done.status == 3
-    assert "left out: stiff/99.csv: the benchmark file does not score it" in done.err
+    assert "left out: stiff/99.csv: not scored by the benchmark file" in done.err
     assert "left out: free/01.csv" in done.err and "2 items were left out" in done.err
 
 
@@ -193,7 +193,7 @@ def test_a_file_name_that_fits_two_recordings_is_refused(logs, measured):
         ("recording,time\n", "stiff/01.csv,1\n", ("triggers.csv line 1", "'time'", "time_s")),
         ("recording,time_s\n", "stiff/01.csv,6,05\n", ("triggers.csv line 2", "3 cells")),
         ("recording,time_s\n", "stiff/01.csv,late\n", ("triggers.csv line 2", "'late'")),
-        ("recording,time_s\n", "", ("triggers.csv", "holds no row")),
+        ("recording,time_s\n", "", ("triggers.csv", "contains no row")),
     ],
 )
 def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
@@ -202,7 +202,7 @@ def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
     assert all(word in done.err for word in words), done.err
 
 
-def test_nothing_that_could_be_scored_is_never_0(logs, tmp_path):
+def test_nothing_to_score_never_exits_with_0(logs, tmp_path):
     done = score(logs, "stiff/99.csv,1.0,plc,\n", "--listed-only")
     assert done.status == 2 and "no recording could be scored" in done.err and "stiff/99.csv" in done.err
     missing = cdtool("score", tmp_path / "none.csv", "-b", logs / "benchmark.toml")
@@ -222,7 +222,7 @@ def test_a_log_of_nothing_but_the_load_cell_can_be_scored(logs, measured, tmp_pa
     assert [item["latency_ms"] for item in values["contacts"]] == [pytest.approx(30.0)]
 
 
-def test_limits_hold_for_whoever_triggers(logs, measured, tmp_path):
+def test_limits_apply_to_external_triggers(logs, measured, tmp_path):
     (tmp_path / "limits").mkdir()
     folder = tmp_path / "limits"
     for name in ("stiff", "soft", "holdout", "machine.toml"):
@@ -246,7 +246,7 @@ def test_the_example_gives_the_lines_of_its_page():
 
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measured, kind, tmp_path):
-    name = HOSTILE[kind].replace("\ud800", "").strip() or "x"  # no file in UTF-8 holds a surrogate
+    name = HOSTILE[kind].replace("\ud800", "").strip() or "x"  # UTF-8 files cannot contain a surrogate
     path = tmp_path / "triggers.csv"
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)
@@ -267,7 +267,7 @@ def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measu
     )
 
 
-def test_triggers_were_held_against_no_threshold_and_have_no_value_and_no_limit(logs, measured, tmp_path):
+def test_triggers_have_no_threshold_value_or_limit(logs, measured, tmp_path):
     report = tmp_path / "score.html"
     values, _ = scored(logs, after(measured, 0.05) + "holdout/01.csv,2.0,plc,\n", "-o", report)
     rows = [*values["contacts"], *values["false_alarms"]]

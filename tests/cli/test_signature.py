@@ -1,4 +1,4 @@
-"""`cdtool signature show|check|update` on a simulated gate: coverage, a season that drifts, and what is not learned."""
+"""`cdtool signature show|check|update` on a simulated gate: coverage, a drifting season, and refused runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.command import Outcome, cdtool
 
 @pytest.fixture(scope="module")
 def seasons(tmp_path_factory) -> Path:
-    """30 runs each: nothing changes, friction grows by half, an obstruction grows at 0.9 m."""
+    """30 runs each: no change, friction increased by half, an obstruction growing at 0.9 m."""
     folder = tmp_path_factory.mktemp("seasons")
     changes = {"quiet": (), "friction": ("--friction-change", 0.5), "stone": ("--obstruction-growth", 8)}
     for name, change in changes.items():
@@ -36,7 +36,7 @@ def check(signature: Path, gate_folder: Path, *arguments: object) -> Outcome:
     return cdtool("signature", "check", signature, *arguments, "-m", gate_folder / "machine.toml")
 
 
-def test_show_tells_what_the_file_holds(signature, tmp_path):
+def test_show_lists_the_content_of_the_file(signature, tmp_path):
     done = cdtool("signature", "show", signature, "--plot", tmp_path / "s.png")
     assert done.status == 0, done.err
     for words in ("friction_ekf", "safety factor 5.5 by default", "debounce 9 ms", "forward at 0.201 m/s", "11"):
@@ -57,13 +57,13 @@ def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
     done = cdtool("signature", "show", path)
     assert done.status == 0 and "threshold: cusum, safety factor 15 by default" in done.out
     refused = cdtool("signature", "update", path, *free, "-m", gate_folder / "machine.toml")
-    assert refused.status == 2 and "holds the threshold cusum, no signature" in refused.err
+    assert refused.status == 2 and "contains the threshold cusum, not a signature" in refused.err
 
 
-def test_runs_that_were_learned_from_are_judged_by_the_others(signature, gate_folder):
+def test_runs_learned_from_are_checked_against_the_others(signature, gate_folder):
     done = check(signature, gate_folder, *logs_of(gate_folder))
     assert done.status == 0, done.err
-    assert "11 runs, each judged by a signature of the others: 0 alarms" in done.out and "advice: " in done.out
+    assert "11 runs, each checked against a signature of the others: 0 alarms" in done.out and "advice: " in done.out
     values = json.loads(check(signature, gate_folder, *logs_of(gate_folder), "--json").out)
     coverage = values["classes"][0]["coverage"]
     assert len(coverage["runs"]) == 11 and 0.0 < coverage["chance"] < 0.2
@@ -80,7 +80,7 @@ def test_a_stricter_target_needs_more_runs(signature, gate_folder):
     assert needed == sorted(needed) and needed[0] < needed[-1]
 
 
-def test_a_quiet_season_shows_no_drift_and_another_says_what_and_where(signature, gate_folder, seasons, tmp_path):
+def test_a_steady_season_shows_no_drift_and_another_shows_what_and_where(signature, gate_folder, seasons, tmp_path):
     quiet = check(signature, gate_folder, *logs_of(seasons / "quiet"))
     assert quiet.status == 0 and "no drift shown" in quiet.out, quiet.out + quiet.err
     picture = tmp_path / "drift.png"
@@ -90,11 +90,11 @@ def test_a_quiet_season_shows_no_drift_and_another_says_what_and_where(signature
     assert "no drift shown" not in stone.out and "inspect" in stone.out, stone.out
 
 
-def test_an_update_adds_what_is_free_and_refuses_impacts_and_repeats(signature, gate_folder, feekf_signature):
+def test_an_update_adds_impact_free_runs_and_refuses_impacts_and_repeats(signature, gate_folder, feekf_signature):
     logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv", gate_folder / "free" / "01.csv"]
     done = cdtool("signature", "update", signature, *logs, "-m", gate_folder / "machine.toml")
     assert done.status == 3 and "1 run added" in done.out
-    assert "not an impact-free run" in done.err and "in the signature already" in done.err
+    assert "not an impact-free run" in done.err and "already in the signature" in done.err
     before, after = json.loads(feekf_signature.read_text()), json.loads(signature.read_text())
     assert len(after["runs"]) == 12 and after["first"] == before["first"] and after["current"] != before["current"]
 
@@ -142,7 +142,7 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
     twin = tmp_path / "twin.csv"
     twin.write_bytes(free[2].read_bytes())
     done = cdtool("learn-signature", *free, twin, *machine, "-d", "gm", "-o", tmp_path / "s2.json")
-    assert done.status == 3 and "twin.csv: holds the same bytes as" in done.err
+    assert done.status == 3 and "twin.csv: has the same content as" in done.err
     assert len(json.loads((tmp_path / "s2.json").read_text())["runs"]) == len(free)
     once, twice = (
         json.loads(check(signature, gate_folder, *logs, "--json").out)["classes"][0]["coverage"]
@@ -151,11 +151,11 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
     assert once == twice
 
 
-def test_some_of_the_runs_learned_from_are_no_verdict_on_all(gate_folder, signature):
+def test_a_check_with_some_of_the_runs_is_reported(gate_folder, signature):
     done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
-    assert done.status == 3 and "given: only 4 of the 11 runs that it was learned from" in done.err
+    assert done.status == 3 and "only 4 of the 11 runs learned from are given" in done.err
     done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
-    assert done.status == 2 and "at least 3 are needed" in done.err and "advice: nothing was assessable" in done.out
+    assert done.status == 2 and "at least 3 are required" in done.err and "advice: nothing was assessable" in done.out
 
 
 def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
@@ -163,20 +163,20 @@ def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
     learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--operations", "motion", "-o", path)
     assert cdtool(*learn).status == 0
     again = cdtool("signature", "update", path, *logs_of(gate_folder), *machine)
-    assert again.status == 2 and "in the signature already" in again.err
+    assert again.status == 2 and "already in the signature" in again.err
     other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--operations", "whole")
     assert other.status == 2 and "learned from logs cut by 'motion', not by 'whole'" in other.err
 
 
-def test_what_a_budget_was_set_on_is_not_claimed_for_something_else(gate_folder, tmp_path):
+def test_the_origin_of_a_budget_is_dropped_when_the_factor_changes(gate_folder, tmp_path):
     path, machine = tmp_path / "b.json", ("-m", gate_folder / "machine.toml")
     learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--force", "-o", path)
     done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--debounce", 5)
     assert done.status == 0 and "set for 1/5op on 11 operations" in done.out, done.err
     log = gate_folder / "holdout" / "01.csv"
-    assert "another activation" not in cdtool("detect", log, *machine, "-s", path).out
+    assert "with an activation different" not in cdtool("detect", log, *machine, "-s", path).out
     assert (
-        "with another activation than that of the file"
+        "with an activation different from the file's"
         in cdtool("detect", log, *machine, "-s", path, "--debounce", 1).out
     )
     updated = cdtool("signature", "update", path, log, *machine)
@@ -184,7 +184,7 @@ def test_what_a_budget_was_set_on_is_not_claimed_for_something_else(gate_folder,
     assert ("before 1 more run" in shown) == (updated.status == 0)
 
 
-def test_hand_set_limits_leave_no_room_for_a_factor_and_need_no_runs(gate_folder, tmp_path):
+def test_limits_set_by_hand_exclude_a_factor_and_need_no_runs(gate_folder, tmp_path):
     (log, *_), machine = logs_of(gate_folder), ("-m", gate_folder / "machine.toml")
     learn = (
         "learn-signature",
@@ -200,6 +200,6 @@ def test_hand_set_limits_leave_no_room_for_a_factor_and_need_no_runs(gate_folder
         tmp_path / "l.json",
     )
     done = cdtool(*learn)
-    assert done.status == 0 and "limit 400 N set by hand" in done.out and "less sure" not in done.err
+    assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
     refused = cdtool(*learn, "-k", 3)
-    assert refused.status == 2 and "beside limits set by hand" in refused.err
+    assert refused.status == 2 and "cannot be combined with limits set by hand" in refused.err

@@ -1,4 +1,4 @@
-"""The benchmark.toml that `cdtool simulate` writes is one that `cdtool benchmark` runs; else there is none, and why."""
+"""`cdtool simulate` writes a benchmark.toml that `cdtool benchmark` can run, or states why it does not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _simulated(folder, free, holdout, stiff, machine="gate"):
 
 
 @pytest.mark.parametrize("counts", [(2, 0, 1), (2, 1, 0), (10, 0, 1), (2, 0, 1, "arm")])
-def test_what_is_written_can_be_run(tmp_path, counts):
+def test_the_written_benchmark_runs(tmp_path, counts):
     assert "benchmark.toml" in _simulated(tmp_path / "gate", *counts).splitlines()[0]
     done = cdtool("benchmark", tmp_path / "gate" / "benchmark.toml", "--detectors", "pt")
     assert done.status == 0, done.err
@@ -26,7 +26,7 @@ def test_what_is_written_can_be_run(tmp_path, counts):
 @pytest.mark.parametrize(
     ("counts", "why"), [((0, 1, 1), "--free"), ((1, 0, 1), "--free"), ((2, 0, 0), "--holdout, --stiff or --soft")]
 )
-def test_what_cannot_be_run_is_not_written_and_the_reason_is_said(tmp_path, counts, why):
+def test_an_unusable_benchmark_is_not_written_and_the_reason_is_shown(tmp_path, counts, why):
     shown = _simulated(tmp_path / "gate", *counts).splitlines()
     assert not (tmp_path / "gate" / "benchmark.toml").exists()
     assert len(shown) == 2 and shown[1].startswith("no benchmark.toml: ") and shown[1].endswith(why)

@@ -1,4 +1,4 @@
-"""`cdtool study`: the sensors of a machine ranked, and the thesis's figures drawn anew."""
+"""`cdtool study`: ranking of a machine's sensors, and the thesis's figures."""
 
 from __future__ import annotations
 
@@ -64,28 +64,28 @@ def test_the_table_says_what_was_assumed_and_what_limits():
         "limited by",
         "half the noise:",
         "assumed: impact.speed = 0.2 m/s",
-        "assumed: drive.stiffness = 2.448e+06 N/m: the load swings at 10 Hz",
+        "assumed: drive.stiffness = 2.448e+06 N/m: the load oscillates at 10 Hz",
         "assumed: sensors.encoder.counts_per_turn = 4096: 12 bit",
-        "without the machine's own scatter",
+        "without the machine's own variation",
     ):
         assert words in done.out, words
     given = cdtool("study", "sensors", "-m", GATE, "--speed", 0.2, "--drive-stiffness", 2e6).out
     assert "assumed: impact.speed" not in given and "assumed: drive.stiffness" not in given
 
 
-def test_a_stiffer_drive_shows_the_impact_sooner_on_the_motor_and_an_option_wins_over_the_file():
+def test_a_stiffer_drive_shows_the_impact_earlier_and_an_option_overrides_the_file():
     soft, stiff = (ranked("-m", GATE, "--study", STUDY, "--drive-stiffness", k) for k in (8e4, 8e6))
     assert stiff["motor_speed"]["time_ms"] < 0.7 * soft["motor_speed"]["time_ms"]
     assert soft == ranked("-m", GATE, "--study", STUDY)
 
 
-def test_a_larger_k_never_sees_sooner():
+def test_a_larger_k_never_detects_earlier():
     low, high = (ranked("-m", GATE, "--k", k) for k in (3, 8))
     assert all(low[name]["time_ms"] <= high[name]["time_ms"] for name in ORDER)
     assert low["motor_torque"]["time_ms"] < high["motor_torque"]["time_ms"]
 
 
-def test_a_rotary_axis_is_taken_at_the_lever_of_its_contact(barrier, tmp_path):
+def test_a_rotary_axis_is_referred_to_the_lever_of_its_contact(barrier, tmp_path):
     found = ranked("-m", barrier, "--lever", 2.0, "--speed", 0.5)
     assert set(found) == set(ORDER)
     # 12 kg m2 and 0.0005 / 0.01^2 = 5 kg m2 at 2 m: the same as 3 kg and 1.25 kg on a slide with r = 0.02 m/rad.
@@ -124,7 +124,7 @@ def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
     # The forearm of the simulated arm: M22 without its motor, hit 0.3 m from the elbow, is that rotary axis.
     done = cdtool("study", "sensors", "-m", ARM, "--joint", "forearm", "--lever", 0.3)
     assert done.status == 0
-    assert "the other joints stand: 0.06984 kg m2 at forearm, without its motor" in done.out
+    assert "the other joints are at rest: 0.06984 kg m2 at forearm, without its motor" in done.out
     alone = tmp_path / "forearm.toml"
     alone.write_text(
         '[machine]\ntype = "rotary_axis"\nmotor_inertia = 1.5e-5\nload_inertia = 0.06984\n'
@@ -146,7 +146,7 @@ def test_a_derivative_part_and_a_force_limit_of_the_controller_count(tmp_path):
     torque = {name: one["sensors"][-1] for name, one in (("plain", plain), ("quick", quick), ("held", held))}
     assert {one["sensor"] for one in torque.values()} == {"motor_torque"}
     assert torque["quick"]["time_ms"] < torque["plain"]["time_ms"] == pytest.approx(torque["held"]["time_ms"])
-    # Without a limit the controller presses ever harder; with it the load's own swing is the worst.
+    # Without a limit the controller force keeps growing; with it the load's own oscillation is the largest.
     assert plain["peak_time_ms"] > 400.0 and held["peak_time_ms"] < 100.0
     assert held["peak_force_n"] < 0.85 * plain["peak_force_n"]
 
@@ -169,7 +169,7 @@ def test_a_figure_is_drawn(tmp_path):
     assert "load_cell" in path.read_text(encoding="utf-8")
 
 
-def test_the_figures_of_the_thesis_are_drawn_anew(tmp_path):
+def test_the_figures_of_the_thesis_are_drawn_again(tmp_path):
     done = cdtool("study", "figures", "-o", tmp_path / "new")
     assert (done.status, done.err) == (0, "")
     written = [Path(line) for line in done.out.splitlines()]
@@ -192,12 +192,12 @@ def test_the_figures_of_the_thesis_are_drawn_anew(tmp_path):
         (("--study", "absent.toml"), "absent.toml: no such file"),
         (("--study", "wrong.toml"), "wrong.toml: sensors.encoder.counts: unknown key (did you mean counts_per_turn?"),
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
-        (("--study", "limit.toml"), "controller.force_limit is 5 N, steady motion takes 30 N"),
+        (("--study", "limit.toml"), "controller.force_limit is 5 N, but steady motion requires 30 N"),
         (("--study", "negative.toml"), "negative.toml: sensors.load_cell.noise: is -1"),
-        (("-o", "ranking.txt"), "ranking.txt is no name for a figure"),
+        (("-o", "ranking.txt"), "--output is 'ranking.txt'"),
     ],
 )
-def test_what_cannot_be_used_ends_with_2_and_one_line(tmp_path, monkeypatch, arguments, message):
+def test_invalid_input_exits_with_2_and_one_line(tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.toml").write_text("[sensors.encoder]\ncounts = 10\n", encoding="utf-8")
     (tmp_path / "kind.toml").write_text("impact = 3\n", encoding="utf-8")
@@ -208,7 +208,7 @@ def test_what_cannot_be_used_ends_with_2_and_one_line(tmp_path, monkeypatch, arg
     assert message in done.err and done.err.count("\n") == 1
 
 
-def test_a_machine_without_what_a_study_needs_is_refused(tmp_path):
+def test_a_machine_without_inertias_is_refused(tmp_path):
     bare = tmp_path / "bare.toml"
     bare.write_text(BARRIER.format(motor=0.0), encoding="utf-8")
     done = cdtool("study", "sensors", "-m", bare)
@@ -216,14 +216,14 @@ def test_a_machine_without_what_a_study_needs_is_refused(tmp_path):
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--joint", "elbow")
     assert done.status == 2 and "coordinates = 'motor' with motor_inertia" in done.err
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "scara.toml")
-    assert done.status == 2 and "have to turn all or slide all" in done.err
+    assert done.status == 2 and "must all rotate or all slide" in done.err
     done = cdtool("study", "sensors", "-m", ARM)
-    assert done.status == 2 and "2 joints (name one with --joint: arm, forearm)" in done.err
+    assert done.status == 2 and "2 joints (select one with --joint: arm, forearm)" in done.err
     done = cdtool("study", "sensors", "-m", ARM, "--joint", "arm")
     assert done.status == 2 and "no lever is given" in done.err
 
 
-def test_one_of_several_joints_has_to_be_named(tmp_path):
+def test_a_joint_is_required_if_there_are_several(tmp_path):
     gantry = tmp_path / "gantry.toml"
     gantry.write_text(
         '[machine]\ntype = "linear_axis"\njoints = ["x", "y"]\nmotor_inertia = [0.001, 0.001]\n'
@@ -231,7 +231,7 @@ def test_one_of_several_joints_has_to_be_named(tmp_path):
         encoding="utf-8",
     )
     done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (name one with --joint: x, y)" in done.err
+    assert done.status == 2 and "2 joints (select one with --joint: x, y)" in done.err
     assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
 
 
@@ -248,7 +248,7 @@ def test_the_page_shows_what_the_commands_print(monkeypatch, tmp_path):
         assert [line.rstrip() for line in shown[:-1]] == printed[: len(shown) - 1]
 
 
-def test_the_page_names_every_key_with_which_the_study_can_be_told():
+def test_the_page_names_every_key_of_a_study():
     page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
     assumed = cdtool("study", "sensors", "-m", GATE).out.split("assumed: ")[1:]
     assert len(assumed) > 25
@@ -257,7 +257,7 @@ def test_the_page_names_every_key_with_which_the_study_can_be_told():
         assert f"`{key}`" in page or f"`{key.rpartition('.')[2]}`" in page, key
 
 
-def test_the_order_of_the_thesis_is_no_law(tmp_path):
+def test_the_order_of_the_thesis_does_not_always_hold(tmp_path):
     stiff = tmp_path / "stiff.toml"
     stiff.write_text(
         "[drive]\nstiffness = 5e7\n[controller]\nproportional = 3e4\nintegral = 1e5\n"

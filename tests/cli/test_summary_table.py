@@ -1,4 +1,4 @@
-"""The table of a benchmark on screen: below ten contacts median and range, from ten on the mean with its interval."""
+"""The table of a benchmark on screen: median and range below ten contacts, else the mean with its interval."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def test_six_contacts_show_the_interval_of_the_median_that_holds(capsys):
     assert "stiff momentum 27.5 (25 to 60) 25 to 60 6 0 0 0 4" in lines
 
 
-def test_a_missed_contact_is_later_than_the_range(capsys):
+def test_a_missed_contact_counts_as_later_than_the_range(capsys):
     lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, None], "direct": [None, None]})
     assert "stiff momentum 27.5 25 to not reached 3 1 0 0 4" in lines
     assert "stiff direct not reached not reached 0 2 0 0 4" in lines
 
 
-def test_ten_contacts_show_the_mean_with_its_interval_beside_a_row_of_few(capsys):
+def test_ten_contacts_show_the_mean_with_its_interval_next_to_a_small_group(capsys):
     lines = shown(capsys, {"momentum": [25.0 + i for i in range(10)], "direct": [25.0, 27.0]})
     many = next(line for line in lines if line.startswith("stiff momentum"))
     assert many.startswith("stiff momentum 29.5 (") and "25 to 34" in many

@@ -1,6 +1,6 @@
-"""No command imports pandas: it is installed for what comes later, and would double the start of each command.
+"""No command imports pandas, which would double the start-up time of each command.
 
-Reading Parquet and Feather is left out: pyarrow imports it by itself there.
+Reading Parquet and Feather is excluded: pyarrow imports it there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from cdtool.cli.app import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-# Runs every command and prints, as JSON, each with its status and whether pandas has been imported by then.
+# Run every command and print, as JSON, its status and whether pandas was imported by then.
 CHILD = """
 import json, sys
 from pathlib import Path
@@ -55,4 +55,4 @@ def test_no_command_imports_pandas(tmp_path):
     ran = json.loads(done.stdout.splitlines()[-1])
     assert not [name for name, _, imported in ran if imported]
     assert {name for name, status, _ in ran if status not in (0, 1, 3)} == set()
-    assert set(COMMANDS) <= {name.split()[0] for name, _, _ in ran}  # a new command belongs into the list above
+    assert set(COMMANDS) <= {name.split()[0] for name, _, _ in ran}  # add a new command to the list above

@@ -1,4 +1,4 @@
-"""A file of another kind than a command needs is named as what it is, and what is wrong in a file is said in words."""
+"""A file of the wrong kind is named by its kind, and errors in a file are described in plain words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tests.command import cdtool
 
-# What only Python calls so.
+# Terms that only Python uses.
 PYTHON = re.compile(
     r"[A-Z][a-z]+Error|NoneType|\bNone\b|\bTrue\b|\bFalse\b|[({\[]'|\w+\(\w+=|object is|argument|iterable"
 )
@@ -51,7 +51,7 @@ WORDS = {
         *(("info", "recording", given) for given in ("signature", "results")),
     ],
 )
-def test_a_file_of_another_kind_is_named_as_what_it_is(files, command, needed, given):
+def test_a_file_of_another_kind_is_named_by_its_kind(files, command, needed, given):
     file = files[given]
     arguments: dict[str, tuple[object, ...]] = {
         "report": ("report", file),
@@ -99,7 +99,7 @@ def _changed(values: dict[str, object], path: tuple[str | int, ...], value: obje
     ],
 )
 @pytest.mark.parametrize("value", [True, -1.0, 1e300, [1, "a"], {"a": 1}], ids=str)
-def test_what_is_wrong_in_a_signature_file_is_said_in_words(files, tmp_path, path, value):
+def test_errors_in_a_signature_file_are_in_plain_words(files, tmp_path, path, value):
     values = json.loads(files["signature"].read_text(encoding="utf-8"))
     wrong = tmp_path / "wrong.json"
     wrong.write_text(json.dumps(_changed(values, path, value)), encoding="utf-8")
@@ -110,7 +110,7 @@ def test_what_is_wrong_in_a_signature_file_is_said_in_words(files, tmp_path, pat
 
 @pytest.mark.parametrize("value", ["true", "[[1], 2]", "{ a = 1 }", "[{ a = 1 }]"])
 @pytest.mark.parametrize("key", ["machine", "detectors", "operations", "window_s", "learn", "onset"])
-def test_what_is_wrong_in_a_benchmark_file_is_said_in_words(gate_folder, tmp_path, key, value):
+def test_errors_in_a_benchmark_file_are_in_plain_words(gate_folder, tmp_path, key, value):
     wrong = tmp_path / "wrong.toml"
     keys = {"machine": f'"{gate_folder}/machine.toml"', "detectors": '["pt"]', key: value}
     wrong.write_text("\n".join(f"{name} = {text}" for name, text in keys.items()), encoding="utf-8")

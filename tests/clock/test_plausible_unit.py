@@ -73,7 +73,7 @@ def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
     path = log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0))
     done = cdtool("init", path, "-o", tmp_path / "drafted.toml")
     text = (tmp_path / "drafted.toml").read_text()
-    assert 'unit = "ms"' in text and "against its header, which says sec" in text + done.out + done.err
+    assert 'unit = "ms"' in text and "although its header states sec" in text + done.out + done.err
 
 
 @pytest.mark.parametrize(("step", "unit", "likely"), [(1e3, "s", "us"), (1e6, "s", "ns"), (1.0, "ns", "ms")])

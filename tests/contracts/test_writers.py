@@ -56,7 +56,7 @@ def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
     subject = WRITERS.load(name).subject
     for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
         path.write_bytes(b"written by hand")
-        with pytest.raises(UsageError, match="already exists and holds no"):
+        with pytest.raises(UsageError, match="already exists and contains no"):
             check_outputs([tmp_path / f"report{suffix}"], subject=subject)
         check_outputs([tmp_path / f"report{suffix}"], force=True, subject=subject)
         path.unlink()

@@ -1,4 +1,4 @@
-"""A detection with a statistic that a test chooses."""
+"""A detection with a statistic set by the test."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LIMIT = FittedLimit((0.0,), (0.0,), (1.0,), (1.0,), safety_factor=3.0)
 
 
 def detection(seed: int, factor: float = 3.0, activation: Activation = ACTIVATION) -> Detection:
-    """Coloured noise on two joints with contacts' steps, a gap and a stretch that is not applicable."""
+    """Coloured noise on two joints with steps for contacts, a gap and a section that is not applicable."""
     rng = np.random.default_rng(seed)
     noise = rng.normal(0.0, 0.2, (8100, 2)).cumsum(axis=0)
     values = noise[100:] - noise[:-100]

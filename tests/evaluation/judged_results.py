@@ -1,4 +1,4 @@
-"""Results with the outcomes that a test chooses."""
+"""Results with outcomes set by the test."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KEY = ("momentum", "stiff")
 
 
 def results(outcomes, verdicts=(), point=None, points=(), **more) -> Results:
-    """Contacts of one detector, and one force verdict a contact in the order given."""
+    """Contacts of one detector, and one force verdict per contact in the given order."""
     made = build({KEY: outcomes}, force_profiles={"stiff": PROFILE} if verdicts or points else {}, **more)
     return replace(
         made, forces=tuple(force(made, i, verdict, point) for i, verdict in enumerate(verdicts)), points=tuple(points)

@@ -21,7 +21,7 @@ def swept(
     hours: float = 0.1,
     not_assessable: int = 0,
 ) -> list[SweepResult]:
-    """A row a safety factor; each figure is a function of the multiple of the factor that is set."""
+    """Return a row per safety factor; each value is a function of the multiple of the set factor."""
     return [
         SweepResult(
             detector=detector,

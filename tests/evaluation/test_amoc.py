@@ -1,4 +1,4 @@
-"""Latency against false alarms: rates with their exposure, the factor in use, and what was not reached."""
+"""Latency against false alarms: rates with their exposure, the factor in use, and quantities not reached."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def of(*rows, **provenance) -> Results:
     return Results(provenance, ("momentum", "direct"), ("stiff",), (), (), (), sweep=tuple(rows))
 
 
-def test_rates_are_false_alarms_per_hour_watched():
+def test_rates_are_false_alarms_per_monitored_hour():
     (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)))
     assert curve.per == "hour"
     assert curve.points[0].rate == pytest.approx(80.0)
@@ -57,7 +57,7 @@ def test_points_are_in_the_order_of_the_factor_whatever_the_order_of_the_rows():
     assert factors == sorted(factors) and len(factors) == len(MULTIPLES)
 
 
-def test_a_median_that_is_not_reached_is_infinite_and_one_without_contacts_is_no_figure():
+def test_an_unreached_median_is_infinite_and_one_without_contacts_is_missing():
     rows = swept("momentum", "stiff", lambda _: None, alarms, missed=lambda _: CONTACTS)
     assert {point.median for point in amoc_curves(of(*rows))[0].points} == {math.inf}
     blind = [replace(row, missed=0, not_assessable=CONTACTS) for row in rows]
@@ -66,7 +66,7 @@ def test_a_median_that_is_not_reached_is_infinite_and_one_without_contacts_is_no
     assert curve.not_assessable == CONTACTS
 
 
-def test_a_detector_that_watched_the_hold_out_nowhere_has_no_curve():
+def test_a_detector_not_assessable_in_the_hold_out_has_no_curve():
     seen = swept("momentum", "stiff", lambda m: 60.0 * m, alarms)
     blind = swept("direct", "stiff", lambda m: 60.0 * m, lambda _: 0, hours=0.0)
     assert [curve.detector for curve in amoc_curves(of(*seen, *blind))] == ["momentum"]

@@ -1,4 +1,4 @@
-"""What a benchmark concludes, and that every report and the exit status say the same."""
+"""The conclusion of a benchmark, identical in every report and the exit status."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_force_misses_and_what_is_not_assessable_decide_everywhere_alike(name, tmp_path: Path):
+def test_force_misses_and_unassessable_contacts_count_the_same_everywhere(name, tmp_path: Path):
     made, outcome, status, words, tone, failures, errors = CASES[name]
     evaluated = evaluate(made, [MET])
     conclusion = evaluated.results.conclusion
@@ -152,7 +152,7 @@ def test_force_misses_and_what_is_not_assessable_decide_everywhere_alike(name, t
         assert " ".join(reason.split()) in " ".join(done.out.split())
 
 
-def test_every_limit_met_is_never_green_while_contacts_fail_at_3600_n():
+def test_limits_met_are_not_a_pass_while_contacts_fail_at_3600_n():
     evaluated = evaluate(results([40.0] * 4, ["fail"] * 4), [MET])
     assert [item.outcome for item in evaluated.results.limits] == ["met"]
     head = evaluated.results.conclusion.headline
@@ -171,7 +171,7 @@ def test_a_limit_on_misses_decides_about_them_where_there_is_one(allowed, status
     assert evaluated.results.conclusion.missed_without_limit == 0
 
 
-def test_without_profile_and_limit_a_miss_is_named_and_not_green_but_asks_for_nothing():
+def test_without_profile_and_limit_a_miss_is_named_without_a_violation():
     for limits, outcome in (((), "not_asked"), ((MET,), "met")):
         evaluated = evaluate(results([40.0] * 3 + [MISSED]), limits)
         conclusion = evaluated.results.conclusion
@@ -181,7 +181,7 @@ def test_without_profile_and_limit_a_miss_is_named_and_not_green_but_asks_for_no
         assert 'failures="0"' in to_junit(Report(evaluated))
 
 
-def test_a_limit_that_nothing_was_measured_for_is_not_met():
+def test_a_limit_without_measurements_is_not_met():
     made = results([BLIND] * 3)
     evaluated = evaluate(made, [LimitRule("*.p95_ms", "*", "*", "p95_ms", largest=50.0)])
     assert [item.outcome for item in evaluated.results.limits] == ["not_assessable"]
@@ -190,7 +190,7 @@ def test_a_limit_that_nothing_was_measured_for_is_not_met():
     assert conclusion.facts == ("limit_violated", "nothing_assessable")
 
 
-def test_a_detector_that_judged_no_impact_free_operation_has_assessed_nothing():
+def test_a_detector_without_an_assessable_impact_free_operation_has_assessed_nothing():
     made = replace(
         build({}, holdout=["momentum"]),
         exposure=(ExposureResult("holdout", "momentum", 4, 4, 0.0, 4, {"standing still": 1.0}),),
@@ -200,7 +200,7 @@ def test_a_detector_that_judged_no_impact_free_operation_has_assessed_nothing():
     assert conclusion.reasons == ("momentum, holdout: none of 4 operations could be assessed: standing still 100 %",)
 
 
-def test_reasons_of_what_could_not_be_assessed_are_named():
+def test_reasons_for_unassessable_contacts_are_named():
     made = results([BLIND] * 3)
     made = replace(made, contacts=tuple(replace(item, reason="the axis stands still") for item in made.contacts))
     assert evaluate(made).results.conclusion.reasons == (
@@ -235,6 +235,6 @@ def test_files_of_version_2_are_read_with_their_words_changed(tmp_path):
     assert done.status == 2 and "this cdtool knows 2 and 3" in done.err and done.err.count("\n") == 1
 
 
-def test_contacts_keep_their_own_words_in_the_data():
+def test_contacts_keep_their_spelling_in_the_data():
     made: ContactResult = results([BLIND]).contacts[0]
     assert made.outcome == "not_assessable"

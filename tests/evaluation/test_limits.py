@@ -1,4 +1,4 @@
-"""[limits]: which figures they name, and what becomes of them."""
+"""[limits]: the quantities they name, and their outcomes."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_above_the_largest_and_below_the_least_are_not_met_with_the_reason():
     assert low.outcome == "violated" and low.reason == "1 is less than 2"
 
 
-def test_a_star_stands_for_every_detector_and_every_group_with_contacts():
+def test_a_star_selects_every_detector_and_every_group_with_contacts():
     limits = check('"*.*.missed" = { max = 0 }')
     assert [(item.detector, item.group, item.outcome) for item in limits] == [
         ("momentum", "stiff", "met"),
@@ -80,20 +80,20 @@ def test_a_star_stands_for_every_detector_and_every_group_with_contacts():
     ]
 
 
-def test_two_parts_mean_every_group_and_a_groups_name_may_hold_dots():
+def test_two_parts_select_every_group_and_group_names_may_contain_dots():
     assert len(check('"*.false_alarms_per_hour" = { max = 2.0 }')) == 6
     (limit,) = check('"feekf.soft.2.mean_ms" = { max = 80 }')
     assert limit.group == "soft.2"
 
 
-def test_what_could_not_be_assessed_does_not_pass():
+def test_unassessable_values_do_not_pass():
     (limit,) = check('"gm.soft.2.mean_ms" = { max = 100 }')
     assert limit.outcome == "not_assessable" and limit.value is None
     assert limit.reason == "none of 1 contacts could be assessed"
     assert not_met([limit]) == [limit]
 
 
-def test_a_quantile_that_is_not_reached_breaks_its_limit():
+def test_an_unreached_quantile_violates_its_limit():
     (limit,) = check('"feekf.stiff.p95_ms" = { max = 1000 }')
     assert limit.outcome == "violated" and limit.value is None and "not reached" in limit.reason
 
@@ -110,7 +110,7 @@ def test_false_alarms_are_counted_in_groups_without_contacts():
     [
         ('"gmm.stiff.mean_ms" = { max = 1 }', "unknown detector 'gmm'.*gm"),
         ('"gm.stif.mean_ms" = { max = 1 }', "unknown group 'stif'.*stiff"),
-        ('"gm.stiff.mean" = { max = 1 }', "unknown figure 'mean'.*mean_ms"),
+        ('"gm.stiff.mean" = { max = 1 }', "unknown metric 'mean'.*mean_ms"),
         ('"gm" = { max = 1 }', "does not name a metric"),
         ('"gm.stiff.mean_ms" = { }', "has no bound"),
         ('"gm.stiff.mean_ms" = 5', "a table"),
@@ -125,23 +125,23 @@ def test_a_wrong_limit_is_one_line_that_names_its_key(text, said):
 
 
 def test_a_figure_of_contacts_in_a_group_without_any_is_an_error():
-    with pytest.raises(ConfigurationError, match="no such figure"):
+    with pytest.raises(ConfigurationError, match="not available in these results"):
         check('"gm.holdout.p95_ms" = { max = 1 }')
 
 
 def test_a_detector_that_was_not_run_is_an_error():
-    with pytest.raises(ConfigurationError, match="no such figure"):
+    with pytest.raises(ConfigurationError, match="not available in these results"):
         check_limits(
             rules('"gm.stiff.p95_ms" = { max = 1 }'), [item for item in SUMMARIES if item.detector != "momentum"]
         )
 
 
-def test_what_was_watched_nowhere_has_no_false_alarms_and_does_not_pass():
+def test_without_monitored_time_a_limit_on_false_alarms_does_not_pass():
     blind = replace(results(), exposure=(ExposureResult("holdout", "friction_ekf", 4, 50, 0.0, 50),))
     summaries = [item for item in summarise(blind) if item.detector == "friction_ekf" and item.group == "holdout"]
     for figure in ("false_alarms", "false_alarms_per_operation_at_most", "false_alarms_per_hour"):
         (limit,) = check_limits(rules(f'"feekf.holdout.{figure}" = {{ max = 9 }}'), summaries)
-        assert limit.outcome == "not_assessable" and limit.reason == "nothing was watched"
+        assert limit.outcome == "not_assessable" and limit.reason == "nothing was monitored"
     assert FIGURES["operations"](summaries[0]) == 0
 
 
@@ -167,7 +167,7 @@ def test_a_missed_contact_makes_the_largest_force_at_the_alarm_infinite():
 
 
 @pytest.mark.parametrize("figure", FIGURES)
-def test_every_figure_is_a_number_or_undefined_with_a_reason(figure):
+def test_every_quantity_is_a_number_or_undefined_with_a_reason(figure):
     for summary in SUMMARIES:
         value = FIGURES[figure](summary)
         assert isinstance(value, int | float)

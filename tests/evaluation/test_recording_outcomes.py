@@ -1,4 +1,4 @@
-"""Which recordings have a part in a broken limit."""
+"""The recordings that contribute to a violated limit."""
 
 from __future__ import annotations
 
@@ -70,38 +70,38 @@ def failing(figure: str, largest: float) -> set[str]:
     return {name for (_, name), item in outcomes(rule).items() if item.breaks}
 
 
-def test_without_limits_no_recording_breaks_one():
+def test_without_limits_no_recording_violates_one():
     found = outcomes()
     assert [name for detector, name in found if detector == "gm"] == [item.recording for item in RESULTS.recordings]
     assert not any(item.breaks for item in found.values())
 
 
 @pytest.mark.parametrize("figure", sorted(MISSES))
-def test_a_limit_on_misses_is_broken_by_the_missed_contact(figure):
+def test_a_limit_on_misses_is_violated_by_the_missed_contact(figure):
     assert failing(figure, 0.0) == {"late"}
 
 
 @pytest.mark.parametrize("figure", sorted(name for name in MEANS if not name.endswith("_upper")))
-def test_a_limit_on_the_mean_is_broken_by_latencies_above_it(figure):
+def test_a_limit_on_the_mean_is_violated_by_latencies_above_it(figure):
     assert failing(figure, 30.0) == {"slow"}
 
 
 @pytest.mark.parametrize("figure", sorted(name for name in QUANTILES if not name.endswith("_upper")))
-def test_a_limit_on_a_quantile_is_broken_by_latencies_above_it_and_by_misses(figure):
+def test_a_limit_on_a_quantile_is_violated_by_latencies_above_it_and_by_misses(figure):
     assert failing(figure, 30.0) == {"slow", "late"}
 
 
 @pytest.mark.parametrize("figure", sorted(FALSE_ALARMS))
-def test_a_limit_on_false_alarms_is_broken_by_the_log_that_has_one(figure):
+def test_a_limit_on_false_alarms_is_violated_by_the_log_that_has_one(figure):
     assert failing(figure, 0.0) == {"cut"}
 
 
 @pytest.mark.parametrize("figure", sorted(FORCES_AT_ALARM))
-def test_a_limit_on_the_force_at_the_alarm_is_broken_by_forces_above_it(figure):
+def test_a_limit_on_the_force_at_the_alarm_is_violated_by_forces_above_it(figure):
     assert failing(figure, 150.0) == {"steady", "slow"}
 
 
-def test_other_limits_are_broken_by_what_they_count():
+def test_other_limits_are_violated_by_what_they_count():
     assert failing("peak_force_n", 500.0) == {"quick", "steady", "slow", "late", "blind"}
     assert failing("force_failed", 0.0) == {"slow"}
     assert failing("not_assessable", 0.0) == {"blind"}
@@ -109,7 +109,7 @@ def test_other_limits_are_broken_by_what_they_count():
     assert {name for (_, name), item in outcomes(rule).items() if item.breaks} == {"late", "blind"}
 
 
-def test_every_figure_is_either_made_by_single_recordings_or_known_not_to_be():
+def test_every_quantity_is_attributed_to_recordings_or_listed_as_not():
     counted = MEANS | QUANTILES | MISSES | FALSE_ALARMS | FORCES_AT_ALARM
     counted |= {"peak_force_n", "force_failed", "not_assessable", "detected", "clipped", "in_progress"}
     assert set(FIGURES) - counted == {"std_ms", "contacts", "operations", "hours"}
@@ -118,7 +118,7 @@ def test_every_figure_is_either_made_by_single_recordings_or_known_not_to_be():
         assert failing(figure, 0.001) == set()
 
 
-def test_a_kept_limit_is_broken_by_none_even_where_a_latency_is_above_it():
+def test_a_met_limit_is_violated_by_no_recording_even_with_a_latency_above_it():
     rule = LimitRule("gm.stiff.mean_ms", "gm", "stiff", "mean_ms", largest=50.0)
     assert not any(item.breaks for item in outcomes(rule).values())
 
@@ -129,7 +129,7 @@ def test_the_words_name_contact_figure_and_limit():
     assert outcomes(rule)["gm", "late"].breaks == ("contact 1 is missed (*.stiff.max_ms: at most 50)",)
 
 
-def test_a_detector_that_gave_nothing_is_told_from_one_that_was_silent():
+def test_a_detector_without_results_differs_from_one_without_alarms():
     found = outcomes()
     assert found["gm", "blind"].blind and not found["gm", "late"].blind
     assert found["gm", "lost"].blind and not found["gm", "lost"].judged
@@ -151,7 +151,7 @@ def test_contacts_of_results_without_rows_of_recordings_are_found_too():
 
 
 @pytest.mark.parametrize("figure", sorted(name for name in MEANS | QUANTILES if name.endswith("_upper")))
-def test_a_limit_on_an_interval_of_few_contacts_is_broken_by_no_recording(figure):
+def test_a_limit_on_an_interval_of_few_contacts_is_violated_by_no_recording(figure):
     rule = LimitRule(f"gm.stiff.{figure}", "gm", "stiff", figure, largest=30.0)
     assert evaluate(RESULTS, [rule]).results.limits[0].outcome == "not_assessable"
     assert not any(item.breaks for item in outcomes(rule).values())

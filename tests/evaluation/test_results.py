@@ -1,4 +1,4 @@
-"""Results, their file, and the statistics that are derived from them."""
+"""Results, their file, and the statistics derived from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cdtool.evaluation.summary import summarise
 from tests.evaluation.full_results import FULL, RESULTS, STEP
 
 
-def test_a_summary_counts_what_its_mean_leaves_out():
+def test_a_summary_counts_contacts_not_in_its_mean():
     momentum, torque, holdout, _ = summarise(RESULTS)
     assert (momentum.mean_ms, momentum.median_ms, momentum.std_ms) == pytest.approx((30.0, 40.0, 26.4575), rel=1e-5)
     assert (momentum.contacts, momentum.detected, momentum.missed, momentum.not_assessable) == (5, 3, 1, 1)
@@ -27,7 +27,7 @@ def test_a_summary_counts_what_its_mean_leaves_out():
     assert (holdout.false_alarms, holdout.operations, holdout.hours) == (1, 9, 0.5)
 
 
-def test_the_json_is_strict_and_has_null_where_there_is_no_figure():
+def test_the_json_is_strict_with_null_for_missing_values():
     values = json.loads(to_json(RESULTS), parse_constant=lambda name: pytest.fail(name))
     assert values["contacts"][0]["peak_force_n"] is None and values["contacts"][3]["latency_ms"] is None
     assert values["provenance"]["gain"] is None and values["schema_version"] == SCHEMA_VERSION
@@ -42,7 +42,7 @@ def test_results_survive_writing_and_reading(tmp_path):
     assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
 
 
-def test_no_name_makes_json_that_a_terminal_obeys_or_that_cannot_be_written(tmp_path):
+def test_names_in_json_have_no_control_characters_and_can_be_encoded(tmp_path):
     name = "a\x1b[31m\x9b31m\u202egnp.exe\u2028\udc80 碰撞"
     text = to_json(replace(RESULTS, skipped=(Skipped(name, name),)))
     assert not set(name) & set(text) - set("a[31mgnp.ex 碰撞")
@@ -60,14 +60,14 @@ def test_a_number_without_decimals_is_read_as_one_with(tmp_path):
 @pytest.mark.parametrize(
     "content", ["", "{}", "[]", '{"schema_version": 2}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
 )
-def test_what_is_no_results_file_is_one_clear_error(tmp_path, content):
+def test_an_invalid_results_file_is_one_clear_error(tmp_path, content):
     path = tmp_path / "results.json"
     path.write_text(content, encoding="utf-8")
     with pytest.raises(RecordingError, match=r"results\.json"):
         read_results(path)
 
 
-def test_another_version_is_named_with_the_way_out(tmp_path):
+def test_another_version_is_named_with_a_hint(tmp_path):
     path = tmp_path / "results.json"
     path.write_text(to_json(RESULTS).replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
     with pytest.raises(RecordingError, match=r"schema_version is 99, this cdtool knows 2") as fault:
@@ -118,15 +118,15 @@ def test_a_wrong_field_is_named(tmp_path, old, new, words):
     [
         (None, r"results\.json: no such file$"),
         ("", r"results\.json: not a results file: it is empty$"),
-        ('{"schema_version": 2, "detec', r"results\.json: not a results file: cut off or damaged at line 1$"),
-        (b"\xff\xfe\x00", r"results\.json: not a results file: no UTF-8 text$"),
+        ('{"schema_version": 2, "detec', r"results\.json: not a results file: truncated or damaged at line 1$"),
+        (b"\xff\xfe\x00", r"results\.json: not a results file: not UTF-8 text$"),
         (
             '{"schema_version": 2}',
             r"results: provenance, detectors, groups, contacts, false_alarms, exposure missing$",
         ),
     ],
 )
-def test_what_cannot_be_read_is_said_in_plain_words(tmp_path, content, words):
+def test_read_errors_are_in_plain_words(tmp_path, content, words):
     path = tmp_path / "results.json"
     if content is not None:
         path.write_bytes(content.encode() if isinstance(content, str) else content)

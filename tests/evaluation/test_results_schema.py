@@ -1,4 +1,4 @@
-"""The published schema is that of the dataclasses; real results follow it, wrong ones do not."""
+"""The published schema matches the dataclasses; real results follow it, wrong ones do not."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_published_schema_is_up_to_date():
     assert made["FILE"].read_text(encoding="utf-8") == made["schema_text"](), "run python docs/make_schema.py"
 
 
-def test_the_schema_is_one_and_says_what_every_field_means():
+def test_the_schema_is_valid_and_describes_every_field():
     schema = results_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     assert set(schema["properties"]) == {item.name for item in fields(Results)}
@@ -47,7 +47,7 @@ def test_the_schema_is_one_and_says_what_every_field_means():
         assert all(len(item["description"]) > 2 for item in part["properties"].values())
 
 
-def test_the_gate_benchmark_writes_what_the_schema_says(tmp_path):
+def test_the_gate_benchmark_follows_the_schema(tmp_path):
     logs = ROOT / "sample_logs" / "gate"
     for item in logs.iterdir():
         (tmp_path / item.name).symlink_to(item)
@@ -122,14 +122,14 @@ def test_a_wrong_value_does_not_follow_it(wrong, value):
     ("where", "value"),
     [("contacts.0.side", None), ("contacts.0.side", "below"), ("contacts.0.latency_ms", 10), ("provenance.any", [1])],
 )
-def test_what_may_be_there_follows_it(where, value):
+def test_optional_parts_follow_the_schema(where, value):
     values = values_of(FULL)
     change(where, value)(values)
     assert not faults(values)
 
 
 @pytest.mark.parametrize("part", ["contacts", "forces", "limits", "schema_version"])
-def test_a_part_that_is_missing_is_a_fault(part):
+def test_a_missing_part_is_an_error(part):
     values = values_of(FULL)
     del values[part]
     assert [part in fault for fault in faults(values)] == [True]

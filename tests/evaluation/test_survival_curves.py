@@ -1,4 +1,4 @@
-"""One survival curve a detector and group: what is missed stays undetected, what is not assessable does not count."""
+"""One survival curve per detector and group: missed contacts stay undetected, unassessable ones do not count."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def of(*contacts: ContactResult) -> Results:
     return Results({}, ("direct", "momentum"), ("stiff", "holdout"), contacts, (), ())
 
 
-def test_all_detected_falls_to_nothing_at_the_last_latency():
+def test_with_all_detected_the_curve_reaches_zero_at_the_last_latency():
     (curve,) = survival_curves(of(*(row("direct", late) for late in (30.0, 10.0, 20.0, 40.0))))
     assert curve.curve.times.tolist() == [0.0, 10.0, 20.0, 30.0, 40.0]
     assert curve.curve.share.tolist() == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0])
@@ -26,7 +26,7 @@ def test_all_detected_falls_to_nothing_at_the_last_latency():
     assert len(curve.missed) == 0
 
 
-def test_a_missed_contact_keeps_the_curve_above_nothing_up_to_where_it_was_watched():
+def test_a_missed_contact_keeps_the_curve_above_zero_until_its_censoring():
     contacts = [row("direct", 10.0), row("direct", 20.0), row("direct", None, "missed", 300.0)]
     (curve,) = survival_curves(of(*contacts))
     assert curve.curve.share[-1] == pytest.approx(1 / 3)

@@ -1,4 +1,4 @@
-"""A detection with its limits moved gives what matching gives with those limits."""
+"""A detection with changed limits gives the same result as matching with these limits."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_above_the_critical_factor_there_is_no_alarm_and_below_it_there_is_one(s
     assert detection(seed, critical * 0.999999).verdict.outcome == "alarm"
 
 
-def test_too_short_a_run_of_judged_samples_has_no_critical_factor():
+def test_too_few_assessable_samples_have_no_critical_factor():
     blind = replace(detection(0), threshold=None, judgement=None)
     assert critical_factor(blind, ACTIVATION) == -np.inf
 
@@ -65,12 +65,12 @@ def test_budgets_are_read(text, rate, per, shown):
 
 
 @pytest.mark.parametrize("text", ["", "1000", "1/0op", "-1/op", "1/1000 runs", "1/nan op", "inf/h"])
-def test_what_is_no_budget_is_refused_with_an_example(text):
+def test_an_invalid_budget_is_refused_with_an_example(text):
     with pytest.raises(UsageError, match="1/1000op"):
         Budget.parse(text)
 
 
-def test_the_factor_is_the_smallest_that_keeps_the_budget_by_operation():
+def test_the_factor_is_the_smallest_that_meets_the_budget_per_operation():
     runs = [detection(seed) for seed in range(20)]
     made = set_factor(Budget(0.1, "operation"), "d", runs, ACTIVATION)
     critical = sorted((critical_factor(run, ACTIVATION) for run in runs), reverse=True)
@@ -79,19 +79,19 @@ def test_the_factor_is_the_smallest_that_keeps_the_budget_by_operation():
     assert sum(alarming) == 1 and made.operations == 20
 
 
-def test_the_budget_is_kept_on_average_by_operations_that_nothing_was_set_on():
+def test_the_budget_is_met_on_average_by_independent_operations():
     pool = np.array([critical_factor(detection(seed), ACTIVATION) for seed in range(120)])
     rng = np.random.default_rng(4)
     broken = []
     for _ in range(400):
         order = rng.permutation(len(pool))
         runs, others = pool[order[:20]], pool[order[20:]]
-        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # what set_factor gives for 1/10op on 20 operations
+        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # the result of set_factor for 1/10op on 20 operations
         broken.append(np.mean(others > factor))
     assert np.mean(broken) == pytest.approx(2 / 21, abs=0.01)
 
 
-def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
+def test_the_factor_meets_a_budget_per_hour_and_a_smaller_one_violates_it():
     runs = [detection(seed) for seed in range(20)]
     hours = sum(run.assessed_seconds for run in runs) / 3600.0
     budget = Budget(4.5 / hours, "hour")
@@ -103,12 +103,12 @@ def test_the_factor_keeps_a_budget_by_hour_and_hardly_less_would_break_it():
     assert alarms(made.factor) == made.alarms <= 3 < alarms(made.factor * 2.0 ** (-1.5 / 32))
 
 
-def test_too_small_an_exposure_is_refused_and_told_what_is_missing():
+def test_too_small_an_exposure_is_refused_with_the_missing_amount():
     with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 were assessable.*add 980"):
         set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
-def test_operations_that_could_not_be_judged_do_not_count_as_exposure():
+def test_unassessable_operations_do_not_count_as_exposure():
     runs = [detection(seed) for seed in range(12)]
     status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
     blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
@@ -135,7 +135,7 @@ def test_a_detection_without_a_threshold_never_alarms():
     assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
 
 
-def test_a_budget_tells_what_is_missing_with_all_digits():
+def test_a_budget_states_the_missing_amount_with_all_digits():
     with pytest.raises(UsageError, match=r"budget 1/2000000op needs 2000000 impact-free operations .* 12 were") as at:
         Budget.parse("1/2000000op").check(12.0, "gm")
     assert "add 1999988 to the runs learned from" in at.value.hint

@@ -147,7 +147,7 @@ def test_bodies_that_nothing_pushes_touch_once():
     assert caught.impacts[1].approach_speed == pytest.approx(-caught.first.rate[-1], rel=1e-9)
 
 
-def test_a_damper_that_is_pressed_for_good_stays_in_contact():
+def test_a_permanently_pressed_damper_stays_in_contact():
     # Ten times critical damping, at the speed to which push and damper settle: it creeps to its rest and never turns.
     law = KelvinVoigt(1e5, 20.0 * math.sqrt(1e5))
     done = collide(law, Bodies(1.0, 0.01, push=100.0), contacts=5)

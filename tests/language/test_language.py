@@ -107,7 +107,9 @@ def test_the_command_prints_file_line_words_and_replacement(tmp_path, capsys):
     assert capsys.readouterr().out == f'page.md:3: "is told": {instead} (is-told)\n'  # language: an example
 
 
-@pytest.mark.parametrize("file", ["tests/language/texts.py", "tests/test_docs.py", "cdtool/formats/csv/stamps.py"])
+@pytest.mark.parametrize(
+    "file", ["tests/language/texts.py", "tests/project/test_docs.py", "cdtool/formats/csv/stamps.py"]
+)
 def test_strings_and_comments_are_those_of_the_tokenizer(file):
     source = (ROOT / file).read_text(encoding="utf-8")
     starts = [0, *itertools.accumulate(len(line) + 1 for line in source.split("\n"))]

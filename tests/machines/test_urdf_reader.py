@@ -222,7 +222,7 @@ def test_without_pinocchio_the_extra_to_install_is_named(tmp_path, monkeypatch):
     assert fault.hint == "pip install 'cdtool[urdf]'"
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     assert "no such file" in refused(tmp_path / "none.urdf").message
 
 

@@ -1,1 +1,1 @@
-"""The project as a whole: its pages, its layers, its pipeline files, its bounds of versions, its tests' markers."""
+"""The project as a whole: pages, layers, pipeline files, version bounds, markers of the tests."""

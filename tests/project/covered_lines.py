@@ -1,11 +1,11 @@
-"""Which share of the lines that the full suite covers do the tests cover that are not slow?
+"""Measure the share of the lines covered by the full suite that the fast tests cover.
 
 `python -m tests.project.covered_lines fast.coverage full.coverage` compares two data files of the coverage package,
-prints the share for each folder of cdtool/, and ends with status 1 where the whole is below 90 %. Compiled loops count
-in neither, nor does what a test runs in a program that it starts.
+prints the share for each folder of cdtool/, and exits with status 1 if the total is below 90 %. Compiled loops and
+programs started by a test count in neither.
 
-    coverage run --data-file fast.coverage --source cdtool -m pytest -q -p no:xdist -m "not slow"
-    coverage run --data-file full.coverage --source cdtool -m pytest -q -p no:xdist
+coverage run --data-file fast.coverage --source cdtool -m pytest -q -p no:xdist -m "not slow"
+coverage run --data-file full.coverage --source cdtool -m pytest -q -p no:xdist
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "cdtool"
 
 
 def covered(data_file: Path) -> dict[str, set[int]]:
-    """File of cdtool/ -> the numbers of its lines that were run."""
+    """Return file of cdtool/ -> the numbers of its executed lines."""
     from coverage import CoverageData
 
     data = CoverageData(str(data_file))
@@ -32,7 +32,7 @@ def covered(data_file: Path) -> dict[str, set[int]]:
 
 
 def shares(fast: dict[str, set[int]], full: dict[str, set[int]]) -> dict[str, tuple[int, int]]:
-    """Folder -> how many of the lines that the full suite runs the fast tests run, and how many there are."""
+    """Return folder -> number of lines executed by the fast tests, and by the full suite."""
     counts: dict[str, tuple[int, int]] = defaultdict(lambda: (0, 0))
     for name, lines in full.items():
         folder = name.partition("/")[0] if "/" in name else "."
@@ -42,7 +42,7 @@ def shares(fast: dict[str, set[int]], full: dict[str, set[int]]) -> dict[str, tu
 
 
 def main() -> int:
-    """Print the shares; 1 where the whole is below the bar."""
+    """Print the shares; return 1 if the total is below the bound."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fast", type=Path, help="data file of the tests that are not slow")
     parser.add_argument("full", type=Path, help="data file of the full suite")

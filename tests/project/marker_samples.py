@@ -1,4 +1,4 @@
-"""What test_markers.py looks at: functions that start a program or drive a browser, directly or by a fixture."""
+"""Samples for test_markers.py: functions that start a program or drive a browser, directly or by a fixture."""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-"""Which tests are slow, and which are listed as slow in tests/slow_tests.txt?
+"""Compare the measured slow tests with the list in tests/slow_tests.txt.
 
-`python -m pytest -n auto --junitxml times.xml`, on a machine that does nothing else, measures. Then
-`python -m tests.project.slow_tests times.xml` prints what the list lacks, what it holds without need and what no longer
-exists, and ends with status 1 where it lacks a test. `--write` corrects the list.
+`python -m pytest -n auto --junitxml times.xml`, on an otherwise idle machine, measures. Then `python -m
+tests.project.slow_tests times.xml` prints the tests missing from the list, those listed without need and those that no
+longer exist, and exits with status 1 if a test is missing. `--write` corrects the list.
 
-A test is slow where all cases of its function, set-up included, together take longer than the bound of
-tests/markers.py. A listed one stays until it takes less than half of that: runs on several machines then do not turn
-the list to and fro.
+A test is slow if all cases of its function, set-up included, together take longer than the bound of tests/markers.py. A
+listed one stays until it takes less than half of that, so that runs on different machines do not alternate the list.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ HEAD = """\
 
 
 def durations(report: Path) -> dict[str, float | None]:
-    """Test function -> what all of its cases took [s]; None: one was skipped, so that nothing is known of it."""
+    """Return test function -> time of all its cases [s]; None if one was skipped, so that the time is unknown."""
     took: dict[str, float | None] = defaultdict(float)
     for case in ElementTree.parse(report).iter("testcase"):
         name = f"{case.attrib['classname'].replace('.', '/')}.py::{case.attrib['name'].partition('[')[0]}"
@@ -37,14 +36,14 @@ def durations(report: Path) -> dict[str, float | None]:
 
 
 def corrected(listed: Sequence[str], took: Mapping[str, float | None], bound: float = BOUND_S) -> list[str]:
-    """The list as it should be."""
+    """Return the corrected list."""
     slow = {name for name, seconds in took.items() if seconds is not None and seconds > bound}
     stay = {name for name in listed if name in took and ((seconds := took[name]) is None or seconds > bound / 2)}
     return sorted(slow | stay)
 
 
 def main() -> int:
-    """Compare the list with the report; 1 where a slow test is not listed."""
+    """Compare the list with the report; return 1 if a slow test is not listed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("report", type=Path, help="what pytest wrote with --junitxml, of the whole suite")
     parser.add_argument("--write", action="store_true", help="correct tests/slow_tests.txt")

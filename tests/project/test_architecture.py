@@ -1,4 +1,4 @@
-"""The shape of the code: imports run downward, importing is light, every module says what it is."""
+"""The structure of the code: downward imports, light imports, a docstring in every module."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 import typer.main
 
 ROOT = Path(__file__).parents[2]
-# Files that name what is called: code, pages, and what the report's page is made of.
+# Files that name public functions: code, pages, and templates of the report's page.
 SHOWS_NAMES = (".py", ".md", ".js", ".j2")
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "mcap", "typer", "rich")
 
@@ -53,13 +53,13 @@ def test_imports_run_downward():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_every_module_says_what_it_is():
+def test_every_module_has_a_docstring():
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         assert path.read_text(encoding="utf-8").startswith('"""'), path
 
 
 def test_the_tests_mirror_the_package():
-    """A folder of tests is one of cdtool/, or says in its __init__.py what it holds."""
+    """A folder of tests mirrors one of cdtool/, or describes its content in its __init__.py."""
     tests, package = ROOT / "tests", ROOT / "cdtool"
     for file in sorted(tests.rglob("test_*.py")):
         folder = file.parent
@@ -75,7 +75,7 @@ def words_of(*folders: Path) -> Counter[str]:
     return Counter(word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8")))
 
 
-def test_what_is_public_is_used_or_shown_by_more_than_tests():
+def test_public_names_are_used_or_documented_outside_tests():
     code, shown = words_of(ROOT / "cdtool"), words_of(ROOT / "docs", ROOT / "benchmarks")
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -89,7 +89,7 @@ def test_the_python_api_names_functions_that_exist_and_every_command_has_one():
 
     assert all(callable(getattr(cdtool, name)) for name in cdtool.__all__ if name != "__version__")
     members = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
-    # A command with subcommands is several functions.
+    # A command with subcommands has several functions.
     commands = {name.replace("-", "_") for name, command in members if not hasattr(command, "commands")}
-    # `report` writes files of what `benchmark` gave; `list` shows the registries.
+    # `report` writes files from the results of `benchmark`; `list` shows the registries.
     assert commands - {"report", "list"} <= set(cdtool.__all__)

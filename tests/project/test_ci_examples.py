@@ -1,4 +1,4 @@
-"""The pipeline files in docs/examples: they parse, ask for little, and their shell lines do what the page says."""
+"""The pipeline files in docs/examples: they parse, request few permissions, and work as documented."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def github_job() -> dict[str, Any]:
 
 
 def github_step(words: str) -> str:
-    """The shell lines of the one step that holds these words."""
+    """Return the shell lines of the only step that contains these words."""
     (found,) = [step["run"] for step in github_job()["steps"] if words in step.get("run", "")]
     return str(found)
 
 
 class Shell:
-    """Runs lines as a runner would: bash that stops at the first failure, in a checkout with sample logs."""
+    """Run lines like a runner: bash that stops at the first failure, in a checkout with sample logs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -90,7 +90,7 @@ def test_the_steps_of_github_make_every_report_compare_and_show_the_summary(shel
     done = shell(github_step("cdtool benchmark"))
     assert done.returncode == 0, done.stderr
     assert shell.names("out") == REPORTS
-    assert shell(compare).returncode == 0 and shell.names("out") == REPORTS  # the first time there is nothing of main
+    assert shell(compare).returncode == 0 and shell.names("out") == REPORTS  # the first run has no results of main
     (shell.folder / "baseline").mkdir()
     shutil.copy(shell.folder / "out" / "results.json", shell.folder / "baseline")
     done = shell(compare)
@@ -101,7 +101,7 @@ def test_the_steps_of_github_make_every_report_compare_and_show_the_summary(shel
     assert shown == "".join(parts)
 
 
-def test_a_broken_limit_fails_the_job_and_the_reports_are_there_all_the_same(shell):
+def test_a_violated_limit_fails_the_job_and_the_reports_exist(shell):
     gate = shell.folder / "sample_logs" / "gate"
     text = f'machine = "{gate}/machine.toml"\ndetectors = ["pi"]\n[learn]\nlogs = ["{gate}/free/*"]\n'
     text += f'[impacts.stiff]\nlogs = ["{gate}/stiff/03.csv"]\n[limits]\n"pi.stiff.max_ms" = {{ max = 20 }}\n'
@@ -114,13 +114,13 @@ def test_a_broken_limit_fails_the_job_and_the_reports_are_there_all_the_same(she
     assert shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
 
 
-def test_a_benchmark_that_cannot_run_fails_the_job_and_the_later_steps_bear_it(shell):
+def test_a_benchmark_that_cannot_run_fails_the_job_and_later_steps_continue(shell):
     shell.environment["BENCHMARK"] = "none.toml"
     assert shell(github_step("cdtool benchmark")).returncode == 2
     assert shell(github_step("cdtool compare")).returncode == shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
 
 
-def test_the_scripts_of_gitlab_are_the_same_benchmark_and_compare_where_there_is_something(shell):
+def test_the_scripts_of_gitlab_run_the_same_benchmark_and_compare_if_possible(shell):
     values = parsed("gitlab-ci.yml")
     benchmark, compare = values["collision-benchmark"], values["collision-compare"]
     assert values["variables"]["BENCHMARK"] == shell.environment["BENCHMARK"]
@@ -157,7 +157,7 @@ def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
     assert f"--name {keep['with']['name']} --dir baseline" in fetch and "--branch main" in fetch
 
 
-def test_gitlab_keeps_artifacts_whatever_happens_and_compares_after_a_broken_limit_too():
+def test_gitlab_always_keeps_artifacts_and_compares_after_a_violated_limit():
     values = parsed("gitlab-ci.yml")
     for name in ("collision-benchmark", "collision-compare"):
         assert values[name]["artifacts"]["when"] == "always"
@@ -168,7 +168,7 @@ def test_gitlab_keeps_artifacts_whatever_happens_and_compares_after_a_broken_lim
     assert values["default"]["timeout"] == "30 minutes"
 
 
-def test_the_page_names_every_figure_and_its_limits_are_valid():
+def test_the_page_names_every_quantity_and_its_limits_are_valid():
     table = [line for line in PAGE.splitlines() if line.startswith("| `")]
     assert set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in table))) == set(FIGURES)
     (block,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)

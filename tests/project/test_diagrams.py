@@ -1,4 +1,4 @@
-"""The block diagrams: made by their script, valid, described, and nothing in them lies over anything else."""
+"""The block diagrams: written by their script, valid, described, and without overlapping text."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def made(script, tmp_path_factory) -> Path:
 
 
 def content(path: Path) -> tuple[list[str], list[str]]:
-    """Words and formulas of a drawing, which no version of matplotlib changes."""
+    """Return the words and formulas of a drawing, which are the same in all versions of matplotlib."""
     text = path.read_text(encoding="utf-8")
     words = [element.text or "" for element in ElementTree.fromstring(text).iter(f"{SVG}text")]
     return words, re.findall(r"<!-- (\$.*?\$) -->", text)
@@ -45,7 +45,7 @@ def test_the_scripts_make_exactly_the_diagrams_of_the_docs(made):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_diagram_is_valid_small_and_described_for_those_who_do_not_see_it(name):
+def test_a_diagram_is_valid_small_and_has_a_text_description(name):
     path = DOCS / "images" / f"{name}.svg"
     root = ElementTree.fromstring(path.read_text(encoding="utf-8"))
     title, description = root.findtext(f"{SVG}title"), root.findtext(f"{SVG}desc")
@@ -54,7 +54,7 @@ def test_a_diagram_is_valid_small_and_described_for_those_who_do_not_see_it(name
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_diagram_of_the_docs_says_what_its_script_draws(name, made):
+def test_a_diagram_of_the_docs_matches_its_script(name, made):
     words, formulas = content(made / f"{name}.svg")
     assert words and formulas
     assert content(DOCS / "images" / f"{name}.svg") == (words, formulas)
@@ -66,7 +66,7 @@ def test_the_same_script_gives_the_same_bytes(script, made):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_text_leaves_the_sheet_or_lies_over_another(name, script):
+def test_no_text_leaves_the_sheet_or_overlaps_another(name, script):
     with matplotlib.rc_context(script.STYLE):
         figure = script.diagram(name).figure
         boxes = {item: item.get_window_extent() for item in figure.axes[0].texts if item.get_text()}
@@ -78,7 +78,7 @@ def test_no_text_leaves_the_sheet_or_lies_over_another(name, script):
         assert not box.overlaps(other_box), (one.get_text(), other.get_text())
 
 
-def test_a_wire_that_would_run_askew_is_an_error(script):
+def test_a_wire_that_is_not_straight_is_an_error(script):
     sheet = script.Diagram(50)
     with pytest.raises(ValueError, match="neither horizontally nor vertically"):
         sheet.wire(sheet.block(20, 10, "one"), sheet.block(60, 40, "two"))

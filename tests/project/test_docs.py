@@ -1,4 +1,4 @@
-"""What the docs say is true: every command runs, every example gives what it shows, every link and key is there."""
+"""The docs are correct: every command runs, every example has its output, every link and key exists."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ EXAMPLES = {
     "docs/simulators.md": 3,
     "docs/detectors/friction-ekf.md": 1,
 }
-# Lines of shell blocks that set something up or take long: they are run by CI or by hand, not here.
+# Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
 NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
 
 _LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -78,7 +78,7 @@ _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 @dataclass(frozen=True)
 class Step:
-    """A command line or a Python example of a page, and the exit status that it should have."""
+    """A command line or a Python example of a page, and its expected exit status."""
 
     kind: str
     text: str
@@ -100,7 +100,7 @@ def steps_of(page: Path) -> Iterator[Step]:
 
 
 def run_command(line: str) -> Outcome:
-    """A line as a shell would run it: variable and wildcards expanded, in the current folder."""
+    """Run a line like a shell: variables and wildcards expanded, in the current folder."""
     words: list[str] = []
     for word in shlex.split(line.replace("$CDTOOL_DATA", str(DATA))):
         matches = sorted(map(str, Path().glob(word))) if "*" in word else [word]
@@ -121,7 +121,7 @@ def run_command(line: str) -> Outcome:
 
 
 def run_example(text: str, names: dict[str, object], page: str) -> None:
-    """A Python block: as a doctest where it has prompts, else as a program."""
+    """Run a Python block: as a doctest if it has prompts, else as a program."""
     if ">>>" not in text:
         exec(compile(text, page, "exec"), names)
         return
@@ -135,7 +135,7 @@ def run_example(text: str, names: dict[str, object], page: str) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A fresh folder that looks like a checkout to the commands of a page."""
+    """A new folder that looks like a checkout to the commands of a page."""
     assert (ROOT / "sample_logs" / "gate" / "benchmark.toml").is_file()
     (tmp_path / "docs").mkdir()
     (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
@@ -165,7 +165,7 @@ def the_tables_of_choosing_are_what_the_runs_gave() -> None:
 
 
 def agrees_with(cell: str, contacts: list[dict[str, Any]]) -> None:
-    """A cell such as `27 ± 1`, `116 ± 5, 11 missed`, `30 missed` or `not assessable` against the contacts' outcomes."""
+    """Check a cell such as `27 ± 1`, `116 ± 5, 11 missed`, `30 missed` or `not assessable` against the outcomes."""
     found = re.fullmatch(r"(?:(\d+) ± (\d+))?(?:, )?(?:(\d+) missed)?(not assessable)?", cell)
     assert found and cell, cell
     mean, deviation, missed, blind = found.groups()
@@ -345,7 +345,7 @@ def named_in(page: str) -> set[str]:
 
 
 def known_keys(read: Callable[[Path], object], text: str, folder: Path) -> set[str]:
-    """The keys that an error about the unknown key `zzz` lists."""
+    """Return the keys listed by an error about the unknown key `zzz`."""
     file = folder / "asked.toml"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"unknown (key|channel)") as fault:
@@ -432,6 +432,6 @@ def test_the_benchmark_file_page_is_valid_and_names_every_key(tmp_path):
         assert key in words, key
 
 
-def test_the_docs_name_no_path_of_a_machine_of_ours():
+def test_the_docs_contain_no_local_paths():
     for page in [*PAGES, *DOCS.rglob("*.py"), *DOCS.rglob("*.toml"), ROOT / "sample_logs" / "README.md"]:
         assert not re.search(r"(?<![\w.])/(work|tmp|home|root)\b", page.read_text(encoding="utf-8")), page

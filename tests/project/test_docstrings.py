@@ -44,7 +44,7 @@ CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
 # Names that have no sections yet; a test fails for one that has them.
 TO_DOCUMENT = (
     "cdtool.evaluation.explanation.",
-    "cdtool.evaluation.force.course.",
+    "cdtool.evaluation.force.curve.",
     "cdtool.evaluation.force.verdict.judge",
 )
 

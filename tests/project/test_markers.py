@@ -1,4 +1,4 @@
-"""The markers of the tests: given by what a test uses, and slow by a list of tests that exist."""
+"""The markers of the tests: derived from what a test uses, and slow from a list of existing tests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_marker_follows_from_what_a_test_and_its_fixtures_use(function, marker
 
 
 def test_what_a_test_imports_from_another_module_of_the_tests_counts_too():
-    # Of pytest's fixtures nothing is known, and of a module that is imported as a whole everything counts.
+    # Pytest's own fixtures are not analysed, and for a module imported as a whole everything counts.
     assert markers_of("tests.whole_runs.test_full_disk", "table") == frozenset()
     assert markers_of("tests.project.test_markers", "marker_samples") == {"external", "browser"}
     assert marker_samples.starts_nothing(ROOT) == ROOT
@@ -53,7 +53,7 @@ def test_every_test_that_is_listed_as_slow_exists():
     assert set(listed) <= functions, "tests/slow_tests.txt: correct the names of tests that were renamed"
 
 
-def test_the_list_holds_what_took_longer_than_the_bound_and_drops_what_took_less_than_half(tmp_path):
+def test_the_list_adds_tests_above_the_bound_and_drops_those_below_half(tmp_path):
     report = tmp_path / "times.xml"
     report.write_text(REPORT, encoding="utf-8")
     took = durations(report)

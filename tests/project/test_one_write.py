@@ -1,4 +1,4 @@
-"""Every file that cdtool writes goes through cdtool/files.py: no module opens a name of the user's for writing."""
+"""Every file that cdtool writes goes through cdtool/files.py: no module opens a user's file name for writing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# The blocks in which a temporary file or folder is written, which `files` flushes and puts in place.
+# The blocks in which a temporary file or folder is written, which `files` flushes and renames.
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
@@ -58,8 +58,8 @@ def test_a_write_is_recognised(code, count):
     assert len(list(writes(ast.parse(code)))) == count
 
 
-def test_files_are_written_by_the_one_module_for_it_alone():
-    """The writers of formats fill the name that they are handed: the temporary file of a `replaced` block."""
+def test_files_are_written_only_by_the_module_for_it():
+    """The writers of formats write to the name passed to them: the temporary file of a `replaced` block."""
     found = set()
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         name = path.relative_to(ROOT).as_posix()

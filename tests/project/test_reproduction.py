@@ -1,4 +1,4 @@
-"""docs/reproduction.md holds what its script makes."""
+"""docs/reproduction.md matches the output of its script."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def script() -> ModuleType:
     return module
 
 
-def test_every_table_and_figure_of_the_script_has_its_place_on_the_page():
+def test_every_table_and_number_of_the_script_is_on_the_page():
     make, page = script(), (DOCS / "reproduction.md").read_text(encoding="utf-8")
     assert set(re.findall(r"<!-- made: (.*) -->", page)) == {*make.THESIS, "thesis rule"}
     shown = set(re.findall(r"images/(reproduction_\w+\.png)", page))
     assert shown == {path.name for path in make.IMAGES.glob("reproduction_*.png")} and len(shown) == 11
 
 
-def test_the_tables_of_the_arms_first_trial_are_what_the_script_gives(tmp_path):
+def test_the_tables_of_the_arms_first_trial_match_the_script(tmp_path):
     make, page = script(), (DOCS / "reproduction.md").read_text(encoding="utf-8")
     write_arm_recordings(tmp_path / "arm1", make.COUNTS, make.SEED, 1)
     rows = summarise(cdtool.benchmark(tmp_path / "arm1" / "benchmark.toml", jobs=2).results)

@@ -1,4 +1,4 @@
-"""Plug-ins that are wrong: one clear line that names the package, and the others go on."""
+"""Faulty plug-ins: one clear line that names the package, and the others work."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """A package of one module and one entry point, as pip would have left it, for the time of a test."""
+    """A package of one module and one entry point, as installed by pip, for the duration of a test."""
     modules = []
 
     def write(code: str, name: str = "odd", group: str = "detectors", package: str = "odd-things") -> None:
@@ -69,7 +69,7 @@ def detect(name: str, *logs: Path) -> Outcome:
     return cdtool("detect", *(logs or (LOG,)), "-m", GATE / "machine.toml", "-d", name, "--limit", 4)
 
 
-def test_the_detector_that_the_others_are_made_from_is_fine(install):
+def test_the_template_detector_is_valid(install):
     install(DETECTOR)
     assert detect("odd").status == detect("od").status == detect("OD").status == cdtool("list", "detectors").status == 0
 
@@ -77,22 +77,30 @@ def test_the_detector_that_the_others_are_made_from_is_fine(install):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (DETECTOR, "import no_such_module", "does not load: ModuleNotFoundError"),
-        (DETECTOR, "def (", "does not load: SyntaxError"),
-        (DETECTOR, "x = 1", "does not load: AttributeError"),
+        (DETECTOR, "import no_such_module", "cannot be loaded: ModuleNotFoundError"),
+        (DETECTOR, "def (", "cannot be loaded: SyntaxError"),
+        (DETECTOR, "x = 1", "cannot be loaded: AttributeError"),
         ('"odd"', '"even"', "is named 'even' in its class"),
-        ("    signed: ClassVar[bool] = True\n", "", "lacks the attribute 'signed'"),
-        ("def signal", "def signals", "lacks the attribute 'signal'"),
+        ("    signed: ClassVar[bool] = True\n", "", "has no attribute 'signed'"),
+        ("def signal", "def signals", "has no attribute 'signal'"),
         ('"od"', '"gm"', "has the short name 'gm', which belongs to momentum"),
-        ("(frozen=True)", "", "is no frozen dataclass"),
-        ('gain(1.0, "1", "a factor")', "1.0", "gives no unit and no meaning for 'factor'"),
+        ("(frozen=True)", "", "is not a frozen dataclass"),
+        ('gain(1.0, "1", "a factor")', "1.0", "has no unit and no meaning for 'factor'"),
         (' = gain(1.0, "1", "a factor")', "", "has no default for 'factor'"),
-        ("    signed", "    look: ClassVar[str] = 'red'\n    signed", "has an attribute 'look' that is no Look"),
-        ("    signed", "    look = Look('red', 'o')\n    signed", 'does not load: ConfigurationError("the colour of a'),
+        (
+            "    signed",
+            "    look: ClassVar[str] = 'red'\n    signed",
+            "has an attribute 'look' that is not of type Look",
+        ),
+        (
+            "    signed",
+            "    look = Look('red', 'o')\n    signed",
+            'cannot be loaded: ConfigurationError("the colour of a',
+        ),
         (
             "    signed",
             "    look = Look('#ff0000', '*')\n    signed",
-            'does not load: ConfigurationError("the marker of',
+            'cannot be loaded: ConfigurationError("the marker of',
         ),
     ],
 )
@@ -105,7 +113,7 @@ def test_a_package_that_cannot_be_used_is_one_line_that_names_it(install, old, n
     assert done.err.endswith("(repair or uninstall 'odd-things')\n")
 
 
-def test_a_plugin_has_the_look_that_its_class_gives_and_otherwise_one_that_its_name_decides(install):
+def test_a_plugin_has_the_look_of_its_class_or_one_derived_from_its_name(install):
     absent = look_of("odd")
     install(DETECTOR)
     assert look_of("odd") == absent
@@ -114,22 +122,22 @@ def test_a_plugin_has_the_look_that_its_class_gives_and_otherwise_one_that_its_n
     assert look_of("even") == Look("#123456", "s")
 
 
-def test_the_others_are_listed_beside_a_package_that_cannot_be_used(install):
+def test_the_others_are_listed_despite_an_unusable_package(install):
     install("import no_such_module")
     listed = cdtool("list", "detectors", "--json")
     assert listed.status == 3 and [entry["name"] for entry in json.loads(listed.out)] == DETECTORS.names()
-    assert "left out: odd: detector plug-in 'odd' of package 'odd-things' does not load" in listed.err
+    assert "left out: odd: detector plug-in 'odd' of package 'odd-things' cannot be loaded" in listed.err
     unknown = detect("momentun")
     assert unknown.status == 2 and "unknown detector 'momentun'; " in unknown.err
     assert "(did you mean momentum" in unknown.err
-    assert "package 'odd-things' does not load" in unknown.err
+    assert "package 'odd-things' cannot be loaded" in unknown.err
 
 
 def test_a_name_of_cdtool_itself_is_refused_and_cdtools_own_is_used(install):
     install(DETECTOR.replace('"odd"', '"momentum"'), "momentum")
     listed = cdtool("list", "detectors")
     assert listed.status == 3 and listed.out.count("momentum (gm): Generalized momentum observer") == 1
-    assert "'momentum' of package 'odd-things' bears the name of a detector of cdtool itself" in listed.err
+    assert "'momentum' of package 'odd-things' has the name of a detector of cdtool itself" in listed.err
     assert detect("momentum").status == 0
 
 
@@ -137,14 +145,14 @@ def test_two_packages_with_one_name_are_both_named(install):
     install(DETECTOR, package="one")
     install(DETECTOR, package="two")
     done = detect("odd")
-    assert done.status == 2 and "the packages one and two both bring a detector 'odd'" in done.err
+    assert done.status == 2 and "the packages one and two both provide a detector 'odd'" in done.err
 
 
-def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_go_on(install):
+def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_work(install):
     install(DETECTOR, package="one")
     install(DETECTOR.replace('"odd"', '"even"'), "even", package="two")
     done = detect("od")
-    assert done.status == 2 and "the short name 'od' belongs to even and odd (write the full name)" in done.err
+    assert done.status == 2 and "the short name 'od' belongs to even and odd (give the full name)" in done.err
     assert detect("odd").status == detect("even").status == 0
 
 
@@ -154,7 +162,7 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
         group="thresholds",
     )
     done = cdtool("list", "thresholds")
-    assert done.status == 3 and "'odd' of package 'odd-things' lacks the attribute 'safety_factor'" in done.err
+    assert done.status == 3 and "'odd' of package 'odd-things' has no attribute 'safety_factor'" in done.err
 
 
 @pytest.mark.parametrize(
@@ -195,7 +203,7 @@ def benchmark_file(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("new", ["import no_such_module", DETECTOR.replace("torque = rec", "1 / 0; torque = rec")])
-def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(install, tmp_path, new):
+def test_all_detectors_run_except_an_unusable_one_which_is_named(install, tmp_path, new):
     install(new)
     done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "all", "--json")
     results = json.loads(done.out)
@@ -204,7 +212,7 @@ def test_all_detectors_are_run_without_the_one_that_cannot_be_and_it_is_named(in
     assert finding["reason"].startswith("left out: ") and "odd" in done.err
 
 
-def test_a_detector_that_cannot_learn_stops_no_other_and_alone_ends_with_one_line(install, tmp_path):
+def test_a_detector_that_cannot_learn_does_not_stop_others(install, tmp_path):
     install(DETECTOR.replace("torque = recording", "1 / 0; torque = recording"))
     why = "detector odd fails: ZeroDivisionError"
     done = cdtool("benchmark", benchmark_file(tmp_path), "--detectors", "gm,odd", "--json")
@@ -245,7 +253,7 @@ def benchmark_with_threshold(folder: Path) -> Outcome:
     return cdtool("benchmark", path)
 
 
-def test_the_threshold_that_the_others_are_made_from_is_fine(install, tmp_path):
+def test_the_template_threshold_is_valid(install, tmp_path):
     install(THRESHOLD, group="thresholds")
     assert benchmark_with_threshold(tmp_path).status == 0
 
@@ -264,7 +272,7 @@ def test_a_threshold_that_breaks_the_contract_is_one_line(install, tmp_path, old
     assert THRESHOLD.count(old) == 1
     install(THRESHOLD.replace(old, new), group="thresholds")
     done = benchmark_with_threshold(tmp_path)
-    # The middle of a long line is cut out: its end names the fault.
+    # The middle of a long line is cut: its end names the error.
     assert done.status == 2 and words[-25:] in done.err and "docs/own-detector.md" in done.err
     assert "Traceback" not in done.err
 
@@ -285,7 +293,7 @@ def test_a_threshold_whose_other_methods_fail_is_one_line_too(install, tmp_path,
     assert "Traceback" not in done.err
 
 
-def test_a_program_error_is_never_the_status_of_a_broken_limit(monkeypatch, tmp_path):
+def test_a_program_error_never_has_the_status_of_a_violated_limit(monkeypatch, tmp_path):
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError("deep inside")
 
@@ -316,7 +324,7 @@ def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path)
     assert cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt").status == 0
     (tmp_path / "list.txt").write_text("my own", encoding="utf-8")
     refused = cdtool("report", tmp_path / "results.json", "-o", tmp_path / "list.txt")
-    assert refused.status == 2 and "holds no list of cdtool" in refused.err
+    assert refused.status == 2 and "contains no list of cdtool" in refused.err
     listed = json.loads(cdtool("list", "writers", "--json").out)
     assert listed[-1]["name"] == "odd" and listed[-1]["suffixes"] == [".txt"]
 
@@ -324,9 +332,9 @@ def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('(".txt",)', '("txt",)', "does not load: ConfigurationError"),
-        ('{".txt"', '{".text"', "does not load: ConfigurationError"),
-        ("(Writer)", "", "lacks the attribute 'in_folder'"),
+        ('(".txt",)', '("txt",)', "cannot be loaded: ConfigurationError"),
+        ('{".txt"', '{".text"', "cannot be loaded: ConfigurationError"),
+        ("(Writer)", "", "has no attribute 'in_folder'"),
     ],
 )
 def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, words):

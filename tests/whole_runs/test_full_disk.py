@@ -1,4 +1,4 @@
-"""What becomes of a file that cannot be written to its end: one line, status 2, nothing left behind."""
+"""A file that cannot be written completely: one line, status 2, no file left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.log_rows import LogRows
 from tests.workflows.convert.kinds import KINDS, needs, table
 
-# A disk that is full as far as a process can tell: no file may grow beyond some KiB.
+# A full disk, simulated for a process: no file may exceed a few KiB.
 LIMITED = """
 import resource, sys
 limit = int(sys.argv.pop(1))
@@ -45,7 +45,7 @@ def on_a_full_disk(limit: int, *arguments: object) -> subprocess.CompletedProces
     [*((suffix, 1 << 15) for suffix in KINDS), (".h5", 1 << 11)],
     ids=[*KINDS, ".h5, as it is closed"],
 )
-def test_a_disk_that_gets_full_is_one_line_and_leaves_what_was_there(suffix, limit, tmp_path):
+def test_a_full_disk_is_one_line_and_leaves_existing_files(suffix, limit, tmp_path):
     needs(suffix)
     rows = 10_000 if limit == 1 << 15 else 20
     log, target = table(tmp_path / "run.csv", rows=rows), tmp_path / "out" / f"out{suffix}"
@@ -58,7 +58,7 @@ def test_a_disk_that_gets_full_is_one_line_and_leaves_what_was_there(suffix, lim
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-def test_a_full_device_behind_a_written_file_names_the_file(tmp_path):
+def test_a_full_device_is_reported_with_the_file_name(tmp_path):
     target = tmp_path / "out.csv"
     with (
         pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device") as told,
@@ -69,7 +69,7 @@ def test_a_full_device_behind_a_written_file_names_the_file(tmp_path):
     assert "\n" not in str(told.value) and list(tmp_path.iterdir()) == []
 
 
-def test_a_disk_that_fails_while_the_log_is_read_is_no_fault_of_the_file_that_is_written(tmp_path, monkeypatch):
+def test_a_read_error_is_not_reported_for_the_file_being_written(tmp_path, monkeypatch):
     log = table(tmp_path / "run.csv")
 
     def lost(*_: object):

@@ -1,4 +1,4 @@
-"""25 recordings with hostile names through every report: all parses, nothing is active, nothing leaves the folder."""
+"""25 recordings with hostile names in every report: all parse, no active content, no file outside the folder."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ NAMES: tuple[bytes | str, ...] = (
     " # ~ ; rm -rf $HOME",
     "\ufffe\U000e0041 tag characters",
 )
-# A pattern matches no name that begins with a dot.
+# A pattern does not match names that begin with a dot.
 SEEN = [name for name in NAMES if not os.fsdecode(name).startswith(".")]
 GROUP = "<script>alert(2)</script> ../../up $y$ =1+1 \u202e" + "g" * 300
 MACHINE = "<b onclick=alert(3)>gate</b> ${x} \u202e"
@@ -56,7 +56,7 @@ REPORTS = ("again.json", "again.html", "again.md", "again.xml", "again.csv", "ag
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory) -> tuple[Path, Outcome, Outcome]:
-    """The folder, what `benchmark` said, and what `report` said."""
+    """The folder, the output of `benchmark`, and the output of `report`."""
     folder = tmp_path_factory.mktemp("hostile")
     cdtool.simulate_gate(folder / "logs", {"free": 10, "stiff": len(NAMES), "holdout": 1}, seed=13)
     logs = folder / "logs"
@@ -83,7 +83,7 @@ def text(bench, name: str) -> str:
     return (bench[0] / "out" / name).read_bytes().decode("utf-8")
 
 
-def test_both_commands_end_as_the_limits_say(bench):
+def test_both_commands_exit_with_the_status_of_the_limits(bench):
     _, made, again = bench
     assert (made.status, again.status) == (1, 1), made.err + again.err
     assert "Traceback" not in made.err + again.err
@@ -98,7 +98,7 @@ def test_nothing_is_written_outside_the_output_folder_and_every_file_name_is_pla
     assert {path.parent for path in (folder / "out").rglob("*")} == {folder / "out"}
 
 
-def test_nothing_is_garbled_on_a_terminal(bench):
+def test_terminal_output_has_no_control_characters(bench):
     for said in (bench[1].out, bench[1].err, bench[2].out, bench[2].err):
         active = {letter for letter in said if unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")}
         assert active <= {"\n"}
@@ -111,14 +111,14 @@ def test_json_is_strict_and_holds_every_recording(bench, name):
     assert len(values["contacts"]) == 2 * len(SEEN)
 
 
-def test_a_report_made_again_is_the_same(bench):
+def test_a_report_written_again_is_the_same(bench):
     pairs = {"html": "report.html", "xml": "junit.xml", "csv": "contacts.csv", "json": "results.json"}
-    for suffix, name in pairs.items():  # the folder's Markdown differs: it links the figures beside it
+    for suffix, name in pairs.items():  # the folder's Markdown differs: it links its figures
         assert text(bench, f"again.{suffix}") == text(bench, name)
 
 
 class Page(HTMLParser):
-    """Every tag and attribute of a page."""
+    """Return every tag and attribute of a page."""
 
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)

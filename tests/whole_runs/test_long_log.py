@@ -77,7 +77,7 @@ def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
     assert results.contacts[0].force_at_alarm_n > 10.0
 
 
-def test_the_plain_limit_serves_a_benchmark_too(folder):
+def test_the_plain_limit_works_in_a_benchmark(folder):
     text = BENCHMARK.replace('operations = "motion"', 'operations = "motion"\nthreshold = "limit"')
     (folder / "limit.toml").write_text(text)
     results = cdtool.benchmark(folder / "limit.toml").results
@@ -86,7 +86,7 @@ def test_the_plain_limit_serves_a_benchmark_too(folder):
     assert results.provenance["threshold"] == "limit"
 
 
-def test_labels_serve_as_ground_truth_where_no_load_cell_is_mapped(folder):
+def test_labels_are_the_ground_truth_without_a_load_cell(folder):
     text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
     (folder / "labels.toml").write_text(text)
     (folder / "label_benchmark.toml").write_text(BENCHMARK.replace("machine.toml", "labels.toml"))
@@ -119,7 +119,7 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
     assert second["current"][0]["by_position"]["mean"] != first["current"][0]["by_position"]["mean"]
 
 
-def test_the_signature_rule_reaches_the_file(folder):
+def test_the_signature_rule_is_stored_in_the_file(folder):
     rule = Signature(sides="two", safety_factor=7.0, alignment="position")
     learned = cdtool.learn_signature(
         [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", activation={"debounce": 4}
@@ -129,7 +129,7 @@ def test_the_signature_rule_reaches_the_file(folder):
     assert learned.signature.activation == Activation(4)
 
 
-def test_what_could_not_be_judged_is_told_with_its_share(folder):
+def test_unassessable_sections_are_shown_with_their_share(folder):
     (folder / "benchmark.toml").write_text(BENCHMARK)
     results = cdtool.benchmark(folder / "benchmark.toml").results
     momentum = next(item for item in results.exposure if (item.group, item.detector) == ("holdout", "momentum"))
@@ -148,29 +148,33 @@ def test_what_could_not_be_judged_is_told_with_its_share(folder):
         "motion",
     )
     assert done.status == 0
-    told = " ".join(done.out.split())  # lines end where the terminal does
-    assert re.search(r"not judged in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told)
+    told = " ".join(done.out.split())  # lines wrap at the terminal's width
+    assert re.search(
+        r"not assessable in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told
+    )
 
 
-def test_a_contact_that_no_operation_holds_is_told_not_lost(folder):
+def test_a_contact_outside_all_operations_is_reported(folder):
     write_log(folder / "rest.csv", 6, {1: 60.0}, 4)
     table = np.loadtxt(folder / "rest.csv", delimiter=",", skiprows=1)
     resting = table[-1].copy()
     tail = np.tile(resting, (4000, 1))
     tail[:, 0] = table[-1, 0] + 1e-3 * np.arange(1, 4001)
     tail[:, 2], tail[:, 4] = 0.0, 0.0
-    tail[2500:2800, 4] = 200.0  # the cell is hit long after the last stroke
+    tail[2500:2800, 4] = 200.0  # an impact on the cell long after the last stroke
     rows = np.vstack((table, tail))
     header = "t,drive,v,x,cell,hit"
     np.savetxt(folder / "rest.csv", rows, delimiter=",", header=header, comments="", fmt="%.7g")
     (folder / "rest.toml").write_text(BENCHMARK.replace("hits.csv", "rest.csv"))
     results = cdtool.benchmark(folder / "rest.toml").results
-    assert [item.reason for item in results.skipped] == ["the contact at 26.500 s lies in no operation (cut by motion)"]
+    assert [item.reason for item in results.skipped] == [
+        "the contact at 26.500 s is outside all operations (cut by motion)"
+    ]
     assert len(results.contacts) == 2
 
 
-def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
-    """The speed is lost from before the contact on: the momentum observer sees nothing, and says so."""
+def test_an_unassessable_contact_has_a_reason(folder, tmp_path):
+    """The speed is lost before the contact: the momentum observer is not assessable, and reports it."""
     table = np.loadtxt(folder / "hits.csv", delimiter=",", skiprows=1)
     table[(table[:, 0] > 5.9) & (table[:, 0] < 8.0), 2] = np.nan
     np.savetxt(folder / "lost.csv", table, delimiter=",", header="t,drive,v,x,cell,hit", comments="", fmt="%.7g")
@@ -181,7 +185,7 @@ def test_a_contact_that_cannot_be_assessed_says_why(folder, tmp_path):
 
 
 @pytest.mark.parametrize("call", [cdtool.detect, cdtool.explain])
-def test_detect_and_explain_take_the_fields_of_the_options_as_keywords_and_no_other(call):
+def test_detect_and_explain_accept_only_the_option_fields_as_keywords(call):
     log, *given = inspect.signature(call).parameters
     assert log == "log" and given == list(inspect.signature(DetectionOptions).parameters)
     with pytest.raises(TypeError, match="'limits'"):

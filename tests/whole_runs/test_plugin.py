@@ -1,4 +1,4 @@
-"""A detector and a threshold of another package, really installed, through every command."""
+"""A detector and a threshold of another, installed package, in every command."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
 def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Another interpreter that finds the packages in `site`."""
+    """Run another interpreter that finds the packages in `site`."""
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{site}", "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(
         [sys.executable, *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=folder, check=False
@@ -34,7 +34,7 @@ def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.Co
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where pip has installed the example package."""
+    """Folder in which pip has installed the example package."""
     folder = tmp_path_factory.mktemp("plugin")
     shutil.copytree(ROOT / "tests" / "plugin_example", folder / "source")
     install = ("install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", "--no-build-isolation")
@@ -45,7 +45,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def command(site: Path, tmp_path: Path) -> Command:
-    """`cdtool ARGUMENTS` with the example package, in a fresh folder."""
+    """Run `cdtool ARGUMENTS` with the example package, in a new folder."""
     return lambda *arguments: python("-c", MAIN, *arguments, site=site, folder=tmp_path)
 
 
@@ -55,7 +55,7 @@ def machine_with(folder: Path, more: str) -> Path:
     return path
 
 
-def test_list_tells_the_plugins_with_gains_units_and_defaults(command):
+def test_list_shows_the_plugins_with_gains_units_and_defaults(command):
     entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").stdout)}
     assert list(entries) == [*DETECTORS.names(), "torque_rate"]
     assert entries["torque_rate"]["short_name"] == "tr" and entries["torque_rate"]["needs"] == ["torque"]
@@ -77,7 +77,7 @@ def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(com
     assert (found["detector"], found["unit"], found["verdict"]) == ("torque_rate", "N/s", "alarm")
     assert 50.0 < found["contacts"][0]["latency_ms"] < 250.0
     explained = command("explain", log, *machine, "-s", "tr.json")
-    assert explained.returncode == 0 and "The first that torque_rate reads: torque" in explained.stdout
+    assert explained.returncode == 0 and "First input of torque_rate: torque" in explained.stdout
     other = machine_with(tmp_path, "\n[detectors.tr]\ncutoff = 3.0\n")
     refused = command("detect", log, "-m", other, "-s", "tr.json")
     assert refused.returncode == 2 and "learned with cutoff = 2.0" in refused.stderr
@@ -85,7 +85,7 @@ def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(com
     assert without.returncode == 2 and "unknown detector 'torque_rate'" in without.stderr
 
 
-def test_its_gains_stand_in_the_machine_file_under_either_name(command, tmp_path):
+def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp_path):
     log = GATE / "stiff" / "03.csv"
     alarms = []
     for name in ("tr", "torque_rate"):
@@ -122,7 +122,7 @@ def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_pat
         assert "cdtool-plugin-example" in (tmp_path / report).read_text(encoding="utf-8"), report
 
 
-def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
+def test_all_detectors_include_those_of_plugins(command, tmp_path):
     machine = ("--machine", GATE / "machine.toml")
     text = f'machine = "{GATE}/machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
     text += f'[learn]\nlogs = ["{GATE}/free/03.csv", "{GATE}/free/04.csv"]\n'
@@ -135,7 +135,7 @@ def test_all_detectors_are_all_of_cdtool_and_of_the_plugins(command, tmp_path):
     (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").stdout)
     assert one["detector"] == "torque_rate"
     only = command("benchmark", "benchmark.toml", "--detectors", "tr")
-    assert only.returncode == 0 and "1 of 1 limits are on detectors that were not run" in only.stderr
+    assert only.returncode == 0 and "1 of 1 limits are set for detectors that were not run" in only.stderr
 
 
 def test_the_contract_tests_run_over_the_plugins(site):

@@ -40,7 +40,7 @@ def test_the_emps_log_is_cut_into_eight_strokes_of_two_classes(emps):
 
 @needs_data("emps/DATA_EMPS.mat")
 @pytest.mark.parametrize("name", ["momentum", "pure_torque"])
-def test_each_emps_stroke_is_quiet_against_a_signature_of_the_others(emps, name):
+def test_each_emps_stroke_raises_no_alarm_with_a_signature_of_the_others(emps, name):
     machine_file, recording = emps
     strokes = operations_of(recording, "motion")
     detector = machine_file.detector(name)
@@ -55,7 +55,7 @@ def test_each_emps_stroke_is_quiet_against_a_signature_of_the_others(emps, name)
 
 @needs_data("emps/DATA_EMPS.mat")
 def test_an_added_force_on_an_emps_stroke_is_found(emps):
-    """The other side of the quiet test: a force of 60 N that the model does not know must not stay quiet."""
+    """The counterpart of the test without alarms: an unmodelled force of 60 N must raise an alarm."""
     machine_file, recording = emps
     strokes = operations_of(recording, "motion")
     detector = machine_file.detector("momentum")
@@ -69,7 +69,7 @@ def test_an_added_force_on_an_emps_stroke_is_found(emps):
 
 
 @needs_data("emps/DATA_EMPS.mat")
-def test_four_strokes_a_direction_need_force(tmp_path):
+def test_four_strokes_per_direction_require_force(tmp_path):
     arguments = ("learn-signature", DATA / "emps" / "DATA_EMPS.mat", "-m", EXAMPLES / "emps.toml", "-d", "gm")
     done = run(*arguments, "--operations", "motion", "-o", tmp_path / "s.json")
     assert done.status == 2 and "6 more are needed" in done.err
@@ -92,7 +92,7 @@ def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
 
 
 @needs_data("ur10e/link4.csv")
-def test_a_detector_that_needs_an_inertia_says_so_on_a_machine_without_one():
+def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
     log = DATA / "ur10e" / "link4.csv"
     done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--limit", "30")
     assert done.status == 2 and "load_inertia" in done.err

@@ -24,7 +24,7 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "ur10e_collisions.py
 DETECTORS = ("momentum", "kalman_momentum", "velocity", "direct", "energy")
 UR10 = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 PANDA = tuple(f"panda_joint{k}" for k in range(1, 8))
-# What comes before the abrupt stop and the last contact [s].
+# Length before the abrupt stop and the last contact [s].
 CONTACT_FREE_END = {"no_torque": 5.0, "link4": 16.4, "ur-static": math.inf}
 
 needs_arm = needs_data("ur10e/parameters.json")
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(find_spec("pinocchio") is None, reason="pinocchi
 
 
 def robot_urdf(name: str) -> Path | None:
-    """A URDF of the package example-robot-data; None where that is not installed."""
+    """Return a URDF of the package example-robot-data; None if it is not installed."""
     try:
         found = files("example-robot-data") or []
     except PackageNotFoundError:
@@ -66,7 +66,7 @@ def motion_of(recording):
 
 
 def forward_euler_observer(time, net_force, momentum, gain):
-    """The recursion of the data's own page: its residual is positive where a contact pushes the joint forward."""
+    """The recursion on the data's web page: its residual is positive if a contact pushes the joint forward."""
     residual, total = np.zeros_like(momentum), momentum[0].copy()
     for k in range(1, len(time)):
         total = total + (time[k] - time[k - 1]) * (net_force[k] + residual[k - 1])
@@ -76,7 +76,7 @@ def forward_euler_observer(time, net_force, momentum, gain):
 
 @needs_arm
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
-def test_the_reference_observer_of_the_data_comes_out_of_the_machines_terms(arm, name):
+def test_the_reference_observer_of_the_data_follows_from_the_machines_terms(arm, name):
     import pinocchio as pin
 
     recording = read(name, arm)
@@ -108,7 +108,7 @@ def test_the_reference_observer_of_the_data_comes_out_of_the_machines_terms(arm,
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
 @pytest.mark.parametrize(("gain", "share"), [(20.0, 0.1), (2.0, 0.04), ((27.0, 15.0, 15.0, 27.0, 27.0, 12.0), 0.12)])
 def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(arm, name, gain, share):
-    """They differ by the sampling alone, forward Euler against the exact step, and less the smaller K T is."""
+    """They differ only by the sampling, forward Euler versus the exact step; the difference decreases with K T."""
     recording = read(name, arm)
     machine_file = read_machine_file(arm)
     machine = machine_file.machine
@@ -124,7 +124,7 @@ def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(a
 
 
 @needs_arm
-def test_at_rest_the_model_and_the_currents_hold_the_shoulder_alike(arm):
+def test_at_rest_model_and_currents_agree_for_the_shoulder(arm):
     position, _, torque = motion_of(read("ur-static", arm))
     gravity = read_machine_file(arm).machine.gravity(position).mean(axis=0)
     assert gravity[1] == pytest.approx(-44.5, abs=0.05)
@@ -157,7 +157,7 @@ def test_joints_named_in_another_order_with_their_columns_give_the_same_residual
         ("[1, 2, 3, 4, 5, 6]", "[1, 2, 3, 4, 5]", "names 5 columns"),
     ],
 )
-def test_joints_and_columns_that_do_not_belong_together_are_refused(arm, tmp_path, right, wrong, message):
+def test_mismatched_joints_and_columns_are_refused(arm, tmp_path, right, wrong, message):
     text = arm.read_text(encoding="utf-8")
     assert right in text
     (tmp_path / "wrong.toml").write_text(text.replace(right, wrong), encoding="utf-8")
@@ -167,7 +167,7 @@ def test_joints_and_columns_that_do_not_belong_together_are_refused(arm, tmp_pat
 
 @pytest.fixture(scope="module")
 def judged(example, tmp_path_factory):
-    """What the example finds: each detector on no_torque, link4 and ur-static."""
+    """The results of the example: each detector on no_torque, link4 and ur-static."""
     path = tmp_path_factory.mktemp("judged") / "machine.toml"
     return example["run"](data("ur10e"), path, factor=5.5, block=0.5)
 
@@ -189,7 +189,7 @@ def test_every_contact_of_the_arm_is_found_with_limits_from_five_seconds_without
     ("name", "count"), [("momentum", 1), ("kalman_momentum", 1), ("velocity", 3), ("direct", 0), ("energy", 0)]
 )
 def test_false_alarms_come_only_from_a_wrist_that_stands_still(judged, name, count):
-    """Its dry friction takes any value up to Coulomb's there, and no rest was in what the limits were learned from."""
+    """At rest, dry friction takes any value up to Coulomb's, and the learned runs contain no rest."""
     quiet, moving, resting = judged[name]
     assert not quiet.detection.verdict.alarms and not resting.matching.false_alarms
     false = moving.matching.false_alarms
@@ -201,7 +201,7 @@ def test_false_alarms_come_only_from_a_wrist_that_stands_still(judged, name, cou
 
 
 @needs_arm
-def test_the_energy_observer_misses_slow_contacts_and_says_that_it_cannot_judge_at_rest(judged):
+def test_the_energy_observer_misses_slow_contacts_and_is_not_assessable_at_rest(judged):
     _, moving, resting = judged["energy"]
     assert [match.outcome for match in moving.matching.matches] == ["missed"] * 3
     assert [match.outcome for match in resting.matching.matches] == ["not_assessable"] * 4
@@ -209,7 +209,7 @@ def test_the_energy_observer_misses_slow_contacts_and_says_that_it_cannot_judge_
 
 
 @needs_arm
-def test_the_table_of_the_page_is_what_the_example_finds(judged):
+def test_the_table_of_the_page_matches_the_example(judged):
     text = (EXAMPLE.parents[1] / "real-recordings.md").read_text(encoding="utf-8")
     for name, (_, moving, resting) in judged.items():
         row_of = rf"^\| `{name}` \| (.*) (?:N m|W) \| (.*) \| (.*) \| (\d) \| (\d+) % \|$"
@@ -241,7 +241,7 @@ def test_smaller_limits_bring_false_alarms_and_larger_ones_miss_contacts(example
 
 
 def machine_text(urdf: Path, joints: dict[str, str], extra: str = "") -> str:
-    """A machine file for joint states: the log's names, each with its name in the URDF."""
+    """A machine file for joint states: the log's names, each mapped to its name in the URDF."""
     names = "\n".join(f'{mine} = "{theirs}"' for mine, theirs in joints.items())
     fields = {"position": "position[:]", "speed": "velocity[:]", "torque": "effort[:]"}
     channels = "\n".join(f'{key} = {{ topic = "/joint_states", field = "{field}" }}' for key, field in fields.items())
@@ -252,7 +252,7 @@ def machine_text(urdf: Path, joints: dict[str, str], extra: str = "") -> str:
 
 
 def joint_states(name: str, folder: Path):
-    """The machine file and the recording of an arm's log; the log holds a Panda's joints as fer_joint1 to 7."""
+    """The machine file and the recording of an arm's log, in which a Panda's joints are fer_joint1 to 7."""
     if name == "ur10":
         text = machine_text(robot_urdf("ur_description/urdf/ur10_robot.urdf"), {joint: joint for joint in UR10})
     else:
@@ -265,7 +265,7 @@ def joint_states(name: str, folder: Path):
 
 
 def friction_of(rest, speed):
-    """Viscous, Coulomb (slope 50 s/rad) and constant friction of each joint that explain a torque best."""
+    """Return the viscous, Coulomb (slope 50 s/rad) and constant friction of each joint that best explain a torque."""
     found = []
     for j in range(speed.shape[1]):
         terms = np.column_stack((speed[:, j], np.tanh(50.0 * speed[:, j]), np.ones(len(speed))))
@@ -322,7 +322,7 @@ def test_every_detector_runs_on_joint_states_of_a_real_arm(name, detector, tmp_p
 
 @needs_robots
 @needs_data("mcap_samples/panda_joint_states.mcap")
-def test_joints_of_a_urdf_that_the_log_names_otherwise_are_asked_for_by_name(tmp_path):
+def test_joints_with_other_names_in_the_log_must_be_named(tmp_path):
     text = machine_text(
         robot_urdf("panda_description/urdf/panda.urdf"),
         {joint: joint for joint in PANDA},

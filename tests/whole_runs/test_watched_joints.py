@@ -1,4 +1,4 @@
-"""Machines of several joints through every command: chosen joints, blind detectors, alarms that name their joint."""
+"""Machines with several joints in every command: selected joints, unassessable joints, alarms that name their joint."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ def learn(folder: Path, output: Path, *options: object) -> None:
     assert done.status == 0, done.err
 
 
-def test_a_benchmark_watches_the_joints_it_names_and_says_so(forearm):
+def test_a_benchmark_monitors_the_joints_it_names_and_shows_them(forearm):
     results = api.benchmark(forearm / "benchmark.toml").results
     assert results.provenance["watched_joints"] == "forearm"
     assert {item.joint for item in results.contacts if item.joint} == {"forearm"}
     done = cdtool("benchmark", forearm / "benchmark.toml")
-    # The friction EKF can judge no joint at rest: that is said, and counts as left out.
-    assert done.status == 3 and "joints watched, of all: forearm" in done.out
+    # The friction EKF cannot assess a joint at rest, which is reported and counts as left out.
+    assert done.status == 3 and "joints monitored, of all: forearm" in done.out
 
 
-def test_a_detector_that_can_judge_nothing_is_not_assessable_and_the_others_go_on(forearm):
+def test_a_detector_without_assessable_samples_does_not_stop_the_others(forearm):
     results = api.benchmark(forearm / "benchmark.toml").results
     blind = [item for item in results.contacts if item.detector == "friction_ekf"]
     assert len(blind) == 3 and {item.outcome for item in blind} == {"not_assessable"}
@@ -49,13 +49,13 @@ def test_a_detector_that_can_judge_nothing_is_not_assessable_and_the_others_go_o
     assert seen == ["detected"] * 3
 
 
-def test_learning_a_signature_where_the_detector_is_blind_is_a_clear_error(forearm):
+def test_learning_a_signature_without_assessable_samples_is_a_clear_error(forearm):
     free = sorted((forearm / "free").iterdir())
     with pytest.raises(NothingValidError, match="not applicable 100 %"):
         api.learn_signature(free, forearm / "machine.toml", "feekf", joints=("forearm",))
 
 
-def test_a_signature_watches_the_joints_that_it_was_learned_for(forearm, tmp_path):
+def test_a_signature_monitors_the_joints_it_was_learned_for(forearm, tmp_path):
     signature = tmp_path / "forearm.json"
     learn(forearm, signature, "--joints", "forearm")
     log = forearm / "stiff" / "01.csv"
@@ -63,19 +63,19 @@ def test_a_signature_watches_the_joints_that_it_was_learned_for(forearm, tmp_pat
     alarms = json.loads(done.out)[0]["alarms"]
     assert alarms and {alarm["joint"] for alarm in alarms} == {"forearm"}
     refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--joints", "arm")
-    assert refused.status == 2 and "joints belong to a limit" in refused.err
+    assert refused.status == 2 and "joints require a limit" in refused.err
     more = forearm / "holdout" / "01.csv"
     added = cdtool("signature", "update", signature, more, "-m", forearm / "machine.toml", "--json")
     assert added.status == 0 and len(json.loads(added.out)["added"]) == 1
 
 
-def test_a_signature_of_a_robot_watches_every_joint_on_both_sides_unless_told_otherwise(forearm, tmp_path):
+def test_a_robot_signature_monitors_every_joint_on_both_sides_by_default(forearm, tmp_path):
     learn(forearm, tmp_path / "all.json")
     stored = json.loads((tmp_path / "all.json").read_text())["current"][0]
     assert stored["joints"] == ["arm", "forearm"] and stored["sides"] == "two"
 
 
-def test_hand_set_limits_watch_chosen_joints(forearm):
+def test_limits_set_by_hand_monitor_the_chosen_joints(forearm):
     machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
     found = api.detect(log, machine, detector="gm", limit=[0.6], joints=("forearm",))
     assert found.joints == ("forearm",) and found.detections[0].statistic.values.shape[1] == 1
@@ -117,7 +117,7 @@ def test_info_names_every_joint(forearm):
     assert done.status == 0 and "speed [arm]" in done.out and "speed [forearm]" in done.out
 
 
-def test_a_benchmark_runs_other_detectors_when_asked_and_all_that_the_logs_allow(forearm, tmp_path):
+def test_a_benchmark_runs_the_given_detectors_or_all_that_the_logs_allow(forearm, tmp_path):
     results = api.benchmark(forearm / "benchmark.toml", detectors=("vo", "gm")).results
     assert results.detectors == ("velocity", "momentum")
     every = api.benchmark(forearm / "benchmark.toml", detectors=("all",)).results
@@ -130,5 +130,5 @@ def test_a_benchmark_runs_other_detectors_when_asked_and_all_that_the_logs_allow
     left = {item.recording for item in fewer.findings if "needs the channel 'acceleration'" in item.reason}
     assert left == {name for name in DETECTORS.names() if "acceleration" in DETECTORS.load(name).needs}
     assert list(fewer.detectors) == [name for name in DETECTORS.names() if name not in left]
-    with pytest.raises(UsageError, match="name one twice"):
+    with pytest.raises(UsageError, match="contain a repetition"):
         api.benchmark(forearm / "benchmark.toml", detectors=("gm", "momentum"))

@@ -1,4 +1,4 @@
-"""Logs without reference channels, from the simulator to the verdict; all of it: benchmarks/without_reference.py."""
+"""Logs without reference channels, from simulator to verdict; the full test is benchmarks/without_reference.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A planted regression of the simulated gate is found, and equal builds are left in peace.
+"""A planted regression of the simulated gate is found, and equal builds are not reported as different.
 
 A small set; the full one is benchmarks/compare_builds.py.
 """
@@ -42,7 +42,7 @@ def test_five_more_samples_of_debounce_are_found_as_five_milliseconds(builds):
     assert {(item.key, item.old, item.new) for item in found.changed} == {("debounce_samples", "9", "14")}
 
 
-def test_the_way_back_is_better_and_nothing_is_no_change(builds):
+def test_the_reverse_change_is_better_and_no_difference_is_no_change(builds):
     assert compare(builds[14], builds[9]).verdict == "better"
     assert compare(builds[9], builds[9]).verdict == "no change shown"
 

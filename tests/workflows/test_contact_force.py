@@ -1,4 +1,4 @@
-"""From a joint residual to the force at a known point."""
+"""The force at a known point, from a joint residual."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ POINT = ContactPoint("forearm", (0.2, 0.0, 0.0))
 
 
 def hit(machine, force, at=2.0):
-    """A recording in which the point meets a force that stays as it is in the base's axes from `at` s on."""
-    free = moving(machine, seconds=5.0, amplitude=0.15, seed=4)  # the elbow stays bent: both directions can be felt
+    """A recording in which a force, constant in the base's axes, acts at the point from `at` s."""
+    free = moving(machine, seconds=5.0, amplitude=0.15, seed=4)  # the elbow stays bent: both directions are observable
     torque, position = free["torque"], free["position"].values
     pushed = np.zeros((len(position), 6))
     pushed[torque.time >= at, :3] = force
@@ -51,14 +51,14 @@ def test_a_force_in_the_plane_is_found_from_the_residual_once_it_has_settled(arm
     assert 0.0 < summary.at_alarm < summary.largest
 
 
-def test_near_a_stretched_pose_what_cannot_be_felt_is_zero_and_not_noise(arm):
+def test_near_a_singular_pose_unobservable_forces_are_zero(arm):
     position, residual = np.array([[0.5, 0.501]]), np.array([[1.0, 2.0]])
     found = arm.contact_force(position, residual, POINT.link, POINT.point)[0]
     along = np.array([np.cos(0.5), 0.0, np.sin(0.5)])
     assert abs(found @ along) < 0.05 * np.linalg.norm(found) and np.linalg.norm(found) < 20.0
 
 
-def test_samples_that_cannot_be_judged_have_no_force(arm):
+def test_unassessable_samples_have_no_force(arm):
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
     speed = recording["speed"].values.copy()
     speed[3000:3100] = np.nan
@@ -68,16 +68,16 @@ def test_samples_that_cannot_be_judged_have_no_force(arm):
     assert np.isfinite(found.values[4000:]).all()
 
 
-def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated):
+def test_a_signal_that_is_not_the_contact_torque_of_all_joints_is_refused(arm, gate, simulated):
     recording = hit(arm, np.array([6.0, 0.0, -9.0]))
-    with pytest.raises(UsageError, match="energy of whole machine is no contact torque"):
+    with pytest.raises(UsageError, match="energy of whole machine is not the contact torque"):
         contact_force(detected(arm, recording, Energy()), arm, POINT)
-    with pytest.raises(UsageError, match="is no contact torque") as refused:
+    with pytest.raises(UsageError, match="is not the contact torque") as refused:
         contact_force(detected(arm, recording, PureTorque()), arm, POINT)
     assert "direct, desired_dynamics, velocity or kalman_momentum" in str(refused.value)
     operation = operations_of(recording)[0]
     one = detect_operation(operation, arm, Momentum(), (Limit.given([1.0]),), Activation(5), watched=("arm",))
-    with pytest.raises(UsageError, match="momentum of arm is no contact torque of all joints"):
+    with pytest.raises(UsageError, match="momentum of arm is not the contact torque of all joints"):
         contact_force(one, arm, POINT)
     with pytest.raises(UsageError, match="no links"):
         contact_force(detected(gate, simulated("stiff", 1), Momentum()), gate, POINT)
@@ -86,12 +86,12 @@ def test_what_is_no_contact_torque_of_all_joints_is_refused(arm, gate, simulated
 
 
 @pytest.mark.parametrize("text", ["forearm", "forearm:1,2", "forearm:1,2,x", ":1,2,3", "forearm:1,2,nan"])
-def test_a_point_that_cannot_be_understood_is_refused(text):
+def test_an_invalid_point_is_refused(text):
     with pytest.raises(UsageError, match="LINK:X,Y,Z"):
         ContactPoint.parse(text)
 
 
-def test_detect_tells_the_force_beside_its_alarms(tmp_path):
+def test_detect_shows_the_force_with_its_alarms(tmp_path):
     write_arm_recordings(tmp_path / "logs", {"free": 1, "holdout": 0, "stiff": 1, "soft": 0}, seed=1)
     command = ("detect", tmp_path / "logs/stiff/01.csv", "-m", tmp_path / "logs/machine.toml", "-d", "gm")
     done = cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0")
@@ -99,6 +99,6 @@ def test_detect_tells_the_force_beside_its_alarms(tmp_path):
     values = json.loads(cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0", "--json").out)[0]
     estimate = values["estimated_force"]
     assert estimate["link"] == "arm" and estimate["point_m"] == [0.28, 0.0, 0.0]
-    # The load cell's peak, and what the joint's dry friction, which the machine file does not know, adds at this lever.
+    # The load cell's peak, plus what the joint's dry friction, unknown to the machine file, adds at this lever.
     assert 20.0 < estimate["largest_n"] < 60.0
     assert values["alarms"] and 0.0 < estimate["at_alarm_n"] <= estimate["largest_n"]

@@ -1,4 +1,4 @@
-"""What `cdtool info` finds without a machine file: the clock, gaps, missing values."""
+"""`cdtool info` without a machine file: clock, gaps, missing values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def write(path: Path, header: str, columns: list[np.ndarray]) -> Path:
     ("header", "factor", "unit"),
     [("t,v", 1.0, "s"), ("Time,v", 1e3, "ms"), ("stamp,v", 1e6, "us"), ("time [ms],v", 1e3, "ms"), ("a,v", 1e9, "ns")],
 )
-def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_said(tmp_path, header, factor, unit):
+def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_shown(tmp_path, header, factor, unit):
     time = np.arange(2000) * 1e-3
     info = cdtool.info(write(tmp_path / "a.csv", header, [time * factor, np.sin(time)]))
     assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 2)
@@ -31,7 +31,7 @@ def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_said(tmp_path, 
     assert any(f"taken to be the clock, in {unit}" in item.message for item in info.findings)
 
 
-def test_gaps_backward_time_and_missing_values_are_all_told_at_once(tmp_path):
+def test_gaps_backward_time_and_missing_values_are_reported_together(tmp_path):
     time = np.arange(2000) * 1e-3
     time[1000:] += 0.4
     time[500] = 0.1
@@ -43,7 +43,7 @@ def test_gaps_backward_time_and_missing_values_are_all_told_at_once(tmp_path):
         assert words in told
 
 
-def test_without_a_clock_no_rate_is_made_up(tmp_path):
+def test_without_a_clock_no_rate_is_shown(tmp_path):
     rng = np.random.default_rng(1)
     info = cdtool.info(write(tmp_path / "a.csv", "a,b", [rng.normal(size=50), rng.normal(size=50)]))
     assert [channel.rate_hz for channel in info.channels] == [None, None]
@@ -68,7 +68,7 @@ def test_a_log_without_a_header_has_a_clock_too():
     assert info.channels[3].duration_s == pytest.approx(5.664)
 
 
-def test_columns_of_joints_that_are_mixed_up_are_told(tmp_path):
+def test_swapped_columns_of_joints_are_reported(tmp_path):
     time = np.arange(4000) * 1e-3
     positions = [np.sin(time), 0.7 * np.sin(2.3 * time + 1.0), np.full(len(time), 0.3)]
     speeds = [np.gradient(item, 1e-3) for item in positions]
@@ -120,7 +120,7 @@ def test_an_hour_of_an_accelerometer_is_checked():
     assert "fits the speed" in found.message
 
 
-def test_a_torque_without_any_value_is_no_traceback(tmp_path):
+def test_a_torque_without_values_causes_no_traceback(tmp_path):
     from tests.command import cdtool as command
 
     made = command("simulate", "gate", "--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0, "-o", tmp_path / "gate")

@@ -141,7 +141,7 @@ def compare_builds(
     """
     check_significance(significance)
     if not 0.0 < relevant_change <= 1.0:
-        raise UsageError(f"relevant change is {relevant_change:g}", "a share above 0 and up to 1, such as 0.1")
+        raise UsageError(f"relevant change is {relevant_change:g}", "give a share above 0 and up to 1, such as 0.1")
     groups = [group for group in old.groups if group in new.groups]
     detectors = [name for name in old.detectors if name in new.detectors]
     builds = (Build(old), Build(new))
@@ -219,11 +219,11 @@ def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: 
                 which = "old" if _in_samples(one) else "new"
                 raise ConfigurationError(
                     f"{which} is of an earlier version, whose onsets are counted in samples, not in ms",
-                    f"run the benchmark of {which} again with this version: such figures cannot be compared",
+                    f"run the benchmark of {which} again with this version: such results cannot be compared",
                 )
             raise ConfigurationError(
                 f"{name} differs: {_shown(one)} in old, {_shown(other)} in new",
-                f"such figures cannot be compared: set {where} of the benchmark file alike and run one of them again",
+                f"such results cannot be compared: use the same {where} in the benchmark file and run one again",
             )
 
 

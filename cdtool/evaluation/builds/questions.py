@@ -172,7 +172,7 @@ def ask_false_alarms(old: Watched, new: Watched, paired: bool) -> Asked:
     """
     count, hours, count_new, hours_new = old.false_alarms, old.hours, new.false_alarms, new.hours
     if not (hours > 0.0 and hours_new > 0.0):
-        reason = "nothing was watched in one of them"
+        reason = "nothing was monitored in one of them"
         return _without("false_alarms", (count, hours), (count_new, hours_new), reason, math.inf)
 
     def p_of(number: int) -> float:
@@ -195,7 +195,7 @@ def _ask_flags(
     if not paired:
         return _ask_counts(figure, (before, len(old)), (after, len(new)))
     if not old:
-        return _without(figure, (0, 0), (0, 0), "no contact that both could assess", math.inf)
+        return _without(figure, (0, 0), (0, 0), "no contact assessable in both", math.inf)
     only_old = sum(a and not b for a, b in zip(old, new, strict=True))
     only_new = sum(b and not a for a, b in zip(old, new, strict=True))
 

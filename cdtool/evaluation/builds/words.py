@@ -1,4 +1,4 @@
-"""What was found of two builds, in words: each row, the whole, and how contacts were paired."""
+"""The comparison of two builds in words: each row, the verdict, and how contacts were paired."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from cdtool.evaluation.builds.rows import INCONCLUSIVE, NOTHING_SHOWN, BuildRow,
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.plain_text import counted, shorten
 
-# The reason of any verdict on one file given twice, or on a copy of it.
-SAME_RESULTS = "both files hold the same results"
-# This many are named in the line of the verdict; all are listed in `only_old`.
+# The reason of a verdict on a file compared with itself or with a copy.
+SAME_RESULTS = "both files contain the same results"
+# Number of names in the line of the verdict; `only_old` lists all.
 _NAMED = 3
 
 
@@ -25,17 +25,17 @@ def row_words(row: BuildRow, asked: int) -> str:
     words = [_SHOWN[item.figure](item) for item in row.questions if item.outcome in ("worse", "better")]
     if row.inconclusive:
         opened = ", ".join(_open(item, asked) for item in _unresolved(row))
-        words.append(f"{INCONCLUSIVE} in the rest" if words else f"{INCONCLUSIVE}: {opened}")
+        words.append(f"otherwise {INCONCLUSIVE}" if words else f"{INCONCLUSIVE}: {opened}")
     words = words or [f"{NOTHING_SHOWN} ({_would_have_been(row)})"]
     if row.one_not_assessable:
-        words.append(f"{row.one_not_assessable} of {row.pairs} contacts apart: one build could not assess them")
+        words.append(f"{row.one_not_assessable} of {row.pairs} contacts not assessable in one of the builds")
     return "; ".join(words)
 
 
 def overall_words(
     verdict: str, rows: Sequence[BuildRow], asked: int, significance: float, relevant_change: float
 ) -> str:
-    """The verdict in one sentence."""
+    """Return the verdict in one sentence."""
     counts = [sum(item.outcome == way for row in rows for item in row.questions) for way in ("worse", "better")]
     unresolved = sum(row.inconclusive for row in rows)
     relevant = f"a change of {100.0 * relevant_change:g} %"
@@ -46,12 +46,12 @@ def overall_words(
         return f"{INCONCLUSIVE}: {where} this sample is too small to rule out {relevant}"
     if verdict == NOTHING_SHOWN and not asked:
         return f"{NOTHING_SHOWN}: every outcome is the same"
-    how = f"of {asked} questions at a level of {significance:g} for all together"
+    rate = f"family-wise error rate {significance:g}"
     if verdict == NOTHING_SHOWN:
-        return f"no change shown ({how})"
+        return f"no change shown ({counted(asked, 'test')}, {rate})"
     ways = [f"{count} {way}" for count, way in zip(counts, ("worse", "better"), strict=True) if count]
     open_rows = f"; {INCONCLUSIVE} in {unresolved} of {counted(len(rows), 'row')}" if unresolved else ""
-    return f"{verdict}: {' and '.join(ways)} {how}{open_rows}"
+    return f"{verdict}: {' and '.join(ways)} of {counted(asked, 'test')} ({rate}){open_rows}"
 
 
 def gone_words(only_old: Sequence[str]) -> str:
@@ -61,18 +61,16 @@ def gone_words(only_old: Sequence[str]) -> str:
 
 
 def pairing_words(pairings: Mapping[str, Pairing]) -> list[str]:
-    """How many recordings of each group are the same in both, where that is not all of them."""
+    """Return a note for each group whose recordings are not all the same in both."""
     words = []
     for group, pairing in pairings.items():
         if not pairing.partners:
             if pairing.old_alone or pairing.new_alone:
-                words.append(
-                    f"{group}: unpaired, the recordings are others ({pairing.old_alone} and {pairing.new_alone})"
-                )
+                words.append(f"{group}: unpaired, the recordings differ ({pairing.old_alone} and {pairing.new_alone})")
         elif pairing.old_alone or pairing.new_alone:
             words.append(
-                f"{group}: {counted(len(pairing.partners), 'recording', 'are')} paired; {pairing.old_alone} that only "
-                f"old holds and {pairing.new_alone} that only new holds count in false alarms alone"
+                f"{group}: {counted(len(pairing.partners), 'recording', 'are')} paired; {pairing.old_alone} only in "
+                f"old and {pairing.new_alone} only in new count only for false alarms"
             )
     return words
 
@@ -95,7 +93,7 @@ def _missed(item: Question) -> str:
 
 
 def _by_chance(item: Question) -> str:
-    return f" (by chance alone with a probability of {item.complete_change_p:.3g})"
+    return f" (probability by chance {item.complete_change_p:.3g})"
 
 
 def _not_assessable(item: Question) -> str:
@@ -120,7 +118,7 @@ _SHOWN: dict[Figure, Callable[[Question], str]] = {
 
 
 def _unresolved(row: BuildRow) -> list[Question]:
-    """The questions that leave a relevant change open; a force only where the latency does not."""
+    """Return the questions that leave a relevant change open; a force only if the latency does not."""
     found = [item for item in row.questions if item.outcome == INCONCLUSIVE]
     latency = any(item.figure == "latency_ms" for item in found)
     missed = any(item.figure == "missed" for item in found)
@@ -130,20 +128,24 @@ def _unresolved(row: BuildRow) -> list[Question]:
 
 
 def _open(item: Question, asked: int) -> str:
-    """What of a figure these recordings cannot tell."""
+    """Describe what remains open about a quantity."""
     if item.figure in ("latency_ms", "force_at_alarm_n"):
         what, unit = ("latency", "ms") if item.figure == "latency_ms" else ("force at the alarm", "N")
         seen = f"{what} {figure(item.old)} {unit} to {figure(item.new)} {unit}"
         if item.detectable == math.inf or math.isnan(item.detectable):
-            return f"{seen}, {item.reason or f'too few recordings for {asked} questions'}"
+            return f"{seen}, {item.reason or _too_few(asked)}"
         return f"{seen}, only a change of {figure(item.detectable)} {unit} would have been shown"
     what = {"missed": "missed", "not_assessable": "not assessable", "false_alarms": "false alarms"}[item.figure]
     seen = f"{what} {item.old:g} to {item.new:g}"
     if item.left_open == math.inf:
-        return f"{seen}, {item.reason or 'nothing was judged'}"
+        return f"{seen}, {item.reason or 'nothing was assessable'}"
     if item.figure == "false_alarms":
         return f"{seen}, up to {item.left_open:.2g} more per operation not ruled out"
     return f"{seen}, up to {100.0 * item.left_open:.2g} % more not ruled out"
+
+
+def _too_few(asked: int) -> str:
+    return f"too few recordings for {counted(asked, 'test')}"
 
 
 def _would_have_been(row: BuildRow) -> str:
@@ -154,15 +156,15 @@ def _would_have_been(row: BuildRow) -> str:
         return "every latency is the same"
     if latency.outcome == "not_asked":
         return f"latency: {latency.reason}"
-    return f"a change of {figure(latency.detectable)} ms would have been"
+    return f"a change of {figure(latency.detectable)} ms would have been shown"
 
 
 def _least_alarms(item: Question) -> str:
     if math.isnan(item.detectable):
         return f"false alarms: {item.reason}"
     if item.detectable == math.inf:
-        return "none could have been in false alarms"
-    return f"{item.detectable:g} false alarms instead of {item.old:g} would have been"
+        return "this sample is too small to show any change in false alarms"
+    return f"{item.detectable:g} false alarms instead of {item.old:g} would have been shown"
 
 
 def _could_show(row: BuildRow) -> bool:
@@ -174,7 +176,7 @@ def _counts(item: Question) -> str:
 
 
 def _interval(change: Interval, unit: str) -> str:
-    """The size of a change with its interval, either way."""
+    """Return the size of a change with its interval, independent of its sign."""
     low, high = (change.low, change.high) if change.value > 0.0 else (-change.high, -change.low)
     bounds = "" if math.isnan(low) or math.isnan(high) else f" ({figure(low)} to {figure(high)})"
     return f"{figure(abs(change.value))} {unit}{bounds}"

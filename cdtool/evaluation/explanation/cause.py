@@ -27,24 +27,24 @@ from cdtool.evaluation.explanation.transient import Loss, Transient, losses, sho
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
 
-# Transients and lost samples this long before the signal left its band for good may be the cause [s].
+# Transients and lost samples this long before the signal's last exit from its band may be the cause [s].
 _SHORTLY = 0.3
-# What is there for good is there in the last of the time that is looked at [s].
+# A permanent change is present in this last part of the analysed time [s].
 _AT_THE_END = 0.15
-# Share of the normal speed that a contact takes away for good.
+# Share of the normal speed that a contact removes permanently.
 _STOPPED = 0.3
 # Share of the normal speed by which a reference has to depart in the mean of the time before the alarm.
 _COMMANDED = 0.1
-# Spreads by which a level has departed for good, at the end and at the alarm.
+# Spreads by which a level has departed permanently, at the end and at the alarm.
 _LASTING, _AT_ALARM = 3.0, 2.0
 # A channel's own noise is at least this share of the spread of the impact-free runs.
 _LEAST_NOISE = 0.25
-# A joint that is held is displaced and pushed back by at least so many spreads.
+# A held joint is displaced and pushed back by at least this many spreads.
 _HELD = 5.0
 
 
 class CauseKind(StrEnum):
-    """What an alarm may come from."""
+    """Possible causes of an alarm."""
 
     CONTACT = "contact"
     COMMAND = "changed command"
@@ -58,7 +58,7 @@ class CauseKind(StrEnum):
 
 @dataclass(frozen=True)
 class Shift:
-    """A channel of a joint that is off for good: its level `value` against its `normal` level, both in `unit`."""
+    """A permanent deviation of a channel of a joint: its level `value` and its `normal` level, both in `unit`."""
 
     channel: str
     joint: str
@@ -69,7 +69,7 @@ class Shift:
 
 @dataclass(frozen=True)
 class Cause:
-    """The likely cause with its evidence: what shifted for good, or the transient, or the samples that were lost."""
+    """The likely cause with its evidence: the permanent shifts, the transient, or the lost samples."""
 
     kind: CauseKind
     shifts: tuple[Shift, ...] = ()
@@ -78,14 +78,14 @@ class Cause:
 
     @property
     def channel(self) -> str:
-        """The channel that is to blame; empty where several agree, or none."""
+        """Return the channel responsible; empty if several agree, or none."""
         found = self.transient or self.loss
         return found.channel if found else ""
 
 
 @dataclass(frozen=True)
 class Event:
-    """An alarm at `alarm` [s] of a signal that left its band for good at `left` [s]; `inputs`: what its detector reads.
+    """An alarm at `alarm` [s] of a signal that last left its band at `left` [s]; `inputs`: the detector's inputs.
 
     `joint` is the signal's: one of the machine's, or the whole machine. `motion` is the operation's.
     """
@@ -127,7 +127,7 @@ def likely_cause(
             for item in _transients(recording, track, window)
         ]
         for channel in ("speed", "torque", "acceleration")
-        # What the detector does not read cannot have raised its alarm.
+        # A channel that the detector does not read cannot have caused its alarm.
         if channel in read or not read
     }
     return _transient_cause(recording, found) or _lost(recording, read, left, alarm) or Cause(CauseKind.UNCLEAR)
@@ -164,7 +164,7 @@ def _commanded(tracks: dict[tuple[str, str], Track], leading: str, alarm: float)
         return ()
     shortly, first = (alarm - _SHORTLY, alarm), float(reference.time[0])
     least = _COMMANDED * abs(speed.normal(*shortly))
-    # A reference that is off all along is another class of motion, not a change.
+    # A reference that deviates throughout is another class of motion, not a change.
     if abs(reference.change(*shortly)) > least > abs(reference.change(first, first + _SHORTLY)):
         return (_shift(reference, shortly),)
     return ()
@@ -195,7 +195,7 @@ def _transients(recording: Recording, track: Track, window: tuple[float, float])
 
 
 def _transient_cause(recording: Recording, found: dict[str, list[Transient]]) -> Cause | None:
-    """A sensor that is wrong: the highest transient, if the other channels do not confirm it."""
+    """Return a faulty sensor: the highest transient, if the other channels do not confirm it."""
     speed = [
         item
         for item in found.get("speed", ())

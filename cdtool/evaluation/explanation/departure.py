@@ -1,9 +1,9 @@
-"""How far each channel is from what is normal there, when it left that band first, and for how long.
+"""The deviation of each channel from its normal band: when it first left it, and for how long.
 
-Conventions: a diagnosis after the fact, for people: it looks at the recording before and after the event, and no
-detector, no threshold and no latency depends on it. Times are seconds on the recording's own clock. Load cell and
-labels are never looked at. Departures count in normal spreads: of single samples, and of a channel's level, the mean
-over 50 ms, which shows a small lasting shift that single samples hide.
+Conventions: a diagnosis after the event, for people: it uses the recording before and after the event, and no detector,
+no threshold and no latency depends on it. Times are seconds on the recording's own clock. Load cell and labels are not
+used. Departures count in normal spreads: of single samples, and of a channel's level, the mean over 50 ms, which shows
+a small lasting shift that single samples hide.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from cdtool.evaluation.explanation.transient import Transient
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels
 
-# A channel has left its normal band where it is farther off the mean than impact-free runs go, by this factor (the runs
-# learned from keep closer to their own mean than others do), and at least so many spreads.
+# A channel has left its normal band if it is farther from the mean than impact-free runs are, by this factor (the runs
+# learned from are closer to their own mean than others), and at least this many spreads.
 _BEYOND, _LEAST_OUT = 1.5, 5.0
-# It began to leave it where it last was within this share of that.
+# The departure began where it last was within this share of that.
 _BACK_TO = 0.4
 _SUCCESSION = 3
 # A departure that takes longer than this [s] to be certain may start with a slow drift: the bend of its curve is
@@ -30,22 +30,22 @@ _SUCCESSION = 3
 _SLOW, _BENDS, _BEFORE_BEND = 0.03, 60, 0.1
 # A run's own constant distance from the mean counts up to this many spreads; more is a departure.
 _OFFSET = 2.5
-# How many spreads off its own past a channel may go without having left it.
+# Spreads by which a channel may deviate from its own past without a departure.
 _OWN_REACH = 5.0
-# What a run's own distance is taken from: this long up to the search [s].
+# Length of the interval from which a run's own distance is computed, up to the search [s].
 _BASELINE = 0.5
 _ENOUGH = 10
-# A departure is brief if it is over after this time [s], with so much calm behind it, back within so many spreads.
+# A departure is brief if it is over after this time [s], followed by this much calm, within this many spreads.
 _BRIEF, _CALM, _BACK = 0.15, 0.03, 3.5
 
 
 @dataclass(frozen=True)
 class Track:
-    """One channel of one joint along the time that is looked at, against what is normal there.
+    """One channel of one joint over the analysed time, compared with its normal band.
 
-    `samples` and `level` (n,) are distances from the normal mean in normal spreads, less the run's own constant
-    distance; NaN where nothing is known. `value`, `mean`, `spread` are in `unit`. `raw`: `samples` with that distance.
-    `out` and `level_out`: outside so many spreads it has left its normal band.
+    `samples` and `level` (n,) are distances from the normal mean in normal spreads, minus the run's own constant
+    distance; NaN if unknown. `value`, `mean`, `spread` are in `unit`. `raw`: `samples` including that distance. `out`
+    and `level_out`: number of spreads outside which it has left its normal band.
     """
 
     channel: str
@@ -64,24 +64,24 @@ class Track:
     level_out: FloatArray
 
     def between(self, start: float, end: float) -> slice:
-        """The samples from `start` to `end` [s]."""
+        """Return the samples from `start` to `end` [s]."""
         first, after = np.searchsorted(self.time, start), np.searchsorted(self.time, end, side="right")
         return slice(int(first), int(after))
 
     def shift(self, start: float, end: float) -> float:
-        """The mean distance of the level from its normal, in spreads, from `start` to `end` [s]; NaN where unknown."""
+        """Return the mean distance of the level from normal, in spreads, from `start` to `end` [s]; NaN if unknown."""
         return _mean(self.level[self.between(start, end)])
 
     def change(self, start: float, end: float) -> float:
-        """The same in the channel's unit."""
+        """Return the same in the channel's unit."""
         return _mean(self.level_off[self.between(start, end)])
 
     def normal(self, start: float, end: float) -> float:
-        """The normal mean from `start` to `end` [s]."""
+        """Return the normal mean from `start` to `end` [s]."""
         return _mean(self.level_mean[self.between(start, end)])
 
     def movement(self, begin: float, end: float) -> Movement:
-        """When and where to the channel left its normal band from `begin` to `end` [s], or that it did not."""
+        """Return when and in which direction the channel left its normal band from `begin` to `end` [s], if it did."""
         part = self.between(begin, end)
         samples, level, raw = self.samples[part], self.level[part], self.raw[part]
         if np.count_nonzero(np.isfinite(samples)) < _SUCCESSION:
@@ -102,7 +102,7 @@ class Track:
         return self._told(float(self.time[start]), "up" if upward else "down", "", farthest)
 
     def brief(self, begin: float, end: float) -> Transient | None:
-        """A departure that began from `begin` to `end` [s] and was over soon; None where none was."""
+        """Return a departure that began from `begin` to `end` [s] and soon ended, or None."""
         moved = self.movement(begin, end)
         if math.isnan(moved.time):
             return None
@@ -138,9 +138,9 @@ class Track:
 def tracks_of(
     recording: Recording, normal: NormalMotion | None, joints: Sequence[str], begin: float, end: float
 ) -> list[Track]:
-    """Every channel of the joints from `begin` to `end` [s] against impact-free runs.
+    """Compare every channel of the joints from `begin` to `end` [s] with impact-free runs.
 
-    Without a `normal` the run's own half second before `begin` has to do: its mean and its spread.
+    Without `normal`, mean and spread of the run's own half second before `begin` are used.
     """
     tracks = []
     for channel in CHANNELS:
@@ -160,7 +160,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, q
     with np.errstate(invalid="ignore", divide="ignore"):
         raw, raw_level = off / compared.spread[cut, j], level_off / compared.level_spread[cut, j]
     raw, raw_level = (np.where(np.isfinite(item), item, np.nan) for item in (raw, raw_level))
-    # Where the motion is taken to have begun shifts all of a position: only a change of its distance counts.
+    # The assumed start of the motion shifts a whole position: only a change of its distance counts.
     reach = math.inf if channel in POSITIONS else _OFFSET
     own, own_level = (_own_offset(item[:quiet], reach) for item in (raw, raw_level))
     if channel in POSITIONS:
@@ -183,7 +183,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, q
 
 
 def _own_past(recording: Recording, channel: str, begin: float) -> Comparison:
-    """The channel against its own half second before `begin`: constant mean and spread."""
+    """Compare the channel with its own half second before `begin`: constant mean and spread."""
     series = recording[channel]
     quiet = slice(*np.searchsorted(series.time, (begin - _BASELINE, begin)))
     level = levels(series.time, series.values)
@@ -201,9 +201,9 @@ def _own_normal(values: FloatArray, quiet: slice) -> tuple[FloatArray, FloatArra
 
 
 def _own_offset(past: FloatArray, reach: float) -> float:
-    """A run's own constant distance from the mean [spreads], up to `reach`.
+    """Return a run's own constant distance from the mean [spreads], up to `reach`.
 
-    Where too little is known it is 0, or unknown (NaN) if it may be as large as it likes.
+    With too little data it is 0, or unknown (NaN) if it is unlimited.
     """
     known = past[np.isfinite(past)]
     if len(known) < _ENOUGH:
@@ -212,7 +212,7 @@ def _own_offset(past: FloatArray, reach: float) -> float:
 
 
 def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool] | None:
-    """The first sample of a departure, whether it is upward, and whether it is the level's; outside is above 1."""
+    """Return the first sample of a departure (above 1), whether it is upward, and whether it is the level's."""
     found = []
     for values, of_level in ((samples, False), (level, True)):
         for sign in (1.0, -1.0):
@@ -223,7 +223,7 @@ def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool]
 
 
 def _first(outside: BoolArray) -> int | None:
-    """The first of the consecutive samples that are outside; missing ones (False) break them."""
+    """Return the first of the consecutive samples that are outside; missing ones (False) interrupt them."""
     if len(outside) < _SUCCESSION:
         return None
     run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
@@ -231,7 +231,7 @@ def _first(outside: BoolArray) -> int | None:
 
 
 def _began(time: FloatArray, shares: FloatArray) -> int:
-    """Where a departure upward that is certain at the last sample began: followed back to `_BACK_TO` of its limit.
+    """Return where an upward departure, certain at the last sample, began: traced back to `_BACK_TO` of its limit.
 
     If a channel had drifted that far before, its departure began at the bend of its curve.
     """
@@ -244,7 +244,7 @@ def _began(time: FloatArray, shares: FloatArray) -> int:
 
 
 def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
-    """From which sample on, `first` or later, the shares leave a straight line for a steeper one upward.
+    """Return the sample, `first` or later, at which the shares leave a straight line for a steeper one upward.
 
     By least squares over the samples from `_BEFORE_BEND` before `first` to the last.
     """

@@ -19,18 +19,18 @@ from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
 
 # Departures are searched from this long before the signal left its band permanently [s]: a soft contact takes as long.
 _BEFORE = 0.9
-# The class of motion of a run is determined up to this long before it left the band [s].
+# The class of motion of a run is determined up to this long before the exit from the band [s].
 _LATEST = 0.1
 # This much of the run after accelerating shows its usual offset [s]; departures are searched for at least this long.
 _SETTLING, _LEAST_BEFORE = 0.3, 0.3
 # The time after an alarm that distinguishes a contact from friction [s].
 _AFTER = 0.5
 
-# Without impact-free runs a run has to have been steady: its speed within this share of its median.
+# Without impact-free runs, a run must have been steady: its speed within this share of its median.
 _STEADY, _ENOUGH = 0.3, 10
-# When a channel began to move is known to about this [s].
+# Uncertainty of the time at which a channel began to move [s].
 _RESOLUTION = 0.02
-# Of channels that move at the same time the one that physically answers first comes first.
+# Among channels that move at the same time, the one that physically responds first comes first.
 _ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
 
 
@@ -38,7 +38,7 @@ _ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
 class Diagnosis:
     """The channels in the order in which they left their normal band, and the likely cause (known for a contact).
 
-    `absent`: why there were no impact-free runs to compare with; None where there were, `runs` of them.
+    `absent`: why there were no impact-free runs to compare with; None if there were, `runs` of them.
     """
 
     moved: tuple[Movement, ...]
@@ -50,9 +50,9 @@ class Diagnosis:
 def diagnose_alarm(
     recording: Recording, event: Event, normals: NormalMotions, own_past: Callable[[], Sequence[Movement]]
 ) -> Diagnosis:
-    """What led to an alarm.
+    """Return what led to an alarm.
 
-    `own_past` finds the movements against the run's own past, which count where there are no impact-free runs.
+    `own_past` finds the movements compared with the run's own past, which are used without impact-free runs.
     """
     found = normals.of(recording, event.left - _LATEST)
     absent = None if isinstance(found, NormalMotion) else found
@@ -79,7 +79,7 @@ def diagnose_contact(
     normals: NormalMotions,
     own_past: Callable[[], Sequence[Movement]],
 ) -> Diagnosis:
-    """What a contact moved, from its onset less what that is uncertain by; its cause is known."""
+    """Return the channels that a contact moved, from its onset minus its uncertainty; its cause is known."""
     normal = normals.of(recording, onset)
     if not isinstance(normal, NormalMotion):
         return Diagnosis(tuple(own_past()), Cause(CauseKind.CONTACT), normal)
@@ -92,16 +92,16 @@ def diagnose_contact(
 
 
 def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str) -> list[Movement]:
-    """Every channel of the signal's joint, and those of other joints that left their normal band.
+    """Return every channel of the signal's joint, and those of other joints that left their normal band.
 
-    The position of the joint that leads the motion is where in the stroke it is: the others are compared at that place.
+    The position of the leading joint is the location in the stroke itself: the others are compared at that location.
     """
     found = [track.movement(begin, end) for track in tracks if track.channel not in POSITIONS or track.joint != leading]
     return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
 
 
 def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
-    """Whether the leading joint ran steadily up to `begin` [s]: only then its own past says what is normal."""
+    """Whether the leading joint ran steadily up to `begin` [s], so that its own past can serve as normal."""
     for track in tracks:
         if (track.channel, track.joint) == ("speed", leading):
             past = track.value[: track.between(begin, begin).start]
@@ -112,7 +112,7 @@ def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
 
 
 def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:
-    """From where on departures are looked for [s]: not far into the acceleration, if that was shortly before."""
+    """Return the start of the search for departures [s]: not far into the acceleration, if that was shortly before."""
     clock = recording["speed"].time
     ran = clock[normal.progress(recording, clock).running]
     settled = float(ran[0]) + _SETTLING if len(ran) else -math.inf
@@ -120,7 +120,7 @@ def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> fl
 
 
 def in_order(moved: Sequence[Movement], joint: str) -> tuple[Movement, ...]:
-    """By time, those that did not move behind them; not shortly before what they follow.
+    """Sort by time, channels that did not move last; a channel does not precede the one it follows.
 
     A position, an integral, follows its own speed; another joint follows the signal's.
     """
@@ -138,7 +138,7 @@ def in_order(moved: Sequence[Movement], joint: str) -> tuple[Movement, ...]:
 
 
 def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequence[Track]) -> list[Movement]:
-    """The channel of the transient as moved when it began: it may have stayed within the spread of the runs."""
+    """Return the channels with that of the transient as moved at its beginning; it may be within the runs' spread."""
     others = [item for item in moved if (item.channel, item.joint) != (found.channel, found.joint)]
     told = Movement(found.channel, found.joint, found.start, "up" if found.height > 0.0 else "down", unit=found.unit)
     for track in tracks:

@@ -1,4 +1,4 @@
-"""Why each alarm came and why each contact was missed: joint, limit, margin over time, what moved first."""
+"""Why each alarm was raised and each contact missed: joint, limit, margin over time, first movement."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ Role = Literal["detection", "further alarm", "in progress", "false alarm", "alar
 # Times at which the margin is reported [s]: to the alarm; from the onset of a missed contact.
 _TO_ALARM = (-0.1, -0.05, -0.02, -0.01, -0.005, 0.0)
 _FROM_ONSET = (-0.1, 0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-# A load cell feels a contact up to this late [s]; by how much an alarm is late is not known without a contact.
+# Largest delay of a load cell [s]; the delay of an alarm is unknown without a contact.
 _LEAD_OF_ONSET, _LEAD_OF_ALARM = 0.05, 0.3
-# For this long after an onset channels are watched [s].
+# Time after an onset in which channels are analysed [s].
 _AFTERMATH = 0.5
 
 
 @dataclass(frozen=True)
 class AlarmExplanation:
-    """Why an alarm came: since `left` [s] the statistic had been outside, for `debounce` consecutive samples.
+    """Why an alarm was raised: since `left` [s] the statistic was outside, for `debounce` consecutive samples.
 
-    `skipped` samples were missing among them. `contact` is the one that the alarm belongs to; None also where that was
-    in progress when the recording began: its onset is not recorded. `moved` are the channels in the order in which they
-    moved; `inputs` names those that the detector needs. `cause` is the likely one, of which
-    neither load cell nor labels were asked. `runs`: how many impact-free runs the channels were compared with; where
-    none, `absent` is why, and the log's own past had to do.
+    `skipped` samples were missing among them. `contact` is the one that the alarm belongs to; None also for a contact
+    in progress when the recording began, since its onset is not recorded. `moved` are the channels in the order in
+    which they moved; `inputs` names those that the detector needs. `cause` is the likely one, derived without load cell
+    and labels. `runs`: number of impact-free runs that the channels were compared with; without any, `absent` is the
+    reason, and the log's own past was used.
     """
 
     operation: str
@@ -62,13 +62,13 @@ class AlarmExplanation:
 
     @property
     def zero(self) -> float:
-        """What times are counted from [s]: the contact's onset, else the alarm."""
+        """Return the time from which others count [s]: the contact's onset, else the alarm."""
         return self.contact.start if self.contact else self.alarm.time
 
 
 @dataclass(frozen=True)
 class MissExplanation:
-    """Why a contact was missed, or could not be assessed (`reason`): how near each joint came, the nearest first.
+    """Why a contact was missed, or was not assessable (`reason`): how near each joint came, the nearest first.
 
     `watched` [s]: how long after the onset an alarm would have counted. `not_judged`: share of the samples there that
     were not assessable, by reason. `joint` is the nearest one; `moments` and `moved` describe it. `runs` and `absent`
@@ -94,7 +94,7 @@ class MissExplanation:
 
     @property
     def zero(self) -> float:
-        """What times are counted from [s]: the contact's onset."""
+        """Return the time from which others count [s]: the contact's onset."""
         return self.contact.start
 
 
@@ -108,9 +108,9 @@ def explain_operation(
     inputs: Sequence[str] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> tuple[Explanation, ...]:
-    """Every alarm of an operation and every contact without one, in order of time.
+    """Return explanations of every alarm of an operation and every missed contact, in order of time.
 
-    `inputs` names the channels that the detector needs; `normals` is what impact-free runs look like.
+    `inputs` names the channels that the detector needs; `normals` is the normal motion of impact-free runs.
     """
     margins = joint_margins(detection)
     detecting = {item.alarm: item.contact for item in matching.matches if item.alarm}
@@ -136,10 +136,10 @@ def explain_alarm(
     margins: Sequence[JointMargin] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> AlarmExplanation:
-    """What led to an alarm of a detection; with the contact that it belongs to, if any, times are told from its onset.
+    """Explain an alarm of a detection; with the contact that it belongs to, if any, times count from its onset.
 
-    `activation` is the one that raised it. `margins` are the detection's `joint_margins`, where they are at hand.
-    Raises UsageError for an alarm of another detection.
+    `activation` is the one that raised it. `margins` are the detection's `joint_margins`, if available. Raises
+    UsageError for an alarm of another detection.
     """
     margin = (margins or joint_margins(detection))[alarm.joint]
     at = int(np.searchsorted(margin.time, alarm.time))
@@ -190,9 +190,9 @@ def explain_miss(
     margins: Sequence[JointMargin] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> MissExplanation:
-    """How near a contact without an alarm came to one, while an alarm would have counted (`match.watched`).
+    """Explain how near a missed contact came to an alarm, while an alarm would have counted (`match.watched`).
 
-    `activation` is the one that was used. `margins` are the detection's `joint_margins`, where they are at hand.
+    `activation` is the one that was used. `margins` are the detection's `joint_margins`, if available.
     """
     contact, statistic = match.contact, detection.statistic
     closes = contact.start + match.watched
@@ -245,7 +245,7 @@ def _as_role(role: Role, item: AlarmExplanation) -> AlarmExplanation:
 
 
 def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[Contact | None, Role]:
-    """The contact that an alarm belongs to, and what the alarm is."""
+    """Return the contact that an alarm belongs to, and the role of the alarm."""
     for item in matching.matches:
         if item.alarm == alarm:
             return item.contact, "detection"

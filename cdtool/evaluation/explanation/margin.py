@@ -1,10 +1,9 @@
-"""How far a statistic is from its limits, over time, and how near it came to an alarm.
+"""The distance of a statistic from its limits over time, and its closest approach to an alarm.
 
 Conventions: the margin is the distance from the statistic to its nearest limit, in the signal's unit: positive inside,
 negative outside the band. The share of the limit is the safety factor at which the sample would meet its limit, over
-the one that is set: 0 in the middle of the band (what was learned as normal, or 0 for a hand-set limit), 1 at the
-limit, more outside, below 0 where it leans to the side without a limit. So it is the same for bands of one and of two
-sides.
+the set one: 0 in the middle of the band (the learned mean, or 0 for a limit set by hand), 1 at the limit, more outside,
+below 0 on the side without a limit. It is the same for one-sided and two-sided bands.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from cdtool.recording import FloatArray
 
 @dataclass(frozen=True)
 class Moment:
-    """The statistic at a time [s] against its nearest limit, both in the signal's unit.
+    """The statistic at a time [s] with its nearest limit, both in the signal's unit.
 
     `margin` and `share` are NaN if the sample was not assessable, and `reason` states why.
     """
@@ -40,7 +39,7 @@ class Moment:
 class Approach:
     """How near a joint came to an alarm: its `nearest` sample, and the `longest` run of samples outside the band.
 
-    `outside_from` [s] is where that run began, NaN without one. `held` is the largest share of the limit that was held
+    `outside_from` [s] is the beginning of that run, NaN without one. `held` is the largest share of the limit held
     for the whole debounce: with `held` times the safety factor there would be an alarm; NaN if never assessable for
     that long. `latched_from` [s]: outside since then, with its crossing before the contact; NaN otherwise.
     """
@@ -64,7 +63,7 @@ class JointMargin:
 
     @property
     def name(self) -> str:
-        """The joint's name."""
+        """Return the joint's name."""
         return self.detection.statistic.joints[self.joint]
 
     @property
@@ -84,15 +83,15 @@ class JointMargin:
         return Moment(time, value, limit, float(self.margin[k]), float(self.share[k]))
 
     def moments(self, times: Sequence[float]) -> tuple[Moment, ...]:
-        """At each of `times` [s] the last sample so far; in order of time, each sample once."""
-        # An alarm less 5 ms is the sample 5 ms before it, whatever the last bit of the difference is.
+        """Return the last sample at or before each of `times` [s]; in order of time, each sample once."""
+        # An alarm minus 5 ms is the sample 5 ms before it, independent of the last bit of the difference.
         at = np.searchsorted(self.time, np.asarray(times) + 1e-9, side="right") - 1
         return tuple(self.moment(int(k)) for k in np.unique(at[at >= 0]))
 
     def runs(self) -> npt.NDArray[np.int64]:
-        """Runs outside the band, as the activation counts them (r, 3): first and last sample, how many.
+        """Return runs outside the band, as counted by the activation (r, 3): first and last sample, how many.
 
-        Missing samples do not break a run and do not count.
+        Missing samples do not interrupt a run and do not count.
         """
         present = np.flatnonzero(self.detection.statistic.status[:, self.joint] != Status.GAP)
         outside = np.concatenate(([False], self.margin[present] < 0.0, [False]))
@@ -122,7 +121,7 @@ class JointMargin:
 
 
 def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
-    """The margin of every column of a detection's statistic. Without a threshold the share of the limit is NaN."""
+    """Return the margin of every column of a detection's statistic; without a threshold the shares are NaN."""
     statistic, band = detection.statistic, detection.band
     share = np.full(statistic.values.shape, np.nan)
     if detection.threshold is not None:

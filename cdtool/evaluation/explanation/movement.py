@@ -1,7 +1,7 @@
-"""Which channel moved first: a diagnosis after the fact, for people.
+"""The first channel to move: a diagnosis after the event, for people.
 
-Conventions: it looks at the recording before and after the event; no detector, no threshold and no latency depends on
-it. Times are seconds on the recording's own clock. The load cell and labels are never looked at.
+Conventions: it uses the recording before and after the event; no detector, no threshold and no latency depends on it.
+Times are seconds on the recording's own clock. The load cell and labels are not used.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
 # Commands to the machine. The reference torque is not one: it is a controller output and responds to a contact.
 COMMANDS = ("reference_position", "reference_speed")
 
-# How far ahead of its line a channel is tried before the event [s]: the further, the less it keeps to it.
+# Extrapolation of a channel's line that is tested before the event [s]; deviations grow with it.
 _AHEAD = (0.05, 0.1, 0.2)
-# Noises off its line at which a channel has moved, and to which the movement is followed back.
+# Noises off its line at which a channel has moved, and to which the movement is traced back.
 _MOVED, _BACK_TO = 6.0, 2.0
 _SUCCESSION = 3
 _ENOUGH = 10
 # A standard deviation from the median absolute deviation of Gaussian noise, and of rounding to a step of 1.
 _MAD, _ROUNDING = 1.4826, 1.0 / math.sqrt(12.0)
-# Rounding errors of computed values: below this share of the channel's size nothing has moved.
+# Rounding errors of computed values: changes below this share of the channel's size do not count.
 _SMALLEST = 1e-9
 
 
@@ -35,8 +35,8 @@ _SMALLEST = 1e-9
 class Movement:
     """When and in which direction a channel of a joint moved away: `time` [s]; NaN if it did not, with the reason.
 
-    Compared with impact-free runs: its `value` where it was farthest off, with their `mean` and `spread` there, in
-    `unit`; NaN where the run's own past had to do. `brief`: it came back within a few samples.
+    Compared with impact-free runs: its `value` where the deviation is largest, with their `mean` and `spread` there, in
+    `unit`; NaN if the run's own past was used. `brief`: it returned within a few samples.
     """
 
     channel: str
@@ -54,14 +54,14 @@ class Movement:
 def which_moved_first(
     recording: Recording, joint: str, around: float, *, before: float = 0.5, lead: float = 0.05, after: float = 0.5
 ) -> tuple[Movement, ...]:
-    """The measured and reference channels of a joint in the order in which they moved, those that did not behind them.
+    """Return the measured and reference channels of a joint in the order in which they moved, unmoved ones last.
 
-    A channel moves at the first of 3 consecutive samples more than 6 noises off the straight line through its
-    `before` seconds up to `around - lead`, followed back to 2 noises; it is looked for until `around + after` [s]. The
-    noise is how far the channel usually was off such a line, as far ahead of it (at most 0.2 s), in those seconds: a
-    median absolute deviation, and at least the rounding of a quantised channel. `joint` may be the whole machine. Fails
-    where a channel swings slowly, or where the motion changed within the second before; a channel that is filtered
-    moves late. Raises UsageError for an unknown joint.
+    A channel moves at the first of 3 consecutive samples more than 6 noises off the straight line through its `before`
+    seconds up to `around - lead`, traced back to 2 noises; the search ends at `around + after` [s]. The noise is the
+    usual deviation of the channel from such a line, extrapolated as far (at most 0.2 s), in those seconds: a median
+    absolute deviation, and at least the rounding of a quantised channel. `joint` may be the whole machine. Fails for a
+    channel that oscillates slowly, or if the motion changed within the second before; a filtered channel moves late.
+    Raises UsageError for an unknown joint.
     """
     names = recording.joints if (joint,) == WHOLE_MACHINE else (joint,)
     for name in names:
@@ -83,7 +83,7 @@ def which_moved_first(
 def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, begin: float, before: float) -> Movement:
     off = _off_line(time, value, np.full(len(time), begin), before)
     quiet = (time >= begin - before) & (time <= begin)
-    # A log that begins shortly before the event has nothing to try: then the line's own residuals have to do.
+    # A log that begins shortly before the event has nothing to extrapolate: the line's own residuals are used.
     usual = [_usual(_off_line(time, value, time - ahead, before)[quiet], off[quiet]) for ahead in _AHEAD]
     later = np.flatnonzero(time > begin)
     if len(later) < _SUCCESSION or not np.isfinite([*usual, *off[later]]).all():
@@ -103,7 +103,7 @@ def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, beg
 
 
 def _usual(tried: FloatArray, residuals: FloatArray) -> float:
-    """How far a channel usually is off its line: a standard deviation; NaN with too few samples."""
+    """Return the usual deviation of a channel from its line: a standard deviation; NaN with too few samples."""
     for off in (tried, residuals):
         known = off[np.isfinite(off)]
         if len(known) >= _ENOUGH:
@@ -112,13 +112,13 @@ def _usual(tried: FloatArray, residuals: FloatArray) -> float:
 
 
 def _off_line(time: FloatArray, value: FloatArray, ends: FloatArray, length: float) -> FloatArray:
-    """For each sample its distance from the least-squares line through the `length` seconds up to its entry of `ends`.
+    """Return each sample's distance from the least-squares line through the `length` seconds up to its entry of `ends`.
 
-    NaN where that stretch holds too few samples, or less than half of its length.
+    NaN if that interval has too few samples, or covers less than half of its length.
     """
     if not len(time):
         return np.empty(0)
-    # Sums from the first sample on, about it and about the mean: so they keep their digits at any time and offset.
+    # Sums from the first sample, about it and about the mean, so that they keep their digits at any time and offset.
     t, v = time - time[0], value - value.mean()
     first = np.searchsorted(time, ends - length, side="left")
     after = np.searchsorted(time, ends, side="right")
@@ -140,7 +140,7 @@ def _off_line(time: FloatArray, value: FloatArray, ends: FloatArray, length: flo
 
 
 def _step(value: FloatArray) -> float:
-    """The smallest step between samples, that of a quantised channel; 0 for a channel that does not change."""
+    """Return the smallest step between samples, that of a quantised channel; 0 for a channel that does not change."""
     steps = np.abs(np.diff(value))
     steps = steps[steps > _SMALLEST * np.abs(value).max(initial=0.0)]
     return float(steps.min()) if len(steps) else 0.0

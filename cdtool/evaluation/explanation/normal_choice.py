@@ -1,4 +1,4 @@
-"""Which impact-free runs an explanation compares a run with, or why with none."""
+"""Select the impact-free runs with which an explanation compares a run, or state why this is impossible."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _BEFORE, _LEAST_SAMPLES = 1.0, 5
 
 
 class Absence(StrEnum):
-    """Why there is nothing learned to compare with."""
+    """Why there are no learned runs to compare with."""
 
     BY_HAND = "limits set by hand"
-    OLDER_FILE = "signature file without normal courses"
+    OLDER_FILE = "signature file without normal motions"
     FEW_RUNS = "too few runs learned from"
     NO_CLASS = "no learned class of motion fits"
     NO_CHANNELS = "no speed and position"
@@ -28,20 +28,20 @@ class Absence(StrEnum):
 
 @dataclass(frozen=True)
 class NormalMotions:
-    """What was learned of every class of motion; `absent`: why there is nothing, if there is nothing."""
+    """The normal motion of every class; `absent`: the reason if it is empty."""
 
     motions: tuple[NormalMotion, ...] = ()
     absent: Absence = Absence.BY_HAND
 
     def for_one_operation(self) -> NormalMotions:
-        """For explaining the alarms of several detectors in one operation: each channel is compared only once."""
+        """Return a copy for the alarms of several detectors in one operation: it compares each channel only once."""
         known = fields(NormalMotion)
         return replace(
             self, motions=tuple(_OnceCompared(*(getattr(item, part.name) for part in known)) for item in self.motions)
         )
 
     def of(self, recording: Recording, until: float) -> NormalMotion | Absence:
-        """The normal motion whose leading speed fits the run best in the second up to `until` [s], or why none does."""
+        """Return the normal motion that best fits the leading speed in the 1 s up to `until` [s], or why none fits."""
         if not self.motions:
             return self.absent
         able = [item for item in self.motions if item.serves(recording)]
@@ -54,19 +54,19 @@ class NormalMotions:
 
 @dataclass(frozen=True)
 class _OnceCompared(NormalMotion):
-    """A normal motion that one operation alone is compared with, whichever detector asks."""
+    """A normal motion for one operation, shared by all detectors."""
 
     compared: dict[str, Comparison] = field(default_factory=dict, compare=False, repr=False)
 
     def compare(self, recording: Recording, channel: str) -> Comparison:
-        """As NormalMotion; the recording is always the same."""
+        """Compare as NormalMotion does; the recording is always the same."""
         if channel not in self.compared:
             self.compared[channel] = super().compare(recording, channel)
         return self.compared[channel]
 
 
 def _distance(normal: NormalMotion, recording: Recording, until: float) -> float:
-    """How far the leading joint's speed is from that of a class of motion [spreads]; infinite where it never began."""
+    """Return the leading joint's speed deviation from a class of motion [spreads]; infinite without a motion."""
     if "speed" not in normal.channels:
         return math.inf
     compared = normal.compare(recording, "speed")

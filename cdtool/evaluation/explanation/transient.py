@@ -1,6 +1,6 @@
-"""What comes and goes within a few samples: pulses and ringing of one channel, and samples that were lost.
+"""Transients within a few samples: pulses and ringing of one channel, and lost samples.
 
-A diagnosis after the fact: a channel is compared with its own running median, which looks to either side.
+A diagnosis after the event: a channel is compared with its own centred running median.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import numpy as np
 
 from cdtool.recording import FloatArray, Recording, Series
 
-# The running median looks this far in total [s], and at least at so many samples: what lasts for less than half of it
-# is a pulse.
+# The running median spans this time in total [s], and at least this many samples: an event shorter than half of it is a
+# pulse.
 _MEDIAN_SECONDS, _MEDIAN_SAMPLES = 0.07, 7
-# A pulse is this many of the channel's own noises off its running median; an accelerometer's noise swings.
+# A pulse deviates by this many of the channel's own noises from its running median; an accelerometer's noise varies.
 _PULSE_OUT, _KNOCK_OUT = 6.5, 8.0
 # Samples outside less than this apart are one transient [s].
 _TOGETHER = 0.02
-# 95 % of Gaussian noise stays within so many of its standard deviations.
+# 95 % of Gaussian noise is within this many of its standard deviations.
 _TWO_SIDED = 1.96
 _ROUNDING = 1.0 / np.sqrt(12.0)
-# The share of a pulse's area that position has to show for the axis to have moved.
+# The share of a pulse's area that the position must show for the axis to have moved.
 _SHARE = 0.5
 
 
@@ -29,8 +29,8 @@ _SHARE = 0.5
 class Transient:
     """A channel of a joint that left its own running median from `start` to `end` [s], by at most `height` [unit].
 
-    `noises`: that height over the channel's own noise. `area` [unit s] is the integral of what is off. `rings`: it
-    went to both sides.
+    `noises`: that height over the channel's own noise. `area` [unit s] is the integral of the deviation. `rings`: it
+    deviated in both directions.
     """
 
     channel: str
@@ -46,7 +46,7 @@ class Transient:
 
 @dataclass(frozen=True)
 class Loss:
-    """Samples of a channel that are missing from `start` to `end` [s]; `samples`: how many, about."""
+    """Missing samples of a channel from `start` to `end` [s]; `samples`: about how many."""
 
     channel: str
     start: float
@@ -57,9 +57,9 @@ class Loss:
 def transients(
     series: Series, channel: str, joint: str, column: int, begin: float, end: float, least: float = 0.0
 ) -> list[Transient]:
-    """The transients of a channel that begin from `begin` to `end` [s], the highest first.
+    """Return the transients of a channel that begin from `begin` to `end` [s], the highest first.
 
-    `least` [unit]: its noise is at least that.
+    `least` [unit]: lower bound of its noise.
     """
     around = series.between(begin - 1.0, end + _MEDIAN_SECONDS)
     values = around.values[:, column]
@@ -68,7 +68,7 @@ def transients(
     if len(time) < 3 * _MEDIAN_SAMPLES:
         return []
     off = values - running_median(time, values)
-    # Of a monotonous piece the running median is the piece itself: the middle of what is off says nothing.
+    # A monotonous section equals its running median, so its deviation is no evidence.
     before = np.abs(off[time < begin])
     noise = max(
         float(np.percentile(before if len(before) else np.abs(off), 95.0)) / _TWO_SIDED, _ROUNDING * _step(values)
@@ -81,7 +81,7 @@ def transients(
     found = []
     groups = np.split(outside, np.flatnonzero(np.diff(time[outside]) > _TOGETHER) + 1) if len(outside) else []
     for group in groups:
-        # Where it rises out of the noise and falls back into it.
+        # From where it rises out of the noise to where it falls back into it.
         first, last = int(group[0]), int(group[-1])
         while first > 0 and abs(off[first - 1]) > 3.0 * noise and off[first - 1] * off[first] > 0.0:
             first -= 1
@@ -115,7 +115,7 @@ def transients(
 
 
 def shown_by_position(pulse: Transient, position: Series, column: int) -> bool:
-    """Whether the position moved as a pulse of the speed says: then the axis did, and the sensor is right."""
+    """Whether the position moved as a pulse of the speed indicates: then the axis moved, and the sensor is right."""
     length = max(0.02, pulse.end - pulse.start)
     before = position.between(pulse.start - 3.0 * length, pulse.start)
     after = position.between(pulse.end, pulse.end + 3.0 * length)
@@ -128,7 +128,7 @@ def shown_by_position(pulse: Transient, position: Series, column: int) -> bool:
 
 
 def losses(recording: Recording, channels: tuple[str, ...], begin: float, end: float) -> list[Loss]:
-    """Samples that are missing from `begin` to `end` [s], the longest first: a gap in the clock, or no value."""
+    """Return samples missing from `begin` to `end` [s], the longest first: a gap in the clock, or no value."""
     found = []
     for channel in channels:
         if channel not in recording:
@@ -150,7 +150,7 @@ def losses(recording: Recording, channels: tuple[str, ...], begin: float, end: f
 
 
 def running_median(time: FloatArray, values: FloatArray) -> FloatArray:
-    """The median of the neighbours within `_MEDIAN_SECONDS`, half of it to either side."""
+    """Return the median of the neighbours within `_MEDIAN_SECONDS`, half of it to either side."""
     period = float(np.median(np.diff(time)))
     reach = max(_MEDIAN_SAMPLES // 2, round(0.5 * _MEDIAN_SECONDS / period))
     padded = np.pad(values, reach, mode="edge")
@@ -160,7 +160,7 @@ def running_median(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _step(values: FloatArray) -> float:
-    """The smallest step of a quantised channel; 0 for one that does not change."""
+    """Return the smallest step of a quantised channel; 0 for one that does not change."""
     steps = np.abs(np.diff(values))
     steps = steps[steps > 1e-9 * np.abs(values).max(initial=0.0)]
     return float(steps.min()) if len(steps) else 0.0

@@ -17,42 +17,42 @@ from cdtool.recording import REFERENCES, Contact
 
 _ABSENT = {
     Absence.BY_HAND: (
-        "with limits set by hand nothing was learned",
+        "limits set by hand are not learned from runs",
         "learn a signature with cdtool learn-signature and give it with --signature",
     ),
     Absence.OLDER_FILE: (
-        "the signature file holds no normal motion",
-        "learn it again with cdtool learn-signature",
+        "the signature file has no normal motion",
+        "relearn it with cdtool learn-signature",
     ),
     Absence.FEW_RUNS: (
         "too few impact-free runs of one class of motion have speed and position",
         "learn from three or more that have both",
     ),
     Absence.NO_CLASS: (
-        "no class of motion that was learned runs as fast as this one",
+        "no learned class of motion is as fast as this run",
         "learn from impact-free runs at this speed",
     ),
     Absence.NO_CHANNELS: (
-        "without speed and position nobody knows where in its motion this run is",
-        "map both in [channels] of the machine file and learn again",
+        "without speed and position the location within the motion is unknown",
+        "map both in [channels] of the machine file and relearn",
     ),
 }
 _REASONS = (
     ("outside since before", "Outside their normal band since before"),
     ("within its usual range", "Within their usual range"),
     ("no departure found", "No clear departure from their own past"),
-    ("too few samples", "Too few samples to tell"),
-    ("no normal band known here", "No normal band is known here for"),
+    ("too few samples", "Too few samples"),
+    ("no normal band known here", "No normal band known here"),
 )
 _SENSOR = {
     CauseKind.SPEED_GLITCH: ("a glitch of the speed sensor", "the position shows no such motion"),
-    CauseKind.TORQUE_SPIKE: ("a spike of the torque or motor current", "the speed did not answer"),
-    CauseKind.KNOCK: ("a knock on the accelerometer", "neither speed nor torque departed"),
+    CauseKind.TORQUE_SPIKE: ("a spike of the torque or motor current", "the speed did not respond"),
+    CauseKind.KNOCK: ("a knock on the accelerometer", "speed and torque did not respond"),
 }
 
 
 def words(explanation: Explanation) -> list[str]:
-    """What happened, how the limit was crossed or not, and what moved first: a sentence or two an entry."""
+    """Return what happened, how the limit was crossed or not, and what moved first, in entries of short sentences."""
     if isinstance(explanation, AlarmExplanation):
         return [_headline(explanation), *_crossing(explanation), *_cause_words(explanation), *_movement(explanation)]
     return [_miss(explanation), *_approaches(explanation), *_movement(explanation)]
@@ -64,7 +64,7 @@ def _headline(item: AlarmExplanation) -> str:
         return f"alarm at {at}, in a contact {IN_PROGRESS}: no latency"
     if item.contact is None:
         known = "false alarm" if item.role == "false alarm" else "alarm"
-        why = "no contact belongs to it" if item.role == "false alarm" else "this log does not tell of contacts"
+        why = "no contact belongs to it" if item.role == "false alarm" else "this log has no ground truth"
         return f"{known} at {at}: {why}"
     late = item.alarm.time - item.contact.start
     what = "alarm" if item.role == "detection" else "further alarm"
@@ -73,7 +73,7 @@ def _headline(item: AlarmExplanation) -> str:
 
 
 def _unseen(contact: Contact) -> str:
-    """That the onset may lie earlier, where load-cell samples are missing."""
+    """Return that the onset may be earlier, if load-cell samples are missing."""
     if not contact.hole:
         return ""
     return f", or up to {1e3 * contact.uncertainty:.0f} ms earlier, since {1e3 * contact.hole:.0f} ms of it are missing"
@@ -84,10 +84,10 @@ def _crossing(item: AlarmExplanation) -> list[str]:
     values = f"{_figure(item.alarm.statistic)} against {_figure(item.alarm.limit)}{_unit(item.unit)}"
     since = f"{_counted(item.left - item.contact.start, 'the onset')}, " if item.contact else ""
     waited = _counted(item.left - item.alarm.time, "the alarm")
-    skipped = f", {item.skipped} missing ones skipped" if item.skipped else ""
+    skipped = f", {item.skipped} missing samples skipped" if item.skipped else ""
     return [
-        f"{item.joint}: {item.alarm.side} its {limit} limit, {values}. It left the band for good {since}{waited}, "
-        f"which needs {_consecutive(item.debounce)} outside{skipped}."
+        f"{item.joint}: {item.alarm.side} its {limit} limit, {values}. Last exit from the band {since}{waited} "
+        f"(debounce: {_consecutive(item.debounce)} outside{skipped})."
     ]
 
 
@@ -95,17 +95,17 @@ def _miss(item: MissExplanation) -> str:
     at = f"contact at {item.contact.start:.3f} s ({item.contact.found_by}{_unseen(item.contact)})"
     if item.outcome == "not_assessable":
         return f"{at} not assessable: {item.reason}"
-    return f"{at} missed: no alarm in the {1e3 * item.watched:.0f} ms that were watched"
+    return f"{at} missed: no alarm within {1e3 * item.watched:.0f} ms"
 
 
 def _approaches(item: MissExplanation) -> list[str]:
     lines = [_approach(found, item) for found in item.approaches[:1]]
     others = [f"{found.joint} {_percent(found.held)}" for found in item.approaches[1:]]
     if others:
-        lines.append(f"The other joints stood for as long at these shares of their limits: {', '.join(others)}.")
+        lines.append(f"Highest share of the limit for that long, other joints: {', '.join(others)}.")
     if item.not_judged and item.outcome == "missed":
         shares = ", ".join(f"{reason} {100.0 * share:.0f} %" for reason, share in item.not_judged.items())
-        lines.append(f"Of the samples in that time some could not be judged: {shares}.")
+        lines.append(f"Samples not assessable in that time: {shares}.")
     return lines
 
 
@@ -113,37 +113,37 @@ def _approach(found: Approach, item: MissExplanation) -> str:
     nearest = found.nearest
     if not math.isnan(found.latched_from):
         return (
-            f"{found.joint}: outside the band since {found.latched_from:.3f} s already, before the contact. A new "
-            "alarm needs a return into it."
+            f"{found.joint}: already outside the band since {found.latched_from:.3f} s, before the contact; a new "
+            "alarm requires a return into the band."
         )
     where = "from" if nearest.margin >= 0.0 else "beyond"
     text = f"{found.joint}: nearest {_counted(nearest.time - item.contact.start, 'the onset')}, "
     text += f"{_figure(abs(nearest.margin))}{_unit(item.unit)} {where} its limit of {_figure(nearest.limit)}"
     text += f" ({_percent(nearest.share)} of it)." if math.isfinite(nearest.share) else "."
     if found.longest:
-        needed = f"{_consecutive(found.longest)} outside; {item.debounce} are needed"
+        needed = f"{_consecutive(found.longest)} outside; {item.debounce} are required"
         text += f" At most {needed}."
     if math.isfinite(found.held):
-        text += f" For {_consecutive(item.debounce)} it stood at {_percent(found.held)} of its limit or above."
+        text += f" For {_consecutive(item.debounce)} it was at {_percent(found.held)} of its limit or above."
     return text
 
 
 def _movement(item: Explanation) -> list[str]:
     lines = [_compared(item)]
     learned = item.absent is None
-    # Against impact-free runs the references say what was asked for, and stand apart; a run's own past tells no command
-    # from an answer to it.
+    # Compared with impact-free runs, the references show the command and are listed separately. A run's own past cannot
+    # distinguish a command from the response to it.
     shown = [found for found in item.moved if not (learned and found.channel in REFERENCES)]
     moved = [found for found in shown if not math.isnan(found.time)]
     end = item.alarm.time if isinstance(item, AlarmExplanation) else math.inf
     sooner, later = [found for found in moved if found.time <= end], [found for found in moved if found.time > end]
-    band = "its normal band" if learned else "its course"
+    band = "left its normal band" if learned else "departed from its own past"
     if sooner:
         lines.append(f"Moved first: {_in_order(sooner, item)}.")
         lines += [] if learned else _commands(sooner, item)
         lines += _first_input(sooner, item)
     else:
-        lines.append(f"No channel on its own had clearly left {band}{' by then' if later else ''}.")
+        lines.append(f"No single channel had clearly {band}{' by then' if later else ''}.")
     if later:
         lines.append(f"After the alarm: {_in_order(later, item)}.")
     if learned:
@@ -152,23 +152,23 @@ def _movement(item: Explanation) -> list[str]:
 
 
 def _compared(item: Explanation) -> str:
-    """What the channels were compared with, or why with the log's own past alone and what to do about it."""
+    """Return what the channels were compared with, or why only with the log's own past and how to change that."""
     if item.absent is None:
-        return f"Compared with {item.runs} impact-free runs at the same place of the motion."
+        return f"Compared with {item.runs} impact-free runs at the same position in the motion."
     why, next_step = _ABSENT[item.absent]
-    return f"Nothing to compare with: {why}; {next_step}. Until then what follows is against this log's own past alone."
+    return f"No impact-free runs to compare with: {why}; {next_step}. Compared with this log's own past instead."
 
 
 def _commands(sooner: Sequence[Movement], item: Explanation) -> list[str]:
     commanded = sooner[0].channel in COMMANDS
     if commanded or (item.contact is None and any(found.channel in COMMANDS for found in sooner)):
-        order = "first" if commanded else "as well"
-        return [f"The command moved {order}: that, not a contact, may be what the detector noticed."]
+        moved = "moved first" if commanded else "also moved"
+        return [f"The command {moved}: the detector may have responded to it, not to a contact."]
     return []
 
 
 def _references(item: Explanation) -> list[str]:
-    """What was asked of the machine, against the impact-free runs."""
+    """Return the references compared with the impact-free runs."""
     found = [each for each in item.moved if each.channel in REFERENCES]
     moved = [each for each in found if not math.isnan(each.time)]
     still = [_channel(each, item) for each in found if each.reason == "within its usual range"]
@@ -189,7 +189,7 @@ def _unmoved(shown: Sequence[Movement], item: Explanation) -> list[str]:
 
 
 def _numbers(found: Movement) -> str:
-    """The value farthest off, against normal mean and spread there, where they are known."""
+    """Return the largest deviation with the normal mean and spread there, if known."""
     if not math.isfinite(found.mean):
         return ""
     normal = f"{_figure(found.mean)} +- {_figure(found.spread)}{_unit(found.unit)}"
@@ -197,7 +197,7 @@ def _numbers(found: Movement) -> str:
 
 
 def _in_order(moved: Sequence[Movement], item: Explanation) -> str:
-    """The channels with the time of each, the first in full."""
+    """Return the channels with the time of each, the first in full."""
 
     def told(found: Movement, when: str) -> str:
         return f"{_channel(found, item)} {found.direction} {when}{_numbers(found)}"
@@ -207,13 +207,13 @@ def _in_order(moved: Sequence[Movement], item: Explanation) -> str:
 
 
 def _first_input(moved: Sequence[Movement], item: Explanation) -> list[str]:
-    """Which of the detector's own inputs moved first, where another channel did before it."""
+    """Return which of the detector's inputs moved first, if another channel moved before it."""
     if not item.inputs or moved[0].channel in item.inputs:
         return []
     read = next((found for found in moved if found.channel in item.inputs), None)
     if read is None:
-        return [f"Nothing that {item.detector} reads had clearly moved by then: {', '.join(item.inputs)}."]
-    return [f"The first that {item.detector} reads: {_channel(read, item)}, {_after_zero(read, item)}."]
+        return [f"No input of {item.detector} had clearly moved by then: {', '.join(item.inputs)}."]
+    return [f"First input of {item.detector}: {_channel(read, item)}, {_after_zero(read, item)}."]
 
 
 def _after_zero(found: Movement, item: Explanation) -> str:
@@ -240,7 +240,7 @@ def _consecutive(count: int) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "never judged for so long"
+    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "not assessable for that long"
 
 
 def _figure(value: float) -> str:
@@ -252,7 +252,7 @@ def _unit(unit: str) -> str:
 
 
 def _cause_words(item: AlarmExplanation) -> list[str]:
-    """The likely cause with its evidence in numbers."""
+    """Return the likely cause with its evidence in numbers."""
     return [f"Likely cause: {_told(item.cause, item)}."]
 
 
@@ -265,31 +265,31 @@ def _told(cause: Cause, item: AlarmExplanation) -> str:
         count = "1 sample" if loss.samples == 1 else f"{loss.samples} samples"
         return (
             f"lost samples: about {count} of {loss.channel} missing from {loss.start:.3f} to {loss.end:.3f} s, "
-            f"{_before(item.alarm.time - loss.end)}, and nothing else explains it"
+            f"{_before(item.alarm.time - loss.end)}, and no other cause was found"
         )
     shifts = "; ".join(_shift(shift, item.absent is None) for shift in cause.shifts)
     if cause.kind is CauseKind.CONTACT:
-        return f"a contact: {shifts}; both stayed off"
+        return f"a contact: {shifts}; both deviations persisted"
     if cause.kind is CauseKind.FRICTION:
-        return f"a change of friction: {shifts}; the torque stayed off, the speed did not"
+        return f"a change of friction: {shifts}; the torque deviation persisted, that of the speed did not"
     if cause.kind is CauseKind.COMMAND:
         return f"a changed command: {shifts}"
     return "not clear"
 
 
 def _shift(shift: Shift, learned: bool) -> str:
-    """Only what was learned is called normal."""
+    """Describe a shift; only a learned value is called normal."""
     unit = f" {shift.unit}" if shift.unit not in ("", "1") else ""
-    before = f"where {shift.normal:.4g} is normal" if learned else f"after {shift.normal:.4g} before it"
+    before = f"(normal: {shift.normal:.4g})" if learned else f"(before: {shift.normal:.4g})"
     return f"{shift.channel} of {shift.joint} {shift.value:.4g}{unit} {before}"
 
 
 def _transient(found: Transient, item: AlarmExplanation) -> str:
     unit = f" {found.unit}" if found.unit not in ("", "1") else ""
     lasted = max(1e3 * (found.end - found.start), 0.0)
-    rings = " to either side" if found.rings else ""
+    rings = " in both directions" if found.rings else ""
     when = _before(item.alarm.time - found.start)
-    return f"{found.channel} of {found.joint} off by {found.height:+.3g}{unit}{rings} for {lasted:.0f} ms, {when}"
+    return f"{found.channel} of {found.joint} deviated by {found.height:+.3g}{unit}{rings} for {lasted:.0f} ms, {when}"
 
 
 def _before(seconds: float) -> str:

@@ -81,7 +81,9 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     root = Table(read_toml(file), where)
     profiles = {name: _profile(name, root.table(name)) for name in root.values}
     if not profiles:
-        raise ConfigurationError(f"{where}: holds no profile", "a table a profile, see docs/force-limits.md")
+        raise ConfigurationError(
+            f"{where}: contains no profile", "write one table per profile, see docs/force-limits.md"
+        )
     return profiles
 
 
@@ -133,7 +135,9 @@ def _steps(table: Table) -> tuple[ForceStep, ...]:
     listed = table.raw("steps")
     if not isinstance(listed, list) or not listed or not all(isinstance(item, dict) for item in listed):
         problem = "is missing" if listed is None else f"is {value_in_words(listed)}"
-        raise table.fault("steps", problem, "a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]")
+        raise table.fault(
+            "steps", problem, "give a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]"
+        )
     steps: list[ForceStep] = []
     for i, item in enumerate(listed):
         row = Table(item, table.where, f"{table.prefix}steps[{i}].")
@@ -142,9 +146,9 @@ def _steps(table: Table) -> tuple[ForceStep, ...]:
         if not steps and step.from_s != 0.0:
             raise row.fault("from_s", f"is {step.from_s:g}", "the first step begins with the contact, at 0")
         if steps and step.from_s <= steps[-1].from_s:
-            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times have to increase")
+            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times must increase")
         if any(step.name == earlier.name for earlier in steps):
-            raise row.fault("name", f"'{step.name}' names two steps", "a name of its own for each step")
+            raise row.fault("name", f"'{step.name}' names two steps", "give each step a different name")
         steps.append(step)
     return tuple(steps)
 
@@ -152,5 +156,5 @@ def _steps(table: Table) -> tuple[ForceStep, ...]:
 def _words(table: Table, name: str) -> str:
     text = table.text(name)
     if not text.strip():
-        raise table.fault(name, "is empty", "a text is needed")
+        raise table.fault(name, "is empty", "give a text")
     return text

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.plain_text import counted
 
@@ -100,14 +100,14 @@ class PointVerdict(_OfSteps):
     note: str
 
 
-def judge(course: ForceCourse, profile: ForceProfile) -> ForceVerdict:
+def judge(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
     """Compare a force curve with every step of a profile.
 
     A step is not assessable if the record ends before or inside it, if samples in it are missing, or if the load cell
     saturated below the limit. The last step is assessed over the recorded part of it.
     """
-    steps = tuple(_judge_step(course, step, profile.ends(i)) for i, step in enumerate(profile.steps))
-    return ForceVerdict(profile.name, steps, course.end)
+    steps = tuple(_judge_step(curve, step, profile.ends(i)) for i, step in enumerate(profile.steps))
+    return ForceVerdict(profile.name, steps, curve.end)
 
 
 def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVerdict:
@@ -141,7 +141,9 @@ def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVe
     """
     for verdict in verdicts:
         if verdict.profile != profile.name:
-            raise UsageError(f"a verdict on '{verdict.profile}' is no test of '{profile.name}'", "judge all by one")
+            raise UsageError(
+                f"a verdict on '{verdict.profile}' is not a test of '{profile.name}'", "use one profile for all"
+            )
     steps = tuple(
         _judge_point(step, [verdict.steps[i] for verdict in verdicts], profile.average_of)
         for i, step in enumerate(profile.steps)
@@ -149,65 +151,63 @@ def averaged(verdicts: Sequence[ForceVerdict], profile: ForceProfile) -> PointVe
     return PointVerdict(profile.name, len(verdicts), steps, _counted(len(verdicts), profile.average_of))
 
 
-def _judge_step(course: ForceCourse, step: ForceStep, ends: float) -> StepVerdict:
-    inside = np.flatnonzero((course.time >= step.from_s) & (course.time < ends))
+def _judge_step(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepVerdict:
+    inside = np.flatnonzero((curve.time >= step.from_s) & (curve.time < ends))
     if not len(inside):
         nan = float("nan")
-        why = _unseen(course, step, ends) or "no load-cell sample while the limit holds"
+        why = _unseen(curve, step, ends) or "no load-cell sample while the limit holds"
         return StepVerdict(step, "not_assessable", nan, nan, float("inf"), why)
-    highest = inside[int(np.argmax(course.force[inside]))]
-    peak, peak_at = float(course.force[highest]), float(course.time[highest])
-    above = inside[course.force[inside] > step.at_most_n]
+    highest = inside[int(np.argmax(curve.force[inside]))]
+    peak, peak_at = float(curve.force[highest]), float(curve.time[highest])
+    above = inside[curve.force[inside] > step.at_most_n]
     if len(above):
-        budget = _crossing(course, int(above[0]), step)
-        since = "it was first seen" if course.hole else "the onset"
+        budget = _crossing(curve, int(above[0]), step)
+        since = "it was first seen" if curve.hole else "the onset"
         reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after {since}"
         return StepVerdict(step, "fail", peak, peak_at, budget, reason)
-    reason = _unseen(course, step, ends) or _may_exceed(course, step, ends)
-    if not reason and course.clipped[inside].any():
+    reason = _unseen(curve, step, ends) or _may_exceed(curve, step, ends)
+    if not reason and curve.clipped[inside].any():
         reason = f"the load cell was at its stop, {peak:.4g} N, below the limit of {step.at_most_n:g} N"
     return StepVerdict(step, "not_assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
 
 
-def _unseen(course: ForceCourse, step: ForceStep, ends: float) -> str:
+def _unseen(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
     """What of a step the record does not show; empty where it shows all."""
-    if course.end < step.from_s:
-        return f"the record ends {course.end:.3g} s after the onset, before {step.from_s:g} s"
-    if math.isfinite(ends) and ends - course.end > course.longest_step:
-        return f"the record ends {course.end:.3g} s after the onset, the limit holds until {ends:g} s"
-    if course.hole and step.from_s == 0.0:
-        return f"load-cell samples are missing for {1e3 * course.hole:.0f} ms where the contact may have begun"
-    begins, stops = course.holes()
+    if curve.end < step.from_s:
+        return f"the record ends {curve.end:.3g} s after the onset, before {step.from_s:g} s"
+    if math.isfinite(ends) and ends - curve.end > curve.longest_step:
+        return f"the record ends {curve.end:.3g} s after the onset, the limit holds until {ends:g} s"
+    if curve.hole and step.from_s == 0.0:
+        return f"load-cell samples are missing for {1e3 * curve.hole:.0f} ms where the contact may have begun"
+    begins, stops = curve.holes()
     missing = float(np.sum(np.maximum(np.minimum(stops, ends) - np.maximum(begins, step.from_s), 0.0)))
     return f"load-cell samples are missing for {1e3 * missing:.0f} ms" if missing > 0.0 else ""
 
 
-def _may_exceed(course: ForceCourse, step: ForceStep, ends: float) -> str:
+def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
     """What may have exceeded the limit unseen: between two samples, or before it held if the contact began earlier."""
-    most, hole = course.could_reach(step.from_s, ends)
+    most, hole = curve.could_reach(step.from_s, ends)
     if most > step.at_most_n:
         return (
             f"load-cell samples are missing for {1e3 * hole:.0f} ms, in which the force may have reached {most:.4g} N"
         )
-    earlier = (course.time >= step.from_s - course.uncertainty) & (course.time < step.from_s)
-    largest = float(np.max(course.force[earlier], initial=0.0))
+    earlier = (curve.time >= step.from_s - curve.uncertainty) & (curve.time < step.from_s)
+    largest = float(np.max(curve.force[earlier], initial=0.0))
     if step.from_s > 0.0 and largest > step.at_most_n:
-        return (
-            f"the onset may lie up to {1e3 * course.uncertainty:.0f} ms earlier, and then {largest:.4g} N are too much"
-        )
+        return f"the onset may be up to {1e3 * curve.uncertainty:.0f} ms earlier, and {largest:.4g} N are then too high"
     return ""
 
 
-def _crossing(course: ForceCourse, first: int, step: ForceStep) -> float:
+def _crossing(curve: ForceTimeCurve, first: int, step: ForceStep) -> float:
     """When the straight line to the first sample above the limit crosses it [s], not before the limit holds.
 
     Where samples are missing before that sample, their beginning counts: the force may have risen at once.
     """
-    time, force = float(course.time[first]), float(course.force[first])
+    time, force = float(curve.time[first]), float(curve.force[first])
     if first == 0:
         return time
-    before, below = float(course.time[first - 1]), float(course.force[first - 1])
-    if below > step.at_most_n or time - before > course.longest_step:
+    before, below = float(curve.time[first - 1]), float(curve.force[first - 1])
+    if below > step.at_most_n or time - before > curve.longest_step:
         return max(before, step.from_s)
     crossed = before + (time - before) * (step.at_most_n - below) / (force - below)
     return max(crossed, step.from_s)

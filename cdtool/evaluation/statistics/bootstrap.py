@@ -92,7 +92,7 @@ def bca(
     if statistic not in _STATISTICS:
         raise UsageError(f"unknown statistic '{statistic}'", nearest(statistic, _STATISTICS))
     if resamples < 1:
-        raise UsageError(f"resamples is {resamples}", f"at least 1; {RESAMPLES} is usual")
+        raise UsageError(f"resamples is {resamples}", f"give at least 1; {RESAMPLES} is usual")
     groups = clusters_of(values, clusters)
     resampled = _STATISTICS[statistic](groups)
     fewest = 2 if statistic == "std" else 1

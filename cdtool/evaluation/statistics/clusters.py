@@ -72,7 +72,7 @@ def clusters_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Clusters:
     """
     array, names = np.asarray(values, dtype=np.float64), list(labels)
     if array.shape != (len(names),):
-        raise UsageError(f"values {array.shape} and clusters ({len(names)},) do not fit", "one label for every value")
+        raise UsageError(f"values {array.shape} and clusters ({len(names)},) do not match", "give one label per value")
     if not np.all(np.isfinite(array)):
         raise UsageError("a value is missing or infinite", "leave missed contacts out, and state how many there are")
     groups: dict[Hashable, list[float]] = {}

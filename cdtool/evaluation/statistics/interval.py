@@ -59,4 +59,4 @@ def check_level(level: float) -> None:
     >>> check_level(0.95)
     """
     if not 0.0 < level < 1.0:
-        raise UsageError(f"confidence level is {level:g}", "a share between 0 and 1, such as 0.95")
+        raise UsageError(f"confidence level is {level:g}", "give a share between 0 and 1, such as 0.95")

@@ -142,7 +142,7 @@ def latency_quantile(latency: npt.ArrayLike, censored: npt.ArrayLike, share: flo
     """
     check_level(level)
     if not 0.0 < share < 1.0:
-        raise UsageError(f"quantile asked for is {share:g}", "a share between 0 and 1, such as 0.95 for the P95")
+        raise UsageError(f"quantile is {share:g}", "give a share between 0 and 1, such as 0.95 for the P95")
     time, missed = _checked(latency, censored)
     if not len(time):
         return Interval(math.nan, math.nan, math.nan, level)
@@ -157,9 +157,13 @@ def _checked(latency: npt.ArrayLike, censored: npt.ArrayLike) -> tuple[FloatArra
     time = np.asarray(latency, dtype=np.float64)
     missed = np.asarray(censored, dtype=np.bool_)
     if time.ndim != 1 or time.shape != missed.shape:
-        raise UsageError(f"latency {time.shape} and censored {missed.shape} do not fit", "one each for every contact")
+        raise UsageError(
+            f"latency {time.shape} and censored {missed.shape} do not match", "give one of each per contact"
+        )
     if not np.all(np.isfinite(time) & (time >= 0.0)):
-        raise UsageError("a latency is missing or below 0", "for a missed contact, give the time that it was watched")
+        raise UsageError(
+            "a latency is missing or below 0", "for a missed contact, give the time for which it was monitored"
+        )
     return time, missed
 
 

@@ -341,13 +341,13 @@ def check_count(name: str, count: int) -> None:
     >>> check_count("number of events", 3)
     """
     if not isinstance(count, Integral) or not 0 <= count <= _MOST_COUNT:
-        raise UsageError(f"{name} is {count}", "a whole number, 0 or more, at most 10^15")
+        raise UsageError(f"{name} is {count}", "give a whole number, 0 or more, at most 10^15")
 
 
 def _check_exposure(count: int, exposure: float) -> None:
     check_count("number of events", count)
     if not (exposure >= 0.0 and math.isfinite(exposure)):
-        raise UsageError(f"exposure is {exposure:g}", "hours or operations, 0 or more")
+        raise UsageError(f"exposure is {exposure:g}", "give hours or operations, 0 or more")
 
 
 def _check_share(count: int, n: int) -> None:

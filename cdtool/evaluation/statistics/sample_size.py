@@ -132,7 +132,7 @@ def detectable_difference(n: int, std: float, power: float = 0.8, level: float =
     _check_above_zero("standard deviation", std)
     check_count("n", n)
     if n < 2:
-        raise UsageError(f"n is {n}", "a spread needs at least 2 impacts")
+        raise UsageError(f"n is {n}", "a standard deviation requires at least 2 impacts")
     from scipy import optimize
 
     def lacking(noncentrality: float) -> float:
@@ -178,7 +178,7 @@ def impacts_for_missed_share(share: float, allowed_missed: int = 0, level: float
     check_level(level)
     check_count("allowed_missed", allowed_missed)
     if not 0.0 < share < 1.0:
-        raise UsageError(f"missed share is {share:g}", "a share between 0 and 1, such as 0.05")
+        raise UsageError(f"missed share is {share:g}", "give a share between 0 and 1, such as 0.05")
     return _least(allowed_missed + 1, lambda n: binomial_at_most(allowed_missed, n, level) <= share)
 
 
@@ -214,7 +214,7 @@ def exposure_for_rate(rate: float, allowed: int = 0, level: float = 0.95) -> flo
     2996
     """
     if not (rate > 0.0 and math.isfinite(rate)):
-        raise UsageError(f"rate is {rate:g}", "events per hour or operation, above 0")
+        raise UsageError(f"rate is {rate:g}", "give events per hour or operation, above 0")
     return poisson_at_most(allowed, 1.0, level) / rate
 
 
@@ -229,7 +229,9 @@ def _effect(difference: float, std: float, power: float, level: float) -> float:
 def _check_power(power: float, level: float) -> None:
     check_level(level)
     if not 1.0 - level < power < 1.0:
-        raise UsageError(f"power is {power:g}", f"a share between {1.0 - level:g} (chance alone) and 1, such as 0.8")
+        raise UsageError(
+            f"power is {power:g}", f"give a share between {1.0 - level:g} (chance alone) and 1, such as 0.8"
+        )
 
 
 def _check_above_zero(name: str, value: float) -> None:
@@ -251,7 +253,7 @@ def _least(fewest: int, enough: Callable[[int], bool]) -> int:
     above = fewest
     while not enough(above):
         if above >= _MOST:
-            raise UsageError(f"more than {_MOST} impacts would be needed", "ask for less: a larger difference or share")
+            raise UsageError(f"more than {_MOST} impacts would be needed", "choose a larger difference or share")
         above = min(2 * above, _MOST)
     below = fewest - 1
     while above - below > 1:

@@ -123,7 +123,7 @@ def median_of(
     if not n:
         return found
     if clusters < min(n, FEWEST):
-        return _without(found, f"{too_few(clusters)}, and contacts of one recording are alike")
+        return _without(found, f"{too_few(clusters)}, and contacts of one recording are correlated")
     if n >= FEWEST:
         return found
     rank = median_rank(n, level)

@@ -38,7 +38,7 @@ class TraceChoice:
         number = self._taken
         self._taken += 1
         if group not in self._first or panels > self._first[group][0]:
-            self._first[group] = (panels, number, make("one of its group"))
+            self._first[group] = (panels, number, make("example of its group"))
         if striking:
             if len(self._striking) < MOST_STRIKING:
                 self._striking[number] = make(striking)
@@ -46,7 +46,7 @@ class TraceChoice:
                 self.left_out += 1
             return
         if log % max(1, -(-self.work // MOST_SAMPLED)) == 0 and len(self._sampled) < MOST_SAMPLED:
-            self._sampled[number] = make("taken evenly from all")
+            self._sampled[number] = make("evenly sampled from all")
             return
         if slowest > 0.0 and (len(self._slow) < MOST_SLOW or slowest > self._slow[0][0]):
             item = (slowest, -number, make("among the slowest"))

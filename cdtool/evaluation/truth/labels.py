@@ -46,7 +46,7 @@ class Labels:
                 raise RecordingError(
                     f"{line}: the contact begins at {contact.start:.10g} s, "
                     f"{recording} is recorded from {start:.3f} to {end:.3f} s",
-                    "seconds on the recording's own clock, as cdtool shows them",
+                    "give seconds on the recording's own clock, as cdtool shows them",
                 )
 
 
@@ -97,6 +97,6 @@ def _contact(row: NamedRow, start: float) -> Contact:
     if end < start or uncertainty < 0.0:
         raise row.fault(
             f"start {start:g} s, end {end:g} s, uncertainty {uncertainty:g} s",
-            "the end comes after the start, and the uncertainty is not negative",
+            "the end must be after the start, and the uncertainty not negative",
         )
     return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"))

@@ -4,9 +4,9 @@ Conventions: latency = time of the sample whose processing raised the alarm (deb
 window is [onset - its uncertainty, onset + window]; it ends earlier where the next contact's window begins. A contact
 without an alarm in it is missed: its latency is censored at `watched`, never dropped. It is not assessable where the
 detector's signal was valid nowhere between onset and the window's end, or where load-cell samples are missing for as
-long as the window before its first sample: nobody saw when it began. A contact that is in progress when the recording
-begins has no onset, and so no latency: it is neither detected nor missed, and what alarms until its release, and in the
-window after that, is no false alarm.
+long as the window before its first sample: its beginning was not measured. A contact that is in progress when the
+recording begins has no onset, and so no latency: it is neither detected nor missed, and what alarms until its release,
+and in the window after that, is no false alarm.
 """
 
 from __future__ import annotations

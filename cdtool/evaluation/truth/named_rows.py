@@ -40,7 +40,7 @@ class NamedRow:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise self.fault(f"{name} is '{text}'", "a number of seconds is needed")
+            raise self.fault(f"{name} is '{text}'", "give a number of seconds")
         return value
 
     def fault(self, problem: str, hint: str) -> ConfigurationError:
@@ -58,10 +58,10 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
         _check_header(path, header, required, [*required, *optional])
         return [_row(path, reader.line_num, header, cells) for cells in reader if cells]
     except UnicodeDecodeError as fault:
-        raise ConfigurationError(f"{path}: no {what} file: no UTF-8 text", "a UTF-8 CSV file is needed") from fault
+        raise ConfigurationError(f"{path}: not a {what} file: not UTF-8 text", "give a UTF-8 CSV file") from fault
     except csv.Error as fault:
         raise ConfigurationError(
-            f"{path}: no {what} file: damaged at line {reader.line_num}", "a CSV file is needed, its quotes in pairs"
+            f"{path}: not a {what} file: damaged at line {reader.line_num}", "give a CSV file with paired quotes"
         ) from fault
 
 
@@ -99,7 +99,7 @@ def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) 
             meant = sorted(item for item in recordings if PurePosixPath(item).name == name)
         if len(meant) > 1:
             raise ConfigurationError(
-                f"{path}: '{name}' fits {first_of(meant)}", "write the path below the benchmark file"
+                f"{path}: '{name}' fits {first_of(meant)}", "give a path relative to the benchmark file"
             )
         found[name] = meant[0] if meant else None
     return found
@@ -110,10 +110,10 @@ def _check_header(path: Path, header: Sequence[str], required: Sequence[str], kn
         if name not in known:
             raise ConfigurationError(f"{path} line 1: unknown column '{name}'", nearest(name, known))
         if header.count(name) > 1:
-            raise ConfigurationError(f"{path} line 1: column '{name}' is there twice", "name each column once")
+            raise ConfigurationError(f"{path} line 1: column '{name}' is repeated", "name each column once")
     for name in required:
         if name not in header:
-            raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"write {','.join(known)}")
+            raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"use {','.join(known)}")
 
 
 def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> NamedRow:
@@ -121,10 +121,10 @@ def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> 
     if len(cells) != len(header):
         raise ConfigurationError(
             f"{where}: {counted(len(cells), 'cell')} under {counted(len(header), 'column')}",
-            "one cell a column, empty where there is nothing; decimals with a point",
+            "give one cell per column, empty without a value; decimals with a point",
         )
     values = dict(zip(header, cells, strict=True))
     name = values["recording"].strip().replace("\\", "/")
     if not name:
-        raise ConfigurationError(f"{where}: no recording is named", "write its path in column recording")
+        raise ConfigurationError(f"{where}: no recording is named", "give its path in column recording")
     return NamedRow(where, PurePosixPath(name).as_posix(), values)

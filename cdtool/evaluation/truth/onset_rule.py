@@ -52,11 +52,11 @@ class OnsetRule:
         for name in ("above", "back_to", "sigmas", "separation"):
             value = getattr(self, name)
             if value is not None and not (value > 0.0 and math.isfinite(value)):
-                raise UsageError(f"onset: {name} is {value:g}", "a finite number above 0")
+                raise UsageError(f"onset: {name} is {value:g}", "give a finite number above 0")
         if not 0.0 <= self.hold <= LONGEST_HOLD:
-            raise UsageError(f"onset: hold is {self.hold:g} s", f"0 to {LONGEST_HOLD:g} s")
+            raise UsageError(f"onset: hold is {self.hold:g} s", f"give 0 to {LONGEST_HOLD:g} s")
         if self.above is not None and self.back_to is not None and self.back_to > self.above:
-            raise UsageError(f"onset: back_to is {self.back_to:g}, more than above", "at most above")
+            raise UsageError(f"onset: back_to is {self.back_to:g}, more than above", "give at most the value of above")
 
     @property
     def described(self) -> str:

@@ -79,7 +79,9 @@ def read_triggers(path: Path) -> TriggerFile:
         by_name = rows.setdefault(row.text("detector") or path.stem, {})
         _take(row, by_name.setdefault(row.recording, Triggered()))
     if not rows:
-        raise ConfigurationError(f"{path}: holds no row", "write one a trigger; an empty time_s: watched, no alarm")
+        raise ConfigurationError(
+            f"{path}: contains no row", "write one per trigger; an empty time_s: monitored, no alarm"
+        )
     return TriggerFile(path, rows, hashlib.sha256(read_bytes(path, ConfigurationError)).hexdigest())
 
 
@@ -87,9 +89,12 @@ def _take(row: NamedRow, said: Triggered) -> None:
     time, until = row.seconds("time_s"), row.seconds("blind_until_s")
     if until is not None:
         if time is None:
-            raise row.fault(f"blind_until_s is {until:g}, time_s is missing", "time_s: from when on it could not judge")
+            raise row.fault(
+                f"blind_until_s is {until:g}, time_s is missing",
+                "give time_s, the beginning of the time that is not assessable",
+            )
         if until < time:
-            raise row.fault(f"blind from {time:g} until {until:g}", "time_s is the begin, and comes first")
+            raise row.fault(f"blind from {time:g} until {until:g}", "time_s must be before blind_until_s")
         said.blind.append((time, until))
     elif time is not None:
         said.alarms.append(time)

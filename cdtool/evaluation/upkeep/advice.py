@@ -43,11 +43,11 @@ def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
         if any(item.overall and (item.overall.outward or not item.two_sided) for item in drift.joints):
             steps.append("relearn from the latest runs" if not steps else "then relearn")
         elif drift.alarms and not steps:
-            steps.append("look at the alarms with cdtool explain: no drift is shown")
+            steps.append("analyse the alarms with cdtool explain: no drift is shown")
     if coverage is not None and not coverage.enough and (drift is None or not drift.drifts):
         steps.append(_more(coverage))
     if not steps and coverage is None and drift is not None and not any(item.course.trend for item in drift.joints):
-        return f"none from so few runs: give at least {LEAST_RUNS} new ones, or those that it was learned from"
+        return f"too few runs for advice: give at least {LEAST_RUNS} new ones, or those learned from"
     return "; ".join(steps) if steps else "keep the signature"
 
 

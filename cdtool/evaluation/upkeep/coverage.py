@@ -74,7 +74,7 @@ class Coverage:
     def verdict(self) -> str:
         """The answer in a line."""
         if math.isnan(self.chance):
-            return f"{counted(len(self.runs), 'assessable run')}: too few to predict from; {LEAST_VALUES} are needed"
+            return f"{counted(len(self.runs), 'assessable run')}: too few to predict from; {LEAST_VALUES} are required"
         allowed = f"at most {_chance(self.target)} is allowed"
         expected = f"the chance of a false alarm in the next operation is {_chance(self.chance)}; {allowed}"
         if self.enough:
@@ -128,10 +128,10 @@ def check_coverage(
     `cdtool.check_signature` returns it for each class.
     """
     if not 0.0 < target < 1.0:
-        raise UsageError(f"target is {target:g}", "a chance between 0 and 1, such as 0.001")
+        raise UsageError(f"target is {target:g}", "give a probability between 0 and 1, such as 0.001")
     if len(pairs) < LEAST_VALUES:
         raise SignatureError(
-            f"{counted(len(pairs), 'run')} to judge by the others", f"at least {LEAST_VALUES} are needed"
+            f"{counted(len(pairs), 'run')} to check against the others", f"at least {LEAST_VALUES} are required"
         )
     bare = [(operation.recording.without_ground_truth(), signal) for operation, signal in pairs]
     fitted = rule.fit(bare)
@@ -197,7 +197,9 @@ class NoLimit:
         where = f"at {self.start:.3f}" if at else f"from {self.start:.3f} to {self.end:.3f}"
         unit = f" {self.unit}" if self.unit else ""
         place = f"{where}{unit} of travel" if self.axis == "travel" else f"{where} s after the motion began"
-        return f"{place}: valid in at most {100.0 * self.share:.0f} % of the runs; {100.0 * COVERAGE:.0f} % are needed"
+        return (
+            f"{place}: valid in at most {100.0 * self.share:.0f} % of the runs; {100.0 * COVERAGE:.0f} % are required"
+        )
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def audit_drift(
             detections.append(detection)
     if not detections:
         reason = f"; first reason: {refused[0][1]}" if refused else ""
-        raise SignatureError(f"no run to compare with the signature{reason}", "runs of the class that was learned")
+        raise SignatureError(f"no run to compare with the signature{reason}", "give runs of the learned class")
     found = deviations_of(signature, detections)
     unit = "s" if found.axis == "time" else detections[0].operation.recording["position"].unit
     audited = [_Joint(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]

@@ -35,7 +35,7 @@ def verdicts(item: JointDrift) -> tuple[str, ...]:
     lines = [_alarms(item)] if any(run.alarm for run in item.runs) else []
     if item.course.trend is None:
         many = counted(item.course.n, "run")
-        return (*lines, f"{many}: too few to show a drift; at least {LEAST_RUNS} are needed")
+        return (*lines, f"{many}: too few to show a drift; at least {LEAST_RUNS} are required")
     lines += [_local(shown, item) if shown.place is not None else _overall(shown, item) for shown in item.shown]
     if not item.shown:
         lines.append(f"{NOTHING_SHOWN} at a level of 1 %: {_slope(item.course.trend.slope)}")

@@ -1,1 +1,1 @@
-"""`cdtool benchmark`: its file, what it learns, one log's scores and the results of all."""
+"""`cdtool benchmark`: its file, learning, scoring one log, and the results of all logs."""

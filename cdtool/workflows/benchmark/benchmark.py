@@ -42,7 +42,7 @@ from cdtool.workflows.signature.threshold_settings import set_by_hand
 
 @dataclass(frozen=True)
 class Benchmark:
-    """The results with their statistics, the traces kept for figures, where the time went [s], and what was read."""
+    """The results with their statistics, the selected traces, the time per step [s], and the files read."""
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
@@ -51,7 +51,7 @@ class Benchmark:
 
     @property
     def results(self) -> Results:
-        """Every verdict with raw figures and provenance."""
+        """Return all verdicts with raw numbers and provenance."""
         return self.evaluated.results
 
 
@@ -121,11 +121,11 @@ def benchmark(
         left_out += [Skipped(name, f"left out: {fault}") for name, fault in DETECTORS.broken_plugins().items()]
         setup = with_only(setup, [detector.name for detector in used])
     if len(setup.limits) < limits:
-        words = f"{limits - len(setup.limits)} of {limits} limits are on detectors that were not run: not checked"
+        words = f"{limits - len(setup.limits)} of {limits} limits are set for detectors that were not run: not checked"
         left_out.append(Skipped(str(setup.path), words))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    detect = detect_with(setup, used, learned.thresholds, learned.lacking)
+    detect = detect_with(setup, used, learned.thresholds, learned.unusable)
     factors = _factors(setup, learned.thresholds)
     gathered = Gathering(
         setup,
@@ -135,8 +135,8 @@ def benchmark(
         NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS),
     )
     gathered.skipped += [*learn.skipped, *learned.skipped]
-    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.lacking.items()]
-    gathered.findings += [*learn.findings, *left_out, *learned.blind]
+    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
+    gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
 
     def score(item: tuple[str, Path]) -> Scored:
@@ -153,7 +153,7 @@ def benchmark(
 
 
 def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, np.ndarray]:
-    """The safety factors of the sweep by detector; none without an impact-free group to count false alarms in."""
+    """Return the safety factors of the sweep by detector; empty without an impact-free group."""
     if HOLDOUT not in setup.impacts:
         return {}
     return {name: items[0].safety_factor * MULTIPLES for name, items in thresholds.items() if items}

@@ -1,4 +1,4 @@
-"""benchmark.toml: which logs to learn from, which to score, with which detectors. Paths are relative to the file."""
+"""benchmark.toml: the logs to learn from and to score, and the detectors. Paths are relative to the file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ HOLDOUT = "holdout"
 
 @dataclass(frozen=True)
 class Group:
-    """One group of logs of impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
+    """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
 
     logs: tuple[Path, ...]
     window: float
@@ -41,11 +41,11 @@ class Group:
 
 @dataclass(frozen=True)
 class BenchmarkFile:
-    """A validated benchmark file with its globs resolved; `impacts` are the groups that are scored, hold-out last.
+    """A validated benchmark file with resolved globs; `impacts` are the scored groups, hold-out last.
 
-    `rule` is the threshold's, with its settings.
-    `synchronisation` [s]: how far the load cell's clock may be off; `mass_before_cell` [kg]. `window` [s] is that of a
-    log of no group. `migrated` says how keys of earlier versions were read.
+    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
+    `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
+    versions were read.
     """
 
     path: Path
@@ -73,12 +73,12 @@ class BenchmarkFile:
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
-        """Limits of the signal that were set by hand; empty where they are learned."""
+        """Return the limits of the signal that were set by hand; empty if they are learned."""
         return tuple(getattr(self.rule, "limits", ()))
 
     @property
     def scoring(self) -> dict[str, Any]:
-        """How figures come about, for provenance: results can be compared only where all this is the same."""
+        """Return the settings that determine the results, for provenance; only results with equal settings compare."""
         return {
             "onset": self.onset.described + (f"{LABEL_FILE}{Path(self.labels.source).name}" if self.labels else ""),
             "separation_s": self.onset.separation,
@@ -92,20 +92,20 @@ class BenchmarkFile:
         }
 
     def rules_of(self, group: str) -> ScoringRules:
-        """The settings that make the figures of a log of that group, or of a log of none."""
+        """Return the settings that determine the results of a log in that group, or in no group."""
         window = self.impacts[group].window if group in self.impacts else self.window
         return ScoringRules(self.onset, window, self.labels, self.synchronisation, self.mass_before_cell)
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """Every file that is read for it: none of them may be written to."""
+        """Return every file that is read for the benchmark; none of them may be overwritten."""
         logs = (path for group in self.impacts.values() for path in group.logs)
         labels = (Path(self.labels.source),) if self.labels else ()
         return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """The impact groups, then the hold-out."""
+        """Return the impact groups, then the hold-out."""
         return tuple(self.impacts)
 
 
@@ -114,21 +114,21 @@ def read_benchmark_file(
 ) -> BenchmarkFile:
     """Read and check a benchmark file; raises ConfigurationError naming the key.
 
-    `detectors` stand for the file's own where it names none; `all` for every one that is registered.
-    Without `learning`, where alarms come from elsewhere, it needs neither detectors nor logs to learn from, and
-    [limits] may be on the detectors `also_known`.
+    `detectors` are used if the file does not name any; `all` selects every registered detector. Without `learning`, for
+    external alarms, the file needs neither detectors nor logs to learn from, and [limits] may be set for the detectors
+    `also_known`.
     """
     file = Path(path)
     root = Table(read_toml(file), str(file))
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
-        raise ConfigurationError(text, f'a benchmark file names it: machine = "{file.name}"')
+        raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(base / root.text("machine"))
     wanted = root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
-        raise root.fault("detectors", "names a detector twice", "name each once")
+        raise root.fault("detectors", "contains a detector twice", "list each detector once")
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
     learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
@@ -166,29 +166,29 @@ def read_benchmark_file(
     )
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
-        raise root.fault("points", "there is no force profile that they are held against", "set [force] profile")
+        raise root.fault("points", "there is no force profile to check them against", "set [force] profile")
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
-    """Raise ConfigurationError where limits set by hand stand beside a budget, or beside more than one detector."""
+    """Raise ConfigurationError if limits set by hand are combined with a budget or with more than one detector."""
     if setup.limits_by_hand and (setup.budget or len(setup.detectors) > 1):
         what = "a false-alarm budget" if setup.budget else f"{counted(len(setup.detectors), 'detector')}"
         raise ConfigurationError(
-            f"{setup.path}: threshold.limits: are set by hand beside {what}", "they belong to one detector alone"
+            f"{setup.path}: threshold.limits: set by hand together with {what}", "use them with a single detector"
         )
 
 
 def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
-    """The same with other detectors, each named once, or with all that are registered where `all` is named.
+    """Return the benchmark with other detectors, or with all registered ones for `all`.
 
-    Raises ConfigurationError for an unknown name, UsageError for one that is named twice.
+    Raises ConfigurationError for an unknown name, UsageError for a repeated one.
     """
     chosen = tuple(setup.machine_file.detector(name).name for name in _all_or(names))
     if len(set(chosen)) < len(chosen):
-        raise UsageError(f"detectors {', '.join(names)} name one twice", "name each once")
+        raise UsageError(f"detectors {', '.join(names)} contain a repetition", "list each detector once")
     return with_only(setup, chosen)
 
 
@@ -197,16 +197,18 @@ def _all_or(names: Sequence[str]) -> Sequence[str]:
 
 
 def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
-    """The same with these detectors, and with the limits that are on them or on every one."""
+    """Return the benchmark with only these detectors, and the limits set for them or for every detector."""
     limits = tuple(rule for rule in setup.limits if rule.detector in (ALL, *detectors))
     return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
 def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, Group]:
-    """The groups of impacts, then the hold-out."""
+    """Return the groups of impacts, then the hold-out."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
-        raise tables.fault(HOLDOUT, "is the name of the impact-free group", "choose another name for the impacts")
+        raise tables.fault(
+            HOLDOUT, "is the name of the impact-free group", "choose another name for the group of impacts"
+        )
     profiles = read_force_limits(base / force.text("limits") if "limits" in force else None)
     profile = force.text("profile", "")
     if profile:
@@ -214,7 +216,7 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
     groups = {}
     for name in tables.values:
         if name.strip() in ("", ALL):
-            raise tables.fault(name, "is no name of a group", f"a name is needed; {ALL} stands for every group")
+            raise tables.fault(name, "is not a valid group name", f"choose another name; {ALL} stands for every group")
         table = tables.table(name)
         limits = _profile(profiles, table, "force_profile", force) if "force_profile" in table else None
         if profile and "force_profile" not in table:
@@ -224,25 +226,31 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
     if HOLDOUT in root:
         groups[HOLDOUT] = Group(logs_of(root.table(HOLDOUT), base), window)
     if "limits" in force and not any(group.force for group in groups.values()):
-        raise force.fault("limits", "holds limits, but no profile is chosen", f"profile = one of {', '.join(profiles)}")
+        raise force.fault(
+            "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
+        )
     if not groups:
-        raise root.fault("impacts", "is missing", "name groups of impact logs: [impacts.stiff] logs = [...]")
+        raise root.fault("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
     return groups
 
 
 def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
-    """The force profile that a key names, None for an empty text; raises ConfigurationError naming key and file."""
+    """Return the force profile that a key names, None for an empty text; ConfigurationError names key and file."""
     if not (name := table.text(key)):
         return None
     try:
         return profile_of(profiles, name)
     except UsageError as fault:
-        where = f" in {force.text('limits')}" if "limits" in force else ": [force] limits names no file of your own"
+        where = (
+            f" in {force.text('limits')}"
+            if "limits" in force
+            else "; [force] limits does not name a file with your own profiles"
+        )
         raise table.fault(key, f"{fault.message}{where}", fault.hint) from fault
 
 
 def _mass_before_cell(force: Table) -> float:
-    """The mass before the cell [kg]; every key of [force] is asked for, so that an unknown one is named first."""
+    """Return the mass before the cell [kg]; reads every key of [force] so that an unknown key is reported first."""
     mass = force.number("mass_before_cell_kg", 0.0, minimum=0.0)
     for name in ("limits", "profile"):
         force.raw(name)
@@ -251,7 +259,7 @@ def _mass_before_cell(force: Table) -> float:
 
 
 def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:
-    """The logs of all groups of impacts, and of the hold-out where it is among `more`."""
+    """Return the logs of all groups of impacts, and of the hold-out if it is among `more`."""
     return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
 
 
@@ -266,19 +274,19 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
         true = path.resolve()
         if true in learned:
             raise ConfigurationError(
-                f"{benchmark.path}: {path} is learned from and scored",
-                "a recording may be in [learn] or scored, not both",
+                f"{benchmark.path}: {path} is both learned from and scored",
+                "use a recording either in [learn] or for scoring",
             )
         if true in scored:
             where = f"in {scored[true]} and in {name}" if scored[true] != name else f"twice in {name}"
             raise ConfigurationError(
-                f"{benchmark.path}: {path} is scored {where}", "a recording belongs to one group, under one path"
+                f"{benchmark.path}: {path} is scored {where}", "list a recording in one group only, under one path"
             )
         scored[true] = name
 
 
 def _read_budget(table: Table) -> Budget | None:
-    """`false_alarm_budget`; None where the file has none."""
+    """Return `false_alarm_budget`; None if it is missing."""
     if "false_alarm_budget" not in table:
         return None
     text = table.text("false_alarm_budget")
@@ -289,16 +297,18 @@ def _read_budget(table: Table) -> Budget | None:
 
 
 def _read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    """`joints`: those to watch; empty: all of them."""
+    """Return `joints`, the joints to monitor; empty: all of them."""
     watched = table.texts("joints", ())
     for joint in watched:
         if joint not in joints:
-            raise table.fault("joints", f"names '{joint}', which the machine file does not", nearest(joint, joints))
+            raise table.fault(
+                "joints", f"contains '{joint}', which is not a joint of the machine file", nearest(joint, joints)
+            )
     return watched
 
 
 def _read_activation(table: Table) -> Activation:
-    """[activation]: how an exit from the band becomes an alarm."""
+    """Return [activation]: how a signal outside the limits becomes an alarm."""
     activation = Activation(
         debounce=table.whole("debounce", 1, minimum=1) if "debounce" in table else None,
         rearm=table.number("rearm_s", Activation.rearm, minimum=0.0),
@@ -312,42 +322,42 @@ def _read_activation(table: Table) -> Activation:
 def _share(table: Table, name: str, default: float) -> float:
     value = table.number(name, default, minimum=0.0)
     if value >= 1.0:
-        raise table.fault(name, f"is {value:g}", "a number from 0 to below 1 is needed")
+        raise table.fault(name, f"is {value:g}", "give a number from 0 to below 1")
     return value
 
 
 def migrated_onset(table: Table) -> tuple[str, ...]:
-    """How a setting of an earlier version is read; nothing where there is none."""
+    """Return how a setting of an earlier version is read; empty without such a setting."""
     if "samples" not in table:
         return ()
-    return (f"{table.key('samples')}: read as hold_s = {_hold(table):g} (samples of 1 kHz): write that instead",)
+    return (f"{table.key('samples')}: read as hold_s = {_hold(table):g} (samples at 1 kHz): use hold_s instead",)
 
 
 def _hold(table: Table) -> float:
-    """`hold_s`, or `samples` of an earlier version: those of a load cell of 1 kHz, whatever this one's rate is."""
+    """Return `hold_s`, or `samples` of an earlier version at 1 kHz, independent of the load cell's actual rate."""
     if "samples" not in table:
         hold = table.number("hold_s", OnsetRule.hold, minimum=0.0)
         if hold > LONGEST_HOLD:
-            raise table.fault("hold_s", f"is {hold:g}", f"at most {LONGEST_HOLD:g} s")
+            raise table.fault("hold_s", f"is {hold:g}", f"give at most {LONGEST_HOLD:g} s")
         return hold
     samples = table.whole("samples", 3, minimum=1)
     if "hold_s" in table:
         raise table.fault(
-            "samples", "is given together with hold_s", "leave samples out: the onset rule counts in seconds"
+            "samples", "cannot be combined with hold_s", "remove samples: the onset rule counts in seconds"
         )
     if samples * SAMPLE > LONGEST_HOLD:
         raise table.fault(
-            "samples", f"is {samples}: the onset rule counts in seconds now", f"write hold_s, at most {LONGEST_HOLD:g}"
+            "samples", f"is {samples}: the onset rule now counts in seconds", f"set hold_s, at most {LONGEST_HOLD:g}"
         )
     return samples * SAMPLE
 
 
 def read_onset(table: Table) -> OnsetRule:
-    """[onset]: when a contact begins."""
+    """Return [onset]: when a contact begins."""
     above = table.number("above_n", above=0.0) if "above_n" in table else None
     back_to = table.number("back_to_n", above=0.0) if "back_to_n" in table else None
     if above is not None and back_to is not None and back_to > above:
-        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "at most above_n")
+        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "give at most above_n")
     rule = OnsetRule(
         above=above,
         back_to=back_to,

@@ -1,4 +1,4 @@
-"""What a benchmark adds up operation by operation: exposure, and the curve of latency against false alarms."""
+"""Totals of a benchmark over its operations: exposure, and the curve of latency against false alarms."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from cdtool.recording import FloatArray
 
 @dataclass
 class Exposure:
-    """How long one detector watched one group."""
+    """How long one detector monitored one group."""
 
     recordings: int = 0
     operations: int = 0
     seconds: float = 0.0
     not_assessable: int = 0
     samples: int = 0
-    not_judged: Counter[str] = field(default_factory=Counter)
+    by_reason: Counter[str] = field(default_factory=Counter)
 
     def add(self, detection: Detection) -> None:
-        """Count one operation."""
+        """Add one operation."""
         self.operations += 1
         self.seconds += detection.assessed_seconds
         self.not_assessable += detection.verdict.outcome == "not_assessable"
         size = detection.statistic.status.size
         self.samples += size
         for reason, share in detection.statistic.shares().items():
-            self.not_judged[reason] += round(share * size)
+            self.by_reason[reason] += round(share * size)
 
     def result(self, group: str, detector: str) -> ExposureResult:
-        """The row of results.json."""
-        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.not_judged.items())}
+        """Return the row of results.json."""
+        shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.by_reason.items())}
         hours = self.seconds / 3600.0
         return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
 
@@ -56,13 +56,13 @@ class SweepRows:
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def add(self, group: str, detection: Detection, swept: Swept | None, matching: Matching) -> None:
-        """Count one operation of one detector."""
+        """Add one operation of one detector."""
         name = detection.detector
         if swept is None:
             return
         if group == self.impact_free:
             if detection.assessed_seconds <= 0.0:
-                return  # an operation that could be judged nowhere is no exposure
+                return  # an operation without an assessable sample does not count as exposure
             self._false_alarms[name] = self._false_alarms.get(name, 0) + swept.false_alarms
             operations, seconds = self._watched.get(name, (0, 0.0))
             self._watched[name] = operations + 1, seconds + detection.assessed_seconds
@@ -73,7 +73,7 @@ class SweepRows:
         self._blind[name, group] += outcomes.count("not_assessable")
 
     def rows(self, detectors: Sequence[str], groups: Sequence[str]) -> Iterator[SweepResult]:
-        """A row for each detector, group of impacts and safety factor."""
+        """Return a row for each detector, group of impacts and safety factor."""
         for group in groups:
             for name in detectors:
                 if name in self._watched and (name, group) in self._latency:
@@ -105,12 +105,12 @@ class SweepRows:
 
 
 def _loudest(false_alarms: npt.NDArray[np.int64]) -> int:
-    """The largest factor with the most false alarms: below it the signal hardly returns, and new alarms get fewer."""
+    """Return the largest factor with the most false alarms; below it the signal hardly returns and alarms merge."""
     return int(np.flatnonzero(false_alarms == false_alarms.max())[-1])
 
 
 def _median(values: FloatArray) -> float | None:
-    """The median [ms], a missed contact (NaN) being later than all; None where it is not reached."""
+    """Return the median [ms], counting a missed contact (NaN) as later than all; None if it is not reached."""
     ordered = np.sort(np.where(np.isnan(values), np.inf, values))
     if not len(ordered):
         return None

@@ -1,10 +1,10 @@
-"""Force verdicts as rows of the results: a contact's, and a test point's."""
+"""Force verdicts as rows of the results: per contact, and per test point."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, RecordingResult
@@ -12,9 +12,9 @@ from cdtool.strict_json import finite
 
 
 def force_rows(
-    recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+    recording: RecordingResult, verdicts: Mapping[int, ForceVerdict], curves: Mapping[int, ForceTimeCurve]
 ) -> list[ForceResult]:
-    """A row for each contact of a recording, by its number."""
+    """Return a row for each contact of a recording, by its number."""
     return [
         ForceResult(
             recording=recording.recording,
@@ -22,7 +22,7 @@ def force_rows(
             contact=number,
             profile=verdict.profile,
             verdict=verdict.outcome,
-            peak_n=courses[number].peak,
+            peak_n=curves[number].peak,
             steps=tuple(
                 ForceStepResult(
                     name=item.step.name,
@@ -46,7 +46,7 @@ def force_rows(
 def point_rows(
     tests: Mapping[tuple[str, str], Sequence[ForceVerdict]], profiles: Mapping[str, ForceProfile | None]
 ) -> list[PointResult]:
-    """A row for each (group, point) that has tests; `profiles` are the groups'."""
+    """Return a row for each (group, point) with tests; `profiles` are those of the groups."""
     rows = []
     for (group, point), verdicts in tests.items():
         profile = profiles[group]

@@ -1,4 +1,4 @@
-"""The thresholds of a benchmark: of each detector, learned from its impact-free runs."""
+"""The thresholds of a benchmark, learned for each detector from its impact-free runs."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from cdtool.workflows.signature.fitting import NoUsableRunError, fitting, signal
 
 @dataclass(frozen=True)
 class LearnedThresholds:
-    """Each detector's thresholds, runs left out, detectors that could judge nothing, and how factors were set.
+    """Each detector's thresholds, runs left out, detectors that were not assessable, and how factors were set.
 
-    `lacking`: the detectors that could not be used on any run, with the reason; they have no threshold.
-    `unused`: the runs that every other detector left out.
+    `unusable` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
+    runs that every other detector left out.
     """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
     skipped: list[Skipped]
-    blind: list[Skipped]
+    not_assessable: list[Skipped]
     calibration: list[CalibrationResult]
-    lacking: dict[str, str]
+    unusable: dict[str, str]
     unused: set[str]
 
     def learned_from(self, operations: Sequence[Operation]) -> list[Operation]:
-        """Return the operations that some detector has learned from."""
+        """Return the operations that at least one detector learned from."""
         return [operation for operation in operations if operation.name not in self.unused]
 
 
 def learn_thresholds(
     setup: BenchmarkFile, operations: Sequence[Operation], detectors: Sequence[Any], unread: Sequence[Skipped]
 ) -> LearnedThresholds:
-    """Learn each detector's threshold from impact-free runs; with a budget its safety factor is set on them too.
+    """Learn each detector's threshold from impact-free runs; a budget also sets its safety factor on these runs.
 
-    A detector that lacks a channel stops the others not. Raises SignatureError where nothing can be learned, UsageError
-    where the runs are too few for the budget.
+    A detector with a missing channel does not stop the others. Raises SignatureError if nothing can be learned,
+    UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set())
     fit = fitting(setup.rule)
@@ -57,11 +57,11 @@ def learn_thresholds(
             fitted = with_left_out(fit, [*unread, *unusable])(pairs)
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
-            learned.blind.append(Skipped(detector.name, f"not assessable: {fault.message}"))
+            learned.not_assessable.append(Skipped(detector.name, f"not assessable: {fault.message}"))
             continue
         except NoUsableRunError as fault:
             learned.thresholds[detector.name] = ()
-            learned.lacking[detector.name] = fault.reason
+            learned.unusable[detector.name] = fault.reason
             continue
         left_out.add(detector.name, [*unusable, *fitted.skipped])
         unused.append({item.recording for item in [*unusable, *fitted.skipped]})
@@ -75,24 +75,24 @@ def learn_thresholds(
                 )
             )
         learned.thresholds[detector.name] = thresholds
-    learned.skipped.extend(left_out.said_once())
+    learned.skipped.extend(left_out.combined())
     learned.unused.update(set.intersection(*unused) if unused else ())
-    if learned.lacking and len(learned.lacking) == len(detectors):
-        raise _none_usable(learned.lacking, known=bool(operations))
+    if learned.unusable and len(learned.unusable) == len(detectors):
+        raise _none_usable(learned.unusable, known=bool(operations))
     return learned
 
 
-def _none_usable(lacking: Mapping[str, str], known: bool) -> SignatureError:
-    name, reason = next(iter(lacking.items()))
-    fault = NoUsableRunError(name if len(lacking) == 1 else f"any of {', '.join(lacking)}", reason)
-    others = f"take {', '.join(lacking)} out of `detectors`, or map what they need"
+def _none_usable(unusable: Mapping[str, str], known: bool) -> SignatureError:
+    name, reason = next(iter(unusable.items()))
+    fault = NoUsableRunError(name if len(unusable) == 1 else f"any of {', '.join(unusable)}", reason)
+    others = f"remove {', '.join(unusable)} from `detectors`, or map the channels they need"
     return SignatureError(fault.message, others if known else fault.hint)
 
 
 def that_can_run(
     detectors: Sequence[Any], operations: Sequence[Operation], machine: Machine
 ) -> tuple[list[Any], list[Skipped]]:
-    """The detectors that the first run holds all channels for, and why not the others."""
+    """Return the detectors whose channels are all in the first run, and the reasons for the others."""
     able: list[Any] = []
     left_out: list[Skipped] = []
     for detector in detectors:

@@ -1,4 +1,4 @@
-"""What several detectors left out for the same reason, said once."""
+"""Combine the reports of several detectors that left out a run for the same reason."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from cdtool.evaluation.results import Skipped
 
 
 class LeftOut:
-    """Runs that detectors left out: a reason that all of them have is said once, any other one names its detectors."""
+    """Runs left out by detectors: a reason shared by all detectors is listed once, others name their detectors."""
 
     def __init__(self) -> None:
         self._detectors: dict[str, None] = {}
         self._reasons: dict[Skipped, dict[str, None]] = {}
 
     def add(self, detector: str, skipped: Iterable[Skipped]) -> None:
-        """Take what one detector left out, which may be nothing."""
+        """Add what one detector left out; may be empty."""
         self._detectors[detector] = None
         for item in skipped:
             self._reasons.setdefault(item, {})[detector] = None
 
-    def said_once(self) -> list[Skipped]:
+    def combined(self) -> list[Skipped]:
         """Return each run with each reason once."""
         return [
             item

@@ -1,4 +1,4 @@
-"""One detector of a benchmark file, ready for single logs: with its threshold, and every setting that makes figures."""
+"""One detector of a benchmark file, ready for single logs: its threshold and all settings that affect results."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, n
 
 @dataclass(frozen=True)
 class PreparedBenchmark:
-    """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
+    """A detector with its threshold in `cdtool benchmark`; `described` states in words where the threshold is from.
 
-    `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
-    `normals` what they look like; `skipped` names the runs that were left out in learning, and why. `notes` are about a
-    signature file of an earlier version.
+    `learned` has the hashes of the logs learned from, `ranges` the ranges of their channels and `normals` their
+    normal motion. `skipped` lists the runs left out in learning, with the reason. `notes` concern a signature file of
+    an earlier version.
     """
 
     setup: BenchmarkFile
@@ -41,16 +41,16 @@ class PreparedBenchmark:
     skipped: tuple[Skipped, ...] = ()
 
     def score(self, log: Path) -> Scored:
-        """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
+        """Return the log's rows as in a benchmark, with the window of its group if it has one. Raises nothing."""
         group, path = self._listed(log)
         return score_log(self.setup, group, path, self.run, {}, self.ranges)
 
     def window(self, log: Path) -> float:
-        """How long after its onset a contact of the log may be detected [s]."""
+        """Return how long after its onset a contact of the log may be detected [s]."""
         return self.setup.rules_of(self._listed(log)[0]).window
 
     def _listed(self, log: Path) -> tuple[str, Path]:
-        """The log's group and its path as the file names it; no group where it is in none."""
+        """Return the log's group and its path as the file names it; an empty group if it is in none."""
         for name, group in self.setup.impacts.items():
             for path in group.logs:
                 if path.resolve() == log.resolve():
@@ -65,11 +65,11 @@ def prepare_benchmark(
     signature: str | Path | None = None,
     jobs: int = 1,
 ) -> PreparedBenchmark:
-    """Read a benchmark file and learn the threshold of one of its detectors, or take that of a signature file.
+    """Read a benchmark file and learn the threshold of one of its detectors, or use that of a signature file.
 
-    `detector` may be left out where the file names one alone, or a signature is given. Raises ConfigurationError for a
-    wrong file, SignatureError where nothing can be learned or the signature does not belong, UsageError for a detector
-    that is not clear.
+    `detector` is optional if the file names only one, or a signature is given. Raises ConfigurationError for a wrong
+    file, SignatureError if nothing can be learned or the signature does not belong, UsageError for an ambiguous
+    detector.
     """
     setup = read_benchmark_file(file, detectors=(detector,) if detector else ())
     machine_file = setup.machine_file
@@ -77,11 +77,11 @@ def prepare_benchmark(
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
-        # A file that names no joints watches all of the machine's; a signal of the whole machine has one column.
+        # Without `joints` in the file all joints are monitored; a signal of the whole machine has one column.
         everything = (tuple(machine_file.machine.joints), WHOLE_MACHINE)
         if stored.joints != setup.watched and (setup.watched or stored.joints not in everything):
             names = [", ".join(joints) or "all joints" for joints in (stored.joints, setup.watched)]
-            raise UsageError(f"the signature watches {names[0]}, {file} {names[1]}", "learn one for the same joints")
+            raise UsageError(f"the signature monitors {names[0]}, {file} {names[1]}", "learn it for the same joints")
         thresholds: Mapping[str, Any] = {instance.name: stored.current}
         learned = {run.sha256: "" for run in stored.runs}
         run = detect_with(setup, [instance], thresholds, {})
@@ -106,7 +106,7 @@ def prepare_benchmark(
     many += f" of {classes} classes of motion" if classes > 1 else ""
     described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {many}"
     hashes = {operation.recording.digest: operation.recording.name for operation in used}
-    run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
+    run = detect_with(setup, [instance], fitted.thresholds, fitted.unusable)
     normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
     left_out = (*runs.skipped, *fitted.skipped)
     return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)

@@ -1,4 +1,4 @@
-"""One log of a benchmark: read, cut, detected by every detector, matched with its contacts; the rows that it gives."""
+"""Score one log of a benchmark: read, cut, detect with every detector, match with its contacts, return the rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
@@ -32,7 +32,7 @@ from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, 
 
 @dataclass
 class Scored:
-    """What one log gave."""
+    """The results of one log."""
 
     recording: RecordingResult | None = None
     judged: list[Judged] = field(default_factory=list)
@@ -42,10 +42,10 @@ class Scored:
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
     findings: list[Skipped] = field(default_factory=list)
-    # Names of logs taken as free of impacts, with what would tell and is not in them.
+    # Names of logs assumed to be free of impacts, with the ground truth that is missing from them.
     unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
-    # The recording itself, its contacts and what they were matched with, for a command that shows more than rows.
+    # The recording, its contacts and their matching, for commands that show more than rows.
     log: Recording | None = None
     truth: tuple[Contact, ...] = ()
     matched: MatchedLog | None = None
@@ -53,7 +53,7 @@ class Scored:
     detecting: float = 0.0
 
 
-# What gives the detections of each operation of a log; it names what failed in the log's `Scored`.
+# Returns the detections of each operation of a log; failures are reported in the log's `Scored`.
 Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
 
 
@@ -61,12 +61,12 @@ def detect_with(
     setup: BenchmarkFile,
     detectors: Sequence[Any],
     thresholds: Mapping[str, tuple[FittedThreshold, ...]],
-    lacking: Mapping[str, str],
+    unusable: Mapping[str, str],
 ) -> Detect:
-    """Detectors with their thresholds; one that fails on a log is left out there and named.
+    """Return the detectors with their thresholds as one function; a detector that fails on a log is left out there.
 
-    Those that are `lacking` what they need, for the reason given, can judge nothing. A class of motion is held for
-    the longest matching window.
+    Detectors in `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of
+    motion is monitored for the longest matching window.
     """
     hold = max(HOLD, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
@@ -76,8 +76,8 @@ def detect_with(
         left_out = LeftOut()
         for detector in detectors:
             failed: list[Skipped] = []
-            if detector.name in lacking:
-                unit, why = detector.unit(machine), lacking[detector.name]
+            if detector.name in unusable:
+                unit, why = detector.unit(machine), unusable[detector.name]
                 made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
             else:
                 known = thresholds[detector.name]
@@ -91,7 +91,7 @@ def detect_with(
             left_out.add(detector.name, failed)
             for of_operation, detection in zip(found, made, strict=not failed):
                 of_operation.append(detection)
-        scored.skipped += left_out.said_once()
+        scored.skipped += left_out.combined()
         return found
 
     return detect
@@ -105,11 +105,10 @@ def score_log(
     factors: Mapping[str, FloatArray],
     ranges: PlausibleRanges | None = None,
 ) -> Scored:
-    """A log's rows; `factors`: the safety factors of the sweep by detector; outside of `ranges` values are masked.
+    """Return the rows of a log; a log or detector that fails is left out and reported, and nothing is raised.
 
-    `group` is empty of a log of no group.
-
-    A log or detector that fails is left out and named, and nothing is raised.
+    `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
+    outside the plausible `ranges` are masked.
     """
     scored = Scored()
     rules = setup.rules_of(group)
@@ -141,16 +140,16 @@ def score_log(
     matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
     scored.findings += matched.warnings
-    scored.matched, courses = matched, matched.courses
+    scored.matched, curves = matched, matched.curves
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
-        scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
-        scored.forces = force_rows(scored.recording, scored.verdicts, courses)
-        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, courses)
+        scored.verdicts = {number: judge(curve, profile) for number, curve in curves.items()}
+        scored.forces = force_rows(scored.recording, scored.verdicts, curves)
+        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, curves)
         numbered = enumerate(contacts, 1)
-        unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
+        unseen = [f"contact {number}" for number, item in numbered if number not in curves and not item.in_progress]
         if unseen:
-            text = f"{', '.join(unseen)}: no load-cell force to hold against {profile.name}"
+            text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
     scored.judged = [_swept(item, setup, rules.window, factors) for item in matched.judged]
     scored.contacts = [row for rows in matched.contacts for row in rows]
@@ -160,13 +159,13 @@ def score_log(
 
 
 def _force_not_seen(
-    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
+    recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], curves: Mapping[int, ForceTimeCurve]
 ) -> list[Skipped]:
-    """The contacts that a force profile could not judge because load-cell samples are missing: a loss of data."""
+    """Return the contacts not assessable by a force profile because load-cell samples are missing: a data loss."""
     lost = [
         f"contact {number} is not assessable by {profile}: {verdict.reason}"
         for number, verdict in verdicts.items()
-        if verdict.outcome == "not_assessable" and courses[number].lacks_samples
+        if verdict.outcome == "not_assessable" and curves[number].has_missing_samples
     ]
     return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
 

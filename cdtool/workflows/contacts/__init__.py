@@ -1,1 +1,1 @@
-"""The true contacts of a log, and what detectors made of them: one answer for every command."""
+"""The true contacts of a log and the results of detectors on them, identical for every command."""

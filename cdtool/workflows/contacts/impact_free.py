@@ -1,4 +1,4 @@
-"""Are impact-free logs free of impacts? What the load cell, a label or an event in them says."""
+"""Check that impact-free logs contain no impact, by load cell, labels or events."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
 from cdtool.recording import Contact, Finding, Recording
 
-# A load cell that reads in steps coarser than its noise flickers by one of them: that is no contact.
+# A load cell whose resolution is coarser than its noise flickers by one step, which is not a contact.
 _STEPS = 3.0
 
 
 def contacts_shown(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]:
-    """The contacts of a log that should have none, by the onset rule of every command; none without ground truth.
+    """Return the contacts of a log that should have none, by the onset rule; empty without ground truth.
 
-    Where the rule takes its level from the noise and the load cell reads in steps coarser than that, the level is three
-    steps at least. A load cell that feels the machine's own motion shows contacts that are none: a level by hand helps.
+    If the rule derives its level from the noise and the load cell's steps are coarser than that, the level is at least
+    three steps. A load cell that measures the machine's own motion shows false contacts; set a level by hand then.
     """
     try:
         return tuple(find_contacts(recording, rule, _STEPS))
@@ -32,7 +32,7 @@ def contacts_shown(recording: Recording, rule: OnsetRule) -> tuple[Contact, ...]
 def without_contacts(
     operations: Sequence[Operation], contacts: Sequence[Contact]
 ) -> tuple[list[Operation], list[Skipped]]:
-    """The operations that no contact lies in, and the others, left out with the reason."""
+    """Return the operations without a contact, and the others, left out with the reason."""
     free: list[Operation] = []
     left_out: list[Skipped] = []
     for operation in operations:
@@ -46,17 +46,17 @@ def without_contacts(
 
 
 def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[Skipped]:
-    """One line on the logs, by name, in which nothing says whether they are free of impacts."""
+    """Return one line on the logs, by name, whose freedom from impacts cannot be checked."""
     if not notes:
         return []
     logs = list(dict.fromkeys(name for name, _ in notes))
     which = logs[0] if len(logs) == 1 else f"{counted(len(logs), 'log')}, the first {logs[0]}"
-    return [Skipped(which, f"{notes[0][1]}: taken as free of impacts")]
+    return [Skipped(which, f"{notes[0][1]}: assumed to be free of impacts")]
 
 
 def _described(contact: Contact) -> str:
     force = f" of {digits(round(contact.peak_force))} N" if np.isfinite(contact.peak_force) else ""
     since = f"from its start to {contact.end:.3f} s" if contact.in_progress else f"at {contact.start:.3f} s"
     shown = f"the {contact.found_by} shows a contact{force} {since}"
-    hint = " (no contact? raise the onset level: --onset-above or [onset] above_n)" if force else ""
+    hint = " (if this is not a contact, raise the onset level: --onset-above or [onset] above_n)" if force else ""
     return f"{shown}: not an impact-free run{hint}"

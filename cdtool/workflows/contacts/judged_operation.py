@@ -1,4 +1,4 @@
-"""One operation with every detector's detection, its alarms held against the contacts, and the rows that it gives."""
+"""One operation with the detection of every detector, its alarms matched with the contacts, and the resulting rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.detection import Alarm, Band, Signal, Status, Verdict
-from cdtool.evaluation.force.course import ForceCourse, force_at
+from cdtool.evaluation.force.curve import ForceTimeCurve, force_at
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult
 from cdtool.evaluation.sweep import Swept
 from cdtool.evaluation.truth.matching import Match, Matching
@@ -21,7 +21,7 @@ from cdtool.strict_json import finite
 
 @dataclass(frozen=True)
 class Judged:
-    """One operation with every detector's detection and its alarms held against the contacts."""
+    """One operation with every detector's detection and its alarms matched with the contacts."""
 
     group: str
     operation: Operation
@@ -32,7 +32,7 @@ class Judged:
 
 
 def not_assessable(operation: Operation, detector: str, unit: str, reason: str, watched: Sequence[str]) -> Detection:
-    """A detector that cannot be used on an operation: no sample of it could be judged, for that reason."""
+    """Return the detection of a detector that cannot be used on an operation: not assessable, with the reason."""
     recording = operation.recording
     time = next((recording[name].time for name in MEASURED if name in recording), np.empty(0))
     nothing = np.full((len(time), len(recording.joints)), np.nan)
@@ -46,10 +46,10 @@ def contact_rows(
     judged: Judged,
     recording: Recording,
     contacts: Sequence[Contact],
-    courses: Mapping[int, ForceCourse],
+    curves: Mapping[int, ForceTimeCurve],
     synchronisation: float,
 ) -> list[ContactResult]:
-    """A row for each contact and detector; `synchronisation` [s]: how far the load cell's clock may be off."""
+    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock."""
     numbers = {contact: number for number, contact in enumerate(contacts, 1)}
     rows = []
     for detection, matching in zip(judged.detections, judged.matchings, strict=True):
@@ -57,12 +57,12 @@ def contact_rows(
         for found in matching.matches:
             number = numbers[found.contact]
             resolution = own + _resolution_of_onset(recording, found.contact)
-            rows.append(_contact_row(judged, recording, detection, found, number, courses.get(number), resolution))
+            rows.append(_contact_row(judged, recording, detection, found, number, curves.get(number), resolution))
     return rows
 
 
 def _resolution_of_onset(recording: Recording, contact: Contact) -> float:
-    """How finely the onset is known [s]: of a label file's, no finer than it says and than the cell."""
+    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell."""
     if np.isfinite(contact.resolution):
         return contact.resolution
     cell = recording["force"].period if "force" in recording else 0.0
@@ -75,14 +75,14 @@ def _contact_row(
     detection: Detection,
     found: Match,
     number: int,
-    course: ForceCourse | None,
+    curve: ForceTimeCurve | None,
     resolution: float,
 ) -> ContactResult:
     contact, alarm = found.contact, found.alarm
-    peak = course.peak if course else contact.peak_force
-    # Before its first sample a contact that began where samples are missing had a force that nobody measured.
-    seen = course is not None and alarm is not None and not (contact.hole and found.clipped)
-    hole = course.longest_hole(contact.end - contact.start) if course else contact.hole
+    peak = curve.peak if curve else contact.peak_force
+    # If samples are missing where a contact began, its force before its first sample was not measured.
+    seen = curve is not None and alarm is not None and not (contact.hole and found.clipped)
+    hole = curve.longest_hole(contact.end - contact.start) if curve else contact.hole
     return ContactResult(
         recording=recording.name,
         group=judged.group,
@@ -93,7 +93,7 @@ def _contact_row(
         alarm_s=alarm.time if alarm else None,
         latency_ms=1e3 * found.latency if alarm else None,
         outcome=found.outcome,
-        force_at_alarm_n=finite(abs(force_at(course, found.latency))) if course and seen else None,
+        force_at_alarm_n=finite(abs(force_at(curve, found.latency))) if curve and seen else None,
         peak_force_n=finite(peak),
         clipped=found.clipped,
         reason=found.reason or None,
@@ -111,7 +111,7 @@ def _contact_row(
 
 
 def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
-    """A row for each alarm without a contact."""
+    """Return a row for each alarm without a contact."""
     return [
         FalseAlarmResult(
             recording=judged.operation.name,
@@ -127,7 +127,7 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
 
 
 def _crossing(detection: Detection, alarm: Alarm | None) -> dict[str, Any]:
-    """Which limit an alarm crossed and with which value; nothing where no threshold raised it, as with triggers."""
+    """Return the limit that an alarm crossed and the value; empty if no threshold raised it, as with triggers."""
     known = alarm if detection.threshold is not None else None
     return {
         "side": known.side if known else None,

@@ -1,4 +1,4 @@
-"""A log's contacts held against what detectors say of its operations: the one way, whatever command asks."""
+"""Match a log's contacts with the results of detectors on its operations, identically for every command."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.force.course import ForceCourse, force_course
+from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.operations import Operation, operations_of
@@ -21,30 +21,30 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
 from cdtool.workflows.runs import DAMAGED
 
-# A stroke counts as judged where at least this share of its samples is.
+# A stroke counts as assessable if at least this share of its samples is.
 _JUDGED = 0.5
 
 
 @dataclass(frozen=True)
 class MatchedLog:
-    """What became of a log's contacts and alarms.
+    """The outcome of a log's contacts and alarms.
 
-    `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
-    number; `not_scored` names contacts that have no onset, lie in no operation or began where load-cell samples are
-    missing, `warnings` are about the log itself.
+    `judged` has one entry and `contacts` a list of rows per operation. `curves` is the force by the contact's number.
+    `not_scored` lists contacts that have no onset, are outside all operations or began where load-cell samples are
+    missing; `warnings` concern the log itself.
     """
 
     judged: tuple[Judged, ...]
     contacts: tuple[tuple[ContactResult, ...], ...]
     false_alarms: tuple[FalseAlarmResult, ...]
-    courses: dict[int, ForceCourse]
+    curves: dict[int, ForceTimeCurve]
     not_scored: tuple[Skipped, ...]
     warnings: tuple[Skipped, ...]
 
 
 @dataclass(frozen=True)
 class DetectedLog:
-    """A log with its contacts, cut into operations as `cut_by` says, and the detections of each operation."""
+    """A log with its contacts, divided into operations by `cut_by`, and the detections of each operation."""
 
     recording: Recording
     operations: Sequence[Operation]
@@ -54,10 +54,10 @@ class DetectedLog:
 
 
 def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -> MatchedLog:
-    """Match the detections of each operation with the log's contacts; `rearm` [s] is the activation's."""
+    """Match the detections of each operation with the log's contacts; `rearm` [s] is a setting of the activation."""
     recording, contacts, found = log.recording, log.contacts, log.detections
     inside = _by_operation(log.operations, contacts)
-    courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
+    curves, doubts = _curves(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
     crossings = _pooled(found)
     judged = []
@@ -77,16 +77,16 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         judged.append(Judged(group, operation, own, tuple(detections), matchings))
     return MatchedLog(
         tuple(judged),
-        tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
+        tuple(tuple(contact_rows(item, recording, contacts, curves, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
-        courses,
+        curves,
         (*_not_scored(recording, contacts, inside, log.cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, curves), *doubts),
     )
 
 
 def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Contact, ...]:
-    """The contacts whose onset lies in an operation, and one that is in progress when it begins."""
+    """Return the contacts with their onset in an operation, and one in progress at its start."""
     part = operation.recording
     return tuple(
         contact
@@ -97,7 +97,7 @@ def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Cont
 
 
 def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
-    """The contacts of each operation; one on the edge of two belongs to the earlier."""
+    """Return the contacts of each operation; one at the boundary of two belongs to the earlier."""
     taken: set[Contact] = set()
     found = []
     for operation in operations:
@@ -115,19 +115,19 @@ def _not_scored(
         if contact.in_progress:
             found.append(Skipped(recording.name, f"{IN_PROGRESS.format(end=contact.end)}, it is not scored"))
         elif not any(contact in own for own in inside):
-            text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
+            text = f"the contact at {contact.start:.3f} s is outside all operations (cut by {cut_by})"
             found.append(Skipped(recording.name, text))
     return found
 
 
 def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: float) -> list[Skipped]:
-    """A line on each contact that began where load-cell samples are missing: a loss, for its latency is not known."""
+    """Return a line for each contact that began where load-cell samples are missing: a loss, its latency is unknown."""
     found = []
     for number, contact in enumerate(contacts, 1):
         if contact.hole and not contact.in_progress:
             later = 1e3 * contact.uncertainty
             what = f"its latency may be up to {later:.0f} ms longer"
-            what = "its latency is not known" if contact.uncertainty >= window else what
+            what = "its latency is unknown" if contact.uncertainty >= window else what
             text = (
                 f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
             )
@@ -136,21 +136,21 @@ def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: fl
 
 
 def _unseen_forces(
-    recording: Recording, contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]
+    recording: Recording, contacts: Sequence[Contact], curves: Mapping[int, ForceTimeCurve]
 ) -> list[Skipped]:
-    """A warning for each contact whose onset was seen, but not all of its force."""
+    """Return a warning for each contact with a known onset whose force is partly missing."""
     found = []
-    for number, course in courses.items():
+    for number, curve in curves.items():
         contact = contacts[number - 1]
-        hole = course.longest_hole(contact.end - contact.start)
+        hole = curve.longest_hole(contact.end - contact.start)
         if hole and not contact.hole:
-            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms while contact {number} presses"
+            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms during contact {number}"
             found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
     return found
 
 
 def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
-    """Every detector's crossings in all operations of a log, in order of time."""
+    """Return every detector's alarms in all operations of a log, in order of time."""
     pooled: dict[str, list[Alarm]] = {}
     for detections in found:
         for detection in detections:
@@ -158,11 +158,11 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
     return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
 
 
-def _courses(
+def _curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
-) -> tuple[dict[int, ForceCourse], list[Skipped]]:
-    """The force over each contact that has an onset, by its number; one without a force is named."""
-    found: dict[int, ForceCourse] = {}
+) -> tuple[dict[int, ForceTimeCurve], list[Skipped]]:
+    """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""
+    found: dict[int, ForceTimeCurve] = {}
     missing: list[Skipped] = []
     if "force" not in recording:
         return found, missing
@@ -171,16 +171,16 @@ def _courses(
         if contact.in_progress:
             continue
         try:
-            found[number] = force_course(recording, contact, mass_before_cell, until)
+            found[number] = force_time_curve(recording, contact, mass_before_cell, until)
         except CdtoolError as fault:
             missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
     return found, missing
 
 
 def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Skipped]:
-    """A warning where the first stroke of a log was judged and a later one was not, since the log is not cut.
+    """Return a warning if the first stroke of an uncut log is assessable and a later one is not.
 
-    `found` are the detections of its operations, `cut_by` is how it was cut into them.
+    `found` are the detections of its operations, `cut_by` how the log is divided into them.
     """
     detections = [item for of_operation in found for item in of_operation]
     if cut_by != "whole" or all(np.all(item.statistic.valid) for item in detections):
@@ -193,9 +193,9 @@ def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_b
     ]
     if not blind:
         return []
-    which = f"stroke {blind[0]} was" if len(blind) == 1 else f"{len(blind)} of them were"
+    which = f"stroke {blind[0]} is" if len(blind) == 1 else f"{len(blind)} of them are"
     text = (
-        f"holds {counted(len(strokes), 'stroke')} in one operation, and {which} not judged: cut it with "
+        f"contains {counted(len(strokes), 'stroke')} in one operation, and {which} not assessable: cut it with "
         'operations = "motion" in the benchmark file, or --operations motion'
     )
     return [Skipped(recording.name, text)]

@@ -1,4 +1,4 @@
-"""The settings that make a log's figures: the same in every command that scores one."""
+"""Settings that determine the results of a log, identical in every command that scores one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdtool.evaluation.truth.onset import OnsetRule
 class ScoringRules:
     """When a contact begins and for how long an alarm belongs to it: the onset rule, labels, `window` [s].
 
-    `synchronisation` [s]: how far the load cell's clock may be off. `mass_before_cell` [kg]: what moves with the
+    `synchronisation` [s]: largest offset of the load cell's clock. `mass_before_cell` [kg]: mass that moves with the
     machine between load cell and contact. Raises UsageError for a setting outside its range.
     """
 
@@ -25,7 +25,7 @@ class ScoringRules:
 
     def __post_init__(self) -> None:
         if not self.window > 0.0:
-            raise UsageError(f"window is {self.window:g} s", "more than 0 s")
+            raise UsageError(f"window is {self.window:g} s", "give more than 0 s")
         for name, unit in (("synchronisation", "s"), ("mass_before_cell", "kg")):
             if not getattr(self, name) >= 0.0:
-                raise UsageError(f"{name} is {getattr(self, name):g} {unit}", f"0 {unit} or more")
+                raise UsageError(f"{name} is {getattr(self, name):g} {unit}", f"give 0 {unit} or more")

@@ -1,4 +1,4 @@
-"""The true contacts of a log: at least one of an impact log, none of an impact-free one."""
+"""The true contacts of a log: at least one in an impact log, none in an impact-free one."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.runs import DAMAGED, absent_truth, lost
 
-# A load cell that ends earlier than this [s] before its log has not seen all of it.
+# A load cell that ends earlier than this [s] before its log does not cover all of it.
 _TAIL = 0.1
 
 
 def unwanted_contacts(recording: Recording, rules: ScoringRules) -> tuple[Contact, ...]:
-    """Return the contacts of a log of the hold-out, which should have none; a label file that names it is believed."""
+    """Return the contacts of a hold-out log, which should have none; a label file with the log takes precedence."""
     labels = rules.labels
     name = labels.name_of(recording.name) if labels else None
     return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, rules.onset)
 
 
 def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
-    """The contacts that a log shows, by a label file that names it or by its channels; none without ground truth."""
+    """Return the contacts of a log by a label file that names it or by its channels; empty without ground truth."""
     name = rules.labels.name_of(recording.name) if rules.labels else None
     if rules.labels and name is not None:
         rules.labels.check(recording.name, recording.start, recording.end)
@@ -38,9 +38,9 @@ def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
 
 
 def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list[Contact]:
-    """Return an impact log's contacts: those of a label file that names it, else the load cell's, a label's or events'.
+    """Return an impact log's contacts: from a label file that names it, else from load cell, label channel or events.
 
-    Raises RecordingError where there is none, or nothing that tells.
+    Raises RecordingError if the log has no contact or no ground truth.
     """
     labels = rules.labels
     name = labels.name_of(recording.name) if labels else None
@@ -48,17 +48,17 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
         labels.check(recording.name, recording.start, recording.end)
         if not labels.contacts[name]:
             raise RecordingError(
-                f"{path}: no contact found ({labels.lines[name][0]} names none)",
-                "write its start_s and end_s there, or move the log to [holdout]",
+                f"{path}: no contact found ({labels.lines[name][0]} does not list one)",
+                "add start_s and end_s there, or move the log to [holdout]",
             )
         return list(labels.contacts[name])
     for item in absent_truth(recording):
         if not any(channel in recording for channel in GROUND_TRUTH):
-            raise RecordingError(f"{path}: no ground truth: {item}", "an impact log needs it, or a label file")
+            raise RecordingError(f"{path}: no ground truth: {item}", "an impact log requires it, or a label file")
     contacts = find_contacts(recording, rules.onset)
     if not contacts and (missing := _missing(recording)):
         raise RecordingError(
-            f"{path}: no contact found ({rules.onset.described}), and {missing}", "copy the log again, or leave it out"
+            f"{path}: no contact found ({rules.onset.described}), and {missing}", "copy the log again, or remove it"
         )
     if not contacts:
         raise RecordingError(
@@ -68,7 +68,7 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
 
 
 def _missing(recording: Recording) -> str:
-    """What a log lacks that may have held the contact; nothing where it is whole."""
+    """Return what is missing from a log that may contain the contact; empty for a complete log."""
     if damage := lost(recording):
         return f"part of the log is lost: {damage[0].reason.removeprefix(DAMAGED)}"
     if "force" not in recording:
@@ -82,5 +82,5 @@ def _missing(recording: Recording) -> str:
         if steps[k] <= longest_step(present):
             return ""
         return f"load-cell samples are missing from {marks[k]:.3f} to {marks[k + 1]:.3f} s"
-    last = f"ends at {present[-1]:.3f} s" if len(present) else "holds no sample"
+    last = f"ends at {present[-1]:.3f} s" if len(present) else "has no samples"
     return f"the load cell {last}, the log at {recording.end:.3f} s"

@@ -1,1 +1,1 @@
-"""`cdtool convert`: a log into another container."""
+"""`cdtool convert`: write a log in another file format."""

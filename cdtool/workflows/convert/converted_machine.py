@@ -1,4 +1,4 @@
-"""The machine file that reads a converted log: the user's own, with channels that name the new columns."""
+"""The machine file for a converted log: the user's own, with channels that name the new columns."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
 def converted_machine(
     machine_file: MachineFile, log: Path, groups: Sequence[Group], names: Written, target: Path
 ) -> str:
-    """The text of `target`: everything of the machine file but its channels, then those of the converted log."""
+    """Return the text of `target`: the machine file without its channels, then those of the converted log."""
     text = read_text(machine_file.path, ConfigurationError)
     kept = _without_channels(text)
-    if not _same(text, kept):  # tables written in a way that lines do not show: only the channels are given
+    if not _same(text, kept):  # the tables cannot be separated line by line: write only the channels
         kept = f"# Put [machine] of {machine_file.path.name} here.\n"
     urdf = _stated_urdf(text)
     if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
@@ -67,7 +67,7 @@ def _without_channels(text: str) -> str:
 
 
 def _same(text: str, kept: str) -> bool:
-    """Is what was kept valid, and all but the channels?"""
+    """Whether the remaining text is valid TOML and contains everything but the channels."""
     try:
         before, after = parse_toml(text), parse_toml(kept)
     except ContentError:
@@ -82,5 +82,5 @@ def _stated_urdf(text: str) -> str:
 
 
 def _text(value: str) -> str:
-    """A TOML string: JSON's escapes are TOML's, but DEL."""
+    """Return a TOML string: JSON's escapes are valid in TOML, except for DEL."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""`cdtool convert`: a log's channels, or all its columns, into another container, to the bit and with provenance."""
+"""`cdtool convert`: write a log's channels or all its columns to another file format, bit for bit, with provenance."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _ONE_CLOCK = (".csv",)
 
 @dataclass(frozen=True)
 class Converted:
-    """The files that were written, the machine files that read them, how much there is, and what is odd."""
+    """The files written, the machine files for them, the amount of data, and the findings."""
 
     source: str
     files: tuple[str, ...]
@@ -103,14 +103,14 @@ def convert(
     )
     rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
     if not rows.groups:
-        raise RecordingError(f"{log}: holds none of the mapped channels", "see cdtool info for what it holds")
+        raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     _check_free([*names, *companions], parts, force)
     provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
     course = _Course(log, sum(group.rows for group in rows.groups), progress)
-    with replaced(*names, *companions) as temporary:  # all of them or none
+    with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
             written = writer(temporary[i], part, course.of(rows.parts(part)), provenance)
             if machine_file is not None:
@@ -123,7 +123,7 @@ def convert(
 
 @dataclass
 class _Course:
-    """The rows of a log on their way to the writer, counted: `rows` of them in all."""
+    """The rows of a log on their way to the writer; `rows` counts them."""
 
     log: Path
     rows: int
@@ -131,7 +131,7 @@ class _Course:
     _done: int = 0
 
     def of(self, parts: Parts) -> Parts:
-        """The parts as they come; what goes wrong as they are read is no fault of the file that is written."""
+        """Yield the parts; a read error is reported for the source, not for the file being written."""
         try:
             for ready in parts:
                 yield ready
@@ -140,7 +140,7 @@ class _Course:
                     self.progress(self._done, self.rows)
         except OSError as fault:
             text = f"{self.log}: cannot be read: {fault.strerror or fault}"
-            raise RecordingError(text, "check the disk it is on") from fault
+            raise RecordingError(text, "check its disk") from fault
 
 
 def _writer(target: Path) -> Writer:
@@ -153,7 +153,7 @@ def _writer(target: Path) -> Writer:
 
 
 def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
-    """A file of the parts' kind in their folder would be one of them from then on."""
+    """Raise UsageError if the new file would become a part of the log."""
     alike = target.suffix.lower() == parts[0].suffix.lower()
     if log.is_dir() and alike and target.parent.is_dir() and target.parent.samefile(log):
         raise UsageError(f"{target}: would be a part of the log", "write it to another folder")
@@ -168,7 +168,7 @@ def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> No
 
 
 def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[Group]]]:
-    """Which groups go into which file."""
+    """Return which groups are written to which file."""
     if target.suffix.lower() in _ONE_CLOCK and len(groups) > 1:
         names = [target.with_name(f"{target.stem}.{i}{target.suffix}") for i in range(1, len(groups) + 1)]
         return [(name, [group]) for name, group in zip(names, groups, strict=True)]
@@ -178,9 +178,9 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 def _provenance(
     log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
 ) -> Mapping[str, str]:
-    """Of a log in parts each part's name and SHA-256, too; `sha256` is then that of these digests."""
+    """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
-        parts = FoundParts.of(log).every  # in the order of time
+        parts = FoundParts.of(log).every  # in order of time
     digests = {part.name: file_digest(part) for part in parts}
     told = {
         "source": log.name or log.resolve().name,

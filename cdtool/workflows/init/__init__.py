@@ -1,1 +1,1 @@
-"""`cdtool init`: a look at a log becomes a draft of a machine file; one guess in each module."""
+"""`cdtool init`: draft a machine file from a log; one guess per module."""

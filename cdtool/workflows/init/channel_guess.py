@@ -1,4 +1,4 @@
-"""Which stream of a log is which channel? Names first, then what the numbers show; each guess says why."""
+"""Guess which stream of a log is which channel: by name, then by values; each guess states its reason."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from cdtool.workflows.init.quantity_words import is_actual, is_load_cell, is_ref
 from cdtool.workflows.init.streams import Channels, Found, Stream, joined
 from cdtool.workflows.init.units_in_names import label, may_be
 
-# The correlation from which on one column is another's derivative.
+# Above this correlation one column is treated as another's derivative.
 _FITS = 0.9
-# Share of a column's variance that inertia and friction must explain for it to be the drive's.
+# Minimum share of a drive column's variance that inertia and friction explain.
 _DRIVES = 0.6
 _MOST_UNNAMED = 48
-# From these correlations on, one stream is taken as the set value of another; the second where its name says so too.
+# Above these correlations one stream is treated as another's set value; the second if its name agrees.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
-_BY_COURSE = "its course alone tells it"
-# A name of one letter speaks for a quantity less than this.
+_BY_COURSE = "guessed from its values only"
+# A one-letter name is weaker evidence for a quantity than this.
 _SPEAKS = 2.0
 
 
 def guess_channels(streams: list[Stream], topics: bool) -> Channels:
-    """The channels of a log, by names and by the numbers; offline, nothing of it is used for detection."""
+    """Guess the channels of a log by names and values; offline, not used for detection."""
     joints = _joint_count(streams)
     if joints == 1 and topics:
         streams = [part for stream in streams for part in _elements(stream)]
@@ -63,7 +63,7 @@ def _unnamed(streams: list[Stream]) -> bool:
 
 
 def _by_place(channels: Channels) -> None:
-    """Columns without names: blocks of J positions, J speeds and, where it moves like a drive, J torques."""
+    """Guess from columns without names: blocks of J positions, J speeds and, if they move like a drive, J torques."""
     streams = channels.free
     block = motion.blocks(streams[:_MOST_UNNAMED])
     if block is None:
@@ -73,19 +73,19 @@ def _by_place(channels: Channels) -> None:
     parts = [streams[first + i * joints : first + (i + 1) * joints] for i in range(3)]
     fit = f"r = {correlation:.3f}"
     many = "column" if joints == 1 else f"{joints} columns"
-    text = f"its derivative fits the {many} behind it, {fit}"
+    text = f"its derivative fits the {many} after it, {fit}"
     channels.take("position", joined(parts[0], _places(parts[0])), text)
     text = f"its integral fits the {many} before it, {fit}"
     channels.take("speed", joined(parts[1], _places(parts[1])), text)
     if len(parts[2]) == joints:
         drive = joined(parts[2], _places(parts[2]))
         share = motion.drive_fit(drive, channels.found["speed"].stream)
-        text = f"its place behind the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
+        text = f"its position after the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
         if motion.rests_and_peaks(drive):
-            channels.take("force", drive, "it rests at one level and has short, high peaks", _BY_COURSE)
+            channels.take("force", drive, "constant level with short, high peaks", _BY_COURSE)
         else:
             channels.take("torque", drive, text, _BY_COURSE)
-        channels.free = []  # further columns without names would be pure guesswork
+        channels.free = []  # other columns without names are not guessed
 
 
 def _places(streams: list[Stream]) -> str:
@@ -135,7 +135,7 @@ def _drive(channels: Channels) -> None:
         rate = moving.stream if speed else _derived(moving.stream)
         found = _best(_unnamed_for(channels, "torque"), lambda stream: motion.drive_fit(stream, rate))
         if found is not None and found[0] > _DRIVES:
-            text = f"it moves as a drive's effort does: inertia and friction explain {100 * found[0]:.0f} % of it"
+            text = f"moves like the force of a drive: inertia and friction explain {100 * found[0]:.0f} % of it"
             channels.take("torque", found[1], text, _BY_COURSE)
 
 
@@ -160,7 +160,7 @@ def _derived(position: Stream) -> Stream:
 
 
 def _references(channels: Channels) -> None:
-    """Set values, by their names, else the one that a measured channel follows."""
+    """Guess set values by their names, else by the measured channel that follows them."""
     for quantity in ("position", "speed", "torque"):
         name = f"reference_{quantity}"
         named = [item for item in _named_for(channels, quantity, reference=True) if item[2].moves]
@@ -175,7 +175,7 @@ def _references(channels: Channels) -> None:
 
 
 def _ground_truth(channels: Channels) -> None:
-    """The load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
+    """Guess the load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
     named = [(*word_for("force", _full(stream)), stream) for stream in singles if not is_something_else(stream.name)]
     named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
@@ -188,7 +188,7 @@ def _ground_truth(channels: Channels) -> None:
     elif "force" not in channels.found:
         for stream in singles:
             if not _is_other("force", stream) and motion.rests_and_peaks(stream):
-                channels.take("force", stream, "it rests at one level and has short, high peaks", _BY_COURSE)
+                channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
                 break
     for quantity in ("label", "trigger"):
         for stream in channels.free:
@@ -199,14 +199,15 @@ def _ground_truth(channels: Channels) -> None:
 
 
 def _full(stream: Stream) -> str:
-    """Return topic and name of a stream: the topic may name a load cell, too."""
+    """Return topic and name of a stream: a load cell may be named in the topic."""
     return f"{stream.topic} {label(stream)}"
 
 
 def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> None:
-    """A stream that the measured one follows; what its name calls measured (`Drehzahl Ist`) is no set value.
+    """Guess the stream that the measured one follows; a name for a measured value (`Drehzahl Ist`) excludes it.
 
-    Of two that bear the quantity's name the smoother one is the set value; a stream without its name displaces none.
+    If two streams bear the quantity's name, the smoother one is the set value; one without the name does not replace
+    it.
     """
     stream = measured.stream
     candidates = [other for other in _unnamed_for(channels, quantity) if not is_actual(other.name)]
@@ -232,7 +233,7 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
 
 
 def _named_for(channels: Channels, quantity: str, reference: bool = False) -> list[tuple[float, str, Stream]]:
-    """(strength, word, stream) of the free streams whose name speaks for a quantity most, the strongest first."""
+    """Return (strength, word, stream) of the free streams whose name best matches a quantity, the strongest first."""
     found = []
     for stream in channels.of_joints():
         name = label(stream)
@@ -247,20 +248,20 @@ def _named_for(channels: Channels, quantity: str, reference: bool = False) -> li
 
 
 def _unnamed_for(channels: Channels, quantity: str) -> list[Stream]:
-    """Return the free streams that may be a quantity by their shape: no name or unit means another one, or a force.
+    """Return the free streams that may be a quantity by their shape: no name or unit indicates another one, or a force.
 
-    A load cell is ground truth: nothing makes an input of it.
+    A load cell is ground truth and must never become an input.
     """
     return [stream for stream in channels.of_joints() if may_be(quantity, stream) and not _is_other(quantity, stream)]
 
 
 def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[float, Stream] | None:
-    """The highest score and the stream that has it; None of none."""
+    """Return the highest score and its stream; None for no streams."""
     return max(((score(stream), stream) for stream in streams), key=lambda item: item[0], default=None)
 
 
 def _is_other(quantity: str, stream: Stream) -> bool:
-    """Return whether the name of a stream means another quantity, or a load cell."""
+    """Whether the name of a stream indicates another quantity, or a load cell."""
     name = label(stream)
     if is_something_else(stream.name) or _is_sensor_of_force(stream):
         return True

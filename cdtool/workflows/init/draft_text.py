@@ -1,4 +1,4 @@
-"""A draft of a machine file: TOML in which every guess says why, and every placeholder asks to be checked."""
+"""The text of a draft machine file: TOML in which every guess states its reason and every placeholder is marked."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_LISTED = 60
 
 @dataclass(frozen=True)
 class Clock:
-    """How the draft takes the time: a column with its unit or the rate [Hz] of its counts, or a rate alone."""
+    """Time in the draft: a column with its unit or the rate [Hz] of its counts, or only a rate."""
 
     column: str | int | None = None
     unit: str = "s"
@@ -31,7 +31,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Draft:
-    """What is written: the machine's kind, its joints, the clock and the channels with their units."""
+    """The content to write: kind of machine, joints, clock, and channels with units."""
 
     name: str
     log: str
@@ -45,16 +45,16 @@ class Draft:
 
     @property
     def units(self) -> dict[str, Logged]:
-        """Unit and scale of each channel that has one."""
+        """Return unit and scale of each channel that has one."""
         return {name: self.evidence.logged(name) for name in self.channels.found if name not in UNITLESS}
 
 
 def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False) -> str:
-    """The machine file; the channels in `left_out` stand there as comments. `turned`: the accelerometer's sign."""
+    """Return the machine file; channels in `left_out` become comments. `turned`: invert the accelerometer's sign."""
     side = draft.side
     lines = [
-        f"# Draft by cdtool init from {_plain(draft.log)}: guesses, not measurements.",
-        '# "guessed" says why; "CHECK" marks what cdtool cannot know: delete the mark once it is checked.',
+        f"# Draft by cdtool init from {_plain(draft.log)}: guessed, not measured.",
+        '# "guessed" gives the reason; "CHECK" marks what cdtool cannot know: delete the mark after checking.',
         "",
         "[machine]",
         *_commented(f"type = {_text(side.type)}", _marked(f"guessed: {side.why}", side.check)),
@@ -73,19 +73,19 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
     if not draft.channels.found:
         lines += _columns(draft)
     elif absent := [name for name in ("torque", "speed", "position") if name not in draft.channels.found]:
-        lines.append(f"# CHECK: found no {', no '.join(absent)}: see cdtool info for what the log has")
+        lines.append(f"# CHECK: found no {', no '.join(absent)}: cdtool info lists the content of the log")
     return "\n".join(lines) + "\n"
 
 
 def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list[str]:
-    """One channel's line, and the comment that says why and what is to be checked."""
+    """Return one channel's line, and the comment with the reason and what to check."""
     found = draft.channels.found[name]
     why, checks = f"guessed: {found.why}", [found.check]
     if logged is not None:
         why += f"; unit: {logged.why}" if logged.why else ""
         checks.append(logged.check)
     if sign < 0.0:
-        why += "; its sign is the other one of the speed's derivative: turned"
+        why += "; opposite in sign to the speed's derivative: inverted"
     if name == "force":
         checks.append("ground truth only: is it the load cell of the test?")
     line = f"{name} = {_channel(draft, name, logged, sign)}"
@@ -93,12 +93,12 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list
 
 
 def _columns(draft: Draft) -> list[str]:
-    """The columns or fields of a log that tells of no channel, as comments."""
+    """Return the columns or fields of a log without a recognised channel, as comments."""
     streams = [stream for stream in draft.channels.free if stream.width == 1 or stream.topic]
     made = _wrapped(
-        "CHECK: no name and no course tells of a torque, speed or position. Write the channels here, with the unit "
-        'that the log holds, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V. '
-        "The log has, with the smallest and the largest value:"
+        "CHECK: no name or value indicates a torque, speed or position. Write the channels here, with the unit "
+        'of the log, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V. '
+        "The log contains, with the smallest and the largest value:"
     )
     for stream in streams[:_MOST_LISTED]:
         if not np.isfinite(stream.values).any():
@@ -106,7 +106,7 @@ def _columns(draft: Draft) -> list[str]:
         low, high = float(np.nanmin(stream.values)), float(np.nanmax(stream.values))
         made.append(f"#   {_plain(_place(draft, stream))}: {low:.4g} to {high:.4g}")
     if len(streams) > _MOST_LISTED:
-        made.append(f"#   and {len(streams) - _MOST_LISTED} more: see cdtool info")
+        made.append(f"#   and {len(streams) - _MOST_LISTED} more, see cdtool info")
     return made
 
 
@@ -118,28 +118,28 @@ def _place(draft: Draft, stream: Stream) -> str:
 
 def _coordinates_why(side: Side) -> str:
     if side.coordinates == "motor":
-        return "guessed: the log holds the motor's torque or speed" + ("" if side.gear else ". CHECK: or the load's")
-    return 'guessed: the log holds the load\'s own force, speed and position. CHECK: "motor" if a gear is between'
+        return "guessed: the log contains the motor's torque or speed" + ("" if side.gear else ". CHECK: or the load's")
+    return 'guessed: the log contains the load\'s own force, speed and position. CHECK: "motor" if there is a gear'
 
 
 def _placeholders(side: Side, joints: int) -> list[str]:
-    """Inertia 0: a detector with a model refuses it, so that a placeholder can never pass for a value."""
+    """Return placeholders: with inertia 0, detectors with a model refuse to run, so it cannot pass for a real value."""
 
     def each(value: str) -> str:
         return value if joints == 1 else _list([value] * joints)
 
     key, unit = ("load_mass", "kg") if side.type == "linear_axis" else ("load_inertia", "kg m2")
     ratio = "m/rad" if side.type == "linear_axis" else "rad/rad"
-    refused = "0 is a placeholder: detectors with a model refuse it"
+    refused = "0 is a placeholder that detectors with a model refuse"
     made = _commented(f"{key} = {each('0.0')}", f"CHECK: {unit}, not in the log; {refused}")
     if side.coordinates == "motor":
         made += _commented(f"motor_inertia = {each('0.0')}", "CHECK: kg m2, not in the log; 0 is a placeholder")
         text = f"CHECK: {ratio}, load travel per motor angle; "
         if side.gear is not None:
             why = f"guessed: {side.gear.why}, {side.gear.position} over {side.gear.speed}"
-            made += _commented(f"transmission_ratio = {side.gear.ratio:.4g}", f"{why}. {text}right if both units are")
+            made += _commented(f"transmission_ratio = {side.gear.ratio:.4g}", f"{why}. {text}correct if both units are")
         else:
-            text += "1 is a placeholder: figures of the load are wrong until then"
+            text += "1 is a placeholder: load-side values are wrong with it"
             made += _commented(f"transmission_ratio = {each('1.0')}", text)
     return made
 
@@ -172,12 +172,12 @@ def _channel(draft: Draft, name: str, logged: Logged | None, sign: float) -> str
 
 
 def _column(name: str) -> str:
-    """A column of a table without a header is named by its number."""
+    """Return the name of a column, or its number in a table without a header."""
     return str(int(name)) if name.isdigit() else _text(name)
 
 
 def _commented(line: str, why: str) -> list[str]:
-    """A line with its comment behind it, or before it where both are too long for one."""
+    """Return a line with its comment after it, or before it if both are too long for one line."""
     why = _plain(why)
     if not why:
         return [line]
@@ -200,10 +200,10 @@ def _list(items: Sequence[str]) -> str:
 
 
 def _text(value: str) -> str:
-    """A TOML string: JSON's escapes are TOML's, but DEL."""
+    """Return a TOML string: JSON's escapes are valid in TOML, except for DEL."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _plain(text: str) -> str:
-    """Without characters that would end a comment or are refused in one."""
+    """Return a text without characters that end a comment or are invalid in one."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,4 +1,4 @@
-"""`cdtool init`: a look at a log becomes a draft of a machine file, with every guess marked."""
+"""`cdtool init`: draft a machine file from a log and mark every guess."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
-# What log_checks.accelerometer_check says of a sensor that is mounted the other way round.
+# Wording of log_checks for an accelerometer mounted the other way round.
 _TURNED = "opposite sign"
 
 
 @dataclass(frozen=True)
 class Drafted:
-    """The draft's text, the channels that it maps, those that stand in it as comments, and what is odd."""
+    """The draft's text, the channels it maps, those written as comments, and warnings."""
 
     path: str
     text: str
@@ -79,7 +79,7 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
 
 
 def _settled(log: Path, draft: Draft) -> Drafted:
-    """The draft with which `cdtool info` reads the log: what the log contradicts is taken back, one after another."""
+    """Return the draft with which `cdtool info` reads the log; guesses that the log contradicts are withdrawn."""
     left_out: list[str] = []
     turned = False
     if not draft.channels.found:
@@ -111,7 +111,7 @@ def _drafted(log: Path) -> Draft:
     clock, times = (None if topics else table_clock(source)) or (None, None)
     streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
     if not streams:
-        raise RecordingError(f"{log}: holds no column of numbers beside a clock", "see cdtool info for what it holds")
+        raise RecordingError(f"{log}: has no column of numbers apart from a clock", "see cdtool info for its content")
     channels = guess_channels(streams, topics)
     own = any(column.time is not None for column in source.columns.values()) and not topics
     clock = None if own else clock
@@ -135,12 +135,12 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
         for found in channels.found.values():
             names = element_names(path, found.stream.topic) if found.stream.field.endswith("[:]") else ()
             if len(names) == channels.joints and len(set(names)) == len(names):
-                return names, f"as the messages of {found.stream.topic} name them"
+                return names, f"names from the messages of {found.stream.topic}"
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
 
 
 def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
-    """What is odd about a clock's unit that its name alone tells: only another one fits the ratio."""
+    """Return the doubt about a clock's unit known only from its name, if only another unit fits the ratio."""
     if clock is None or not clock.told.endswith("name") or ratio is None or ratio.fitting:
         return ""
     other = ratio_of(channels, replace(clock, told=""), messages_si=False)
@@ -152,33 +152,33 @@ def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) ->
 
 def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
     if clock is None:
-        return Clock(why="no column looks like a clock: give the rate, or the column and its unit")
+        return Clock(why="no column looks like a clock: give the rate, or a column with its unit")
     name: str | int = int(clock.column) if clock.column.isdigit() else clock.column
     if clock.told:
         return Clock(name, clock.unit, clock.told, check)
     why = "its name or its steps"
     if (named := unit_in_name("time", clock.column)) and not clock.counts:
-        why += f", though its name ends with {named}"
+        why += f", although its name ends with {named}"
     if ratio is not None and ratio.fitting:
         first = ratio.fitting[0]
         pair = f"{first.position} and {first.speed}"
         if ratio.tick:
-            text = f"counts, not a time: the rate is right if position and speed are in {pair}"
+            text = f"counts, not a time: the rate is correct if position and speed are in {pair}"
             return Clock(name, why=f"{why}; rate: with {pair}", check=text, rate=1.0 / ratio.tick)
         also = (
             f"; {fits_as_well(ratio, clock_told=False)} as well" if ratio.fitting[1:] else "; no other fits the ratio"
         )
         why += f"; unit: steps of {clock.step:.4g} {first.clock}, with {pair}"
-        return Clock(name, first.clock, why, f"the unit is not told{also}")
+        return Clock(name, first.clock, why, f"the unit is not stated{also}")
     if clock.counts:
-        text = "counts, not a time: 1000 steps a second are a placeholder; give their rate"
+        text = "counts, not a time: 1000 steps per second is a placeholder; give the rate"
         return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
     rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
-    return Clock(name, clock.unit, why, f"the unit is not told: steps of {clock.step:.4g} are {rates}")
+    return Clock(name, clock.unit, why, f"the unit is not stated: steps of {clock.step:.4g} are {rates}")
 
 
 def _blamed(fault: CdtoolError, mapped: tuple[str, ...]) -> str | None:
-    """The channel that an error names, if the draft can do without it."""
+    """Return the channel that an error names, if the draft works without it."""
     for match in _CHANNEL.finditer(fault.message):
         name = match[1] or match[2]
         if name in CHANNELS and name in mapped and len(mapped) > 1:

@@ -1,4 +1,4 @@
-"""Which kind of machine does a log tell of, and of its motor or of its load? Units first, then names and ranges."""
+"""Guess the kind of machine and whether a log is of its motor or its load: units first, then names and ranges."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit,
 from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.table_clock import TableClock
 
-# Above this a rotation [rad, rad/s] is a motor's, not a load's.
+# Above this a rotation [rad, rad/s] is the motor's, not the load's.
 _MOTOR_RANGE = 20.0
-# Travel per motor angle [m/rad] of spindles, belts and pinions: which unit of length goes with a ratio.
+# Travel per motor angle [m/rad] of spindles, belts and pinions, to match a ratio with a unit of length.
 _GEARS = (2e-4, 0.2)
 _LENGTHS = ("mm", "m", "um")
-_MOTOR_OF_LOAD = "linear_axis with coordinates motor where this is the motor of a slide"
+_MOTOR_OF_LOAD = "linear_axis with coordinates = 'motor' if this is the motor of a slide"
 _MOTOR_OF_SLIDE = "rotary_axis for a hinged door or a turntable"
 
 
 @dataclass(frozen=True)
 class Gear:
-    """Position and speed on two sides of a gear: units of both, m of travel per rad of the motor, and why."""
+    """Position and speed on two sides of a gear: the units of both, travel per motor angle [m/rad], and the reason."""
 
     position: str
     speed: str
@@ -33,7 +33,7 @@ class Gear:
 
 @dataclass(frozen=True)
 class Side:
-    """The kind of machine and the side that its log tells of, why, and what else it may be (empty: it is known)."""
+    """The kind of machine and the side that the log is from, the reason, and an alternative (empty: certain)."""
 
     type: str
     coordinates: str
@@ -42,7 +42,7 @@ class Side:
     gear: Gear | None = None
 
     def accepted(self, channel: str) -> tuple[str, ...]:
-        """SI units that this kind of machine takes for a channel, as cdtool.machines has them."""
+        """Return the SI units that this kind of machine accepts for a channel, as in cdtool.machines."""
         quantity = channel.removeprefix("reference_")
         if quantity == "force":
             return ("N",)
@@ -55,20 +55,20 @@ class Side:
 
 
 def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, messages_si: bool) -> Side:
-    """Linear or rotary, motor or load: from the units told, from names and from how far and how fast it turns."""
+    """Guess linear or rotary, motor or load: from stated units, names, and the range and speed of rotation."""
     told = {name: stated(name, found.stream).si for name, found in channels.found.items()}
     lengths = told.get("position") == "m" or told.get("speed") == "m/s"
     motor, why = _is_motor(channels, ratio, messages_si)
     if channels.joints > 1:
-        text = f"{channels.joints} joints of which no model is known; {why}"
+        text = f"{channels.joints} joints without a known model; {why}"
         kind = "linear_axis" if lengths else "rotary_axis"
-        other = "planar_arm or urdf for joints that are coupled"
+        other = "planar_arm or urdf for coupled joints"
         turns = told.get("torque") == "N m" if lengths else motor
         return Side(kind, "motor" if turns else "load", text, other)
     if (gear := _gear(channels, ratio, clock)) is not None:
-        return Side("linear_axis", "motor", "a travel is logged, and a speed of rotation", "", gear)
+        return Side("linear_axis", "motor", "a travel and a speed of rotation are logged", "", gear)
     if lengths and told.get("torque") == "N m":
-        return Side("linear_axis", "motor", "a travel is logged, and a torque")
+        return Side("linear_axis", "motor", "a travel and a torque are logged")
     if lengths:
         return Side("linear_axis", "load", "one joint, position or speed in a unit of length")
     if motor:
@@ -76,20 +76,20 @@ def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, m
     if told.get("torque") == "N" and "angle" in _kinds(channels):
         return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
     if "angle" in _kinds(channels):
-        return Side("rotary_axis", "load", "one joint, and it tells of angles", _MOTOR_OF_LOAD)
+        return Side("rotary_axis", "load", "one joint, in angles", _MOTOR_OF_LOAD)
     if messages_si:
-        return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a joint that slides")
-    return Side("linear_axis", "load", "one joint", "rotary_axis for one that turns")
+        return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a sliding joint")
+    return Side("linear_axis", "load", "one joint", "rotary_axis for a rotating joint")
 
 
 def _gear(channels: Channels, ratio: Ratio | None, clock: TableClock | None) -> Gear | None:
-    """A travel and a rotation, as units or names tell, whose ratio is that of a gear."""
+    """Return a travel and a rotation, by units or names, whose ratio is that of a gear."""
     if ratio is None or ratio.fitting:
         return None
     position, speed = (channels.found[name].stream for name in ("position", "speed"))
     units = stated("position", position), stated("speed", speed)
     slope = ratio.per_second(clock.unit if clock is not None else "")
-    correlation = f"as the position's derivative over the speed has it, r = {ratio.correlation:.3f}"
+    correlation = f"from the position's derivative over the speed, r = {ratio.correlation:.3f}"
     if units[0].si == "rad" and units[1].si == "m/s":
         travel = _factor(units[1].unit) / (slope * _factor(units[0].unit))
         return Gear(units[0].unit, units[1].unit, travel, correlation)
@@ -110,10 +110,10 @@ def _gear(channels: Channels, ratio: Ratio | None, clock: TableClock | None) -> 
 def _is_motor(channels: Channels, ratio: Ratio | None, messages_si: bool) -> tuple[bool, str]:
     for name in ("position", "speed", "torque"):
         if name in channels.found and any("motor" in word for word in words(channels.found[name].stream.name)):
-            return True, f"'{channels.found[name].stream.name}' tells of a motor"
+            return True, f"'{channels.found[name].stream.name}' indicates a motor"
     speed = channels.found["speed"].stream if "speed" in channels.found else None
     if speed is not None and "rpm" in (stated("speed", speed).unit, rotation_unit(speed)):
-        return True, f"'{speed.name}' is a speed of rotation, as motors have"
+        return True, f"'{speed.name}' is a speed of rotation, typical of a motor"
     fitting = ratio.fitting[0] if ratio is not None and ratio.fitting else None
     for name in ("position", "speed"):
         if name not in channels.found:
@@ -126,7 +126,7 @@ def _is_motor(channels: Channels, ratio: Ratio | None, messages_si: bool) -> tup
         if known.factor * float(np.nanmax(np.abs(stream.values))) > _MOTOR_RANGE:
             limit = f"{_MOTOR_RANGE:g} {'rad' if messages_si else known.si}"
             return True, f"'{stream.name}' goes beyond {limit}, as only a motor does"
-    return False, "nothing tells of a motor"
+    return False, "nothing indicates a motor"
 
 
 def _kinds(channels: Channels) -> set[str]:

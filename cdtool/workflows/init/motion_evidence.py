@@ -1,6 +1,6 @@
-"""Evidence from the numbers: whose derivative fits whom, what moves as a drive does. Offline: for drafts only.
+"""Evidence from values: derivatives that match, and streams that move like a drive. Offline: for drafts only.
 
-Increments over some hundred windows are compared, so that neither noise nor a resolution of the encoder decides.
+Increments over some hundred windows are compared, so that neither noise nor the encoder's resolution matters.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ _SURE = 0.9
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one stream follows another: correlation and slope, medians of the joints that move.
+    """How well one stream follows another: correlation and slope, each the median of the moving joints.
 
-    The slope is that of joints which follow surely; NaN where none does.
+    The slope is that of joints with a clear correlation; NaN without one.
     """
 
     correlation: float
@@ -31,7 +31,7 @@ _NONE = Fit(0.0, float("nan"))
 
 
 def integral_fit(position: Stream, speed: Stream) -> Fit:
-    """Increments of the position against those of the integrated speed."""
+    """Compare increments of the position with those of the integrated speed."""
     if position.width != speed.width or len(speed.time) < 3:
         return _NONE
     steps = np.diff(speed.time)[:, np.newaxis]
@@ -41,12 +41,12 @@ def integral_fit(position: Stream, speed: Stream) -> Fit:
 
 
 def derivative_fit(acceleration: Stream, speed: Stream) -> Fit:
-    """The integrated acceleration against increments of the speed; a negative correlation: the other sign."""
+    """Compare the integrated acceleration with increments of the speed; negative correlation: opposite sign."""
     return integral_fit(speed, acceleration)
 
 
 def likeness(one: Stream, other: Stream) -> float:
-    """Correlation of two streams as they stand, the median of the joints that move: of a set value and what follows."""
+    """Return the correlation of two streams, as median of the moving joints: a set value and what follows it."""
     if one.width != other.width:
         return 0.0
     first, second = np.nan_to_num(_at(one.time, one.values, other.time)), np.nan_to_num(other.values)
@@ -56,9 +56,9 @@ def likeness(one: Stream, other: Stream) -> float:
 
 
 def drive_fit(drive: Stream, speed: Stream) -> float:
-    """Share of a stream's variance that inertia and friction explain: R2 of [dv/dt, v, sign v, 1], the joints' median.
+    """Return the share of a stream's variance explained by inertia and friction: R2 of [dv/dt, v, sign v, 1], median.
 
-    A drive's torque or current moves so; with gravity the share is smaller.
+    High for a drive's torque or current; lower with gravity.
     """
     if drive.width != speed.width:
         return 0.0
@@ -80,14 +80,14 @@ def drive_fit(drive: Stream, speed: Stream) -> float:
 
 
 def roughness(stream: Stream) -> float:
-    """How much a stream shakes from sample to sample, in parts of its range: a set value shakes least."""
+    """Return how much a stream varies from sample to sample, relative to its range: a set value is the smoothest."""
     values = np.nan_to_num(stream.values)
     span = float(np.max(np.ptp(values, axis=0)))
     return float(np.sqrt(np.mean(np.diff(values, n=2, axis=0) ** 2))) / span if span and len(values) > 2 else np.inf
 
 
 def rests_and_peaks(stream: Stream) -> bool:
-    """True for a load cell's course: at one level for most of the time, short and high peaks, no whole numbers."""
+    """Whether a stream looks like a load cell: constant for most of the time, short high peaks, no integers."""
     values = stream.values[np.isfinite(stream.values)]
     if len(values) < 20 or not np.ptp(values) or np.array_equal(values, np.rint(values)):
         return False
@@ -96,7 +96,7 @@ def rests_and_peaks(stream: Stream) -> bool:
 
 
 def blocks(streams: list[Stream]) -> tuple[int, int, float] | None:
-    """In columns without names: (first, J, correlation) of J positions with their J speeds right behind them."""
+    """Find (first, J, correlation) of J positions followed by their J speeds in columns without names."""
     best: tuple[int, int, float] | None = None
     for joints in range(1, len(streams) // 2 + 1):
         for first in range(len(streams) - 2 * joints + 1):
@@ -109,7 +109,7 @@ def blocks(streams: list[Stream]) -> tuple[int, int, float] | None:
 
 
 def _stirs(position: Stream, speed: Stream) -> bool:
-    """False for a joint that stands still: what it shows is noise."""
+    """Whether a joint moves; values of a joint at rest are noise."""
     way = float(np.ptp(np.nan_to_num(position.values)))
     return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))
 

@@ -1,11 +1,11 @@
-"""What a column's name says of its quantity, in English and German."""
+"""Guess the quantity of a column from its name, in English and German."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
-# Words that say it alone, also inside a longer one (`motordrehzahl`), and short ones that must stand for themselves.
+# Words that are sufficient alone, also inside a longer one (`motordrehzahl`), and short ones that must be separate.
 _LONG: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "angle", "winkel", "stellung", "encoder", "travel", "displacement"),
     "speed": ("speed", "velocity", "geschwindigkeit", "drehzahl", "omega"),
@@ -43,24 +43,24 @@ _OTHER = re.compile(
     r"|schlepp|following|deviation|abweichung|(?:^|_)lag(?:_|$)"
 )
 _STRONG, _WEAK = 3.0, 2.0
-_LETTERS = 2  # a short word of one letter says little
+_LETTERS = 2  # a one-letter word is weak evidence
 _SPLIT = re.compile(r"[^a-zäöüß]+")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 
 
 def words(name: str) -> list[str]:
-    """The words of a name, in lower case, numbers left out."""
+    """Return the words of a name, in lower case, without numbers."""
     return [word for word in _SPLIT.split(_CAMEL.sub(" ", name).lower()) if word]
 
 
 def is_reference(name: str) -> bool:
-    """True for a set value: `n_ref`, `target_q_0`, `Solldrehzahl`."""
+    """Whether the name is that of a set value: `n_ref`, `target_q_0`, `Solldrehzahl`."""
     parts = words(name)
     return any(long in name.lower() for long in _REFERENCE_LONG) or any(part in _REFERENCE_SHORT for part in parts)
 
 
 def is_actual(name: str) -> bool:
-    """True for what was measured, by its name: `actual_q_0`, `Istposition`, `Drehzahl Ist`, `n_act`."""
+    """Whether the name is that of a measured value: `actual_q_0`, `Istposition`, `Drehzahl Ist`, `n_act`."""
     parts = words(name)
     return any(long in name.lower() for long in _ACTUAL) or any(
         part.startswith("ist") or part in _ACTUAL_SHORT for part in parts
@@ -68,7 +68,7 @@ def is_actual(name: str) -> bool:
 
 
 def is_load_cell(name: str) -> bool:
-    """True for a load cell or a sensor of forces: ground truth, and never an input of a detector."""
+    """Whether the name is that of a load cell or force sensor: ground truth, never an input of a detector."""
     parts = words(name)
     if any(long in "".join(parts) for long in _LOAD_CELL) or "dms" in parts:
         return True
@@ -76,24 +76,24 @@ def is_load_cell(name: str) -> bool:
 
 
 def is_something_else(name: str) -> bool:
-    """True for what a joint's channel never is: a tool's pose, a temperature, a covariance, a following error."""
+    """Whether the name cannot be a joint's channel: a tool's pose, a temperature, a covariance, a following error."""
     return _OTHER.search("_".join(words(name))) is not None
 
 
 def is_clock(name: str) -> bool:
-    """True for a time: `Zeit`, `LogTime`, `timestamp`, `t`."""
+    """Whether the name is that of a time: `Zeit`, `LogTime`, `timestamp`, `t`."""
     parts = words(name)
     return _CLOCKS.search("".join(parts)) is not None or any(part in _CLOCKS_SHORT for part in parts)
 
 
 def is_counter(name: str) -> bool:
-    """True for a number that is counted up: `ticks`, `sample_index`."""
+    """Whether the name is that of a counter: `ticks`, `sample_index`."""
     whole = "".join(words(name))
     return any(word in whole for word in _COUNTERS)
 
 
 def motion_of(name: str) -> str:
-    """ "angle" or "length" for a name that tells of a rotation or of a travel, else empty."""
+    """Return "angle" or "length" for a name of a rotation or a travel, else an empty text."""
     parts = words(name)
     if any(long in "".join(parts) for long in _ANGLES) or any(part in _ANGLES_SHORT for part in parts):
         return "angle"
@@ -103,7 +103,7 @@ def motion_of(name: str) -> str:
 
 
 def word_for(quantity: str, name: str) -> tuple[float, str]:
-    """How strongly a name speaks for a quantity, and the word that does; 0 and no word where none does."""
+    """Return how strongly a name indicates a quantity, and the word that does; 0 and an empty word without one."""
     parts = words(name)
     whole = "".join(parts)
     if quantity == "torque" and is_load_cell(name):

@@ -1,7 +1,7 @@
-"""Units of clock, position and speed, weighed together: what fits the ratio of the position's derivative to the speed?
+"""Find the units of clock, position and speed that fit the ratio of the position's derivative to the speed.
 
-With the log's own numbers x of the position and v of the speed, dx / (v dt) = f_speed f_clock / f_position, where f are
-the factors to SI: ms with m and m/s give 0.001, as do s with m and mm/s. So all combinations that fit are named.
+With the logged values x of the position and v of the speed, dx / (v dt) = f_speed f_clock / f_position, where f are
+the factors to SI. Several combinations can fit: ms with m and m/s give 0.001, as do s with m and mm/s. All are named.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _PAIRS = (
     ("rad", "rad/s"), ("m", "m/s"), ("mm", "mm/s"), ("deg", "deg/s"), ("rad", "rpm"), ("deg", "rpm"), ("rev", "rpm"),
     ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("m", "m/min"), ("rad", "deg/s"),
 )  # fmt: skip
-# A ratio fits within this; within the second it leaves no doubt.
+# Largest deviation of a ratio that fits; below the second one the fit is certain.
 _NEAR, _SURE = 0.02, 0.01
-# What is so much less likely than the likeliest is not named: stamps in minutes at 17 Hz.
+# Combinations less likely than the best by this much are not listed: stamps in minutes at 17 Hz.
 _FAR = 2.5
 _RPM = ("n", "rpm", "motor")
 _RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
@@ -33,23 +33,23 @@ _RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
 
 @dataclass(frozen=True)
 class Stated:
-    """The unit that a log states for a channel; `by`: "log" (its header), "name", or "" where it states none."""
+    """The unit that a log states for a channel; `by`: "log" (its header), "name", or "" without a stated unit."""
 
     unit: str = ""
     by: str = ""
 
     @property
     def si(self) -> str:
-        """The SI unit of its dimension, empty where none is known."""
+        """Return the SI unit of its dimension, or an empty text if unknown."""
         known = find_unit(self.unit) if self.unit else None
         return known.si if known is not None else ""
 
 
 @dataclass(frozen=True)
 class Combination:
-    """Units that fit together, how unlikely they are, and how far the ratio is from theirs (relative).
+    """Units that fit together, how unlikely they are, and the relative deviation of the ratio from theirs.
 
-    `named`: unit or name of the position tell of an angle or a travel as these units do. An empty clock is told.
+    `named`: unit or name of the position indicate an angle or a travel, as these units do. Empty clock: stated.
     """
 
     clock: str
@@ -62,10 +62,10 @@ class Combination:
 
 @dataclass(frozen=True)
 class Ratio:
-    """What position and speed say together: `raw` is dx / (v dt) in the log's units of both and in assumed seconds.
+    """Result for position and speed: `raw` is dx / (v dt) in the log's units of both and in assumed seconds.
 
-    `fitting` are the units that go with it, the likeliest first; `correlation` says how surely one follows the other.
-    `tick` [s] is the step from count to count that the likeliest units ask for; 0 where the clock is no mere counter.
+    `fitting` are the units that fit, the likeliest first; `correlation` states how reliably one follows the other.
+    `tick` [s] is the step per count that the likeliest units require; 0 if the clock is not just a counter.
     """
 
     raw: float
@@ -75,23 +75,23 @@ class Ratio:
     tick: float = 0.0
 
     def per_second(self, clock: str) -> float:
-        """dx / (v dt) with the time in seconds, if the clock is in this unit (empty: as assumed, or as its ticks)."""
+        """Return dx / (v dt), the time in seconds if the clock is in this unit (empty: as assumed, or its ticks)."""
         if self.tick:
             return self.raw * self.assumed / self.tick
         return self.raw * self.assumed / seconds(clock) if clock else self.raw
 
     @property
     def certain(self) -> bool:
-        """True where one combination alone fits, well, and the names tell of the same.
+        """Whether only one combination fits, well, and the names indicate the same.
 
-        Without the names a gear might have that ratio: 1 m a turn is that of turns and 1/min.
+        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min.
         """
         first = self.fitting[0]
         return len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
 
 
 def stated(channel: str, stream: Stream) -> Stated:
-    """The unit in the header, else the one that the name ends with."""
+    """Return the unit in the header, else the unit at the end of the name."""
     if stream.unit and find_unit(stream.unit):
         return Stated(stream.unit, "log")
     unit = unit_in_name(channel.removeprefix("reference_"), own_name(stream))
@@ -99,7 +99,7 @@ def stated(channel: str, stream: Stream) -> Stated:
 
 
 def motion_kind(channel: str, channels: Channels) -> str:
-    """ "angle" or "length", as unit or name tell; "raw" for counts, percent and volts; empty where nothing tells."""
+    """Return "angle" or "length" by unit or name; "raw" for counts, percent and volts; empty if unknown."""
     if channel not in channels.found:
         return ""
     stream = channels.found[channel].stream
@@ -110,9 +110,9 @@ def motion_kind(channel: str, channels: Channels) -> str:
 
 
 def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) -> Ratio | None:
-    """Position over speed and all units that fit; None where one of the two is missing or does not follow the other.
+    """Return position over speed and all units that fit; None if one is missing or does not follow the other.
 
-    `messages_si`: the type of the messages says that both are in SI units.
+    `messages_si`: the type of the messages implies SI units.
     """
     if not {"position", "speed"} <= channels.found.keys():
         return None
@@ -139,7 +139,7 @@ def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) ->
 
 
 def rotation_unit(stream: Stream) -> str:
-    """The unit of a speed of rotation, by its name."""
+    """Return the unit of a speed of rotation, by its name."""
     parts = words(label(stream))
     if any(part in _RPM or "drehzahl" in part or "motor" in part for part in parts):
         return "rpm"
@@ -147,13 +147,13 @@ def rotation_unit(stream: Stream) -> str:
 
 
 def whole_numbers(stream: Stream) -> bool:
-    """True for counts: no value lies between two whole numbers, and there are many."""
+    """Whether the values are counts: all integers, and many different ones."""
     seen = stream.values[np.isfinite(stream.values)]
     return bool(np.array_equal(seen, np.rint(seen))) and len(np.unique(seen)) > 50
 
 
 def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
-    """Units of position and speed that may be: the header's where it states one, a name's beside the usual ones."""
+    """Return possible units of position and speed: the header's if stated, a name's together with the usual ones."""
     if messages_si:
         return list(_PAIRS[:2])
     position, speed = (stated(name, channels.found[name].stream) for name in ("position", "speed"))
@@ -169,7 +169,7 @@ def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
 
 
 def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> float:
-    """The step [s] of a counter that makes the likeliest units fit."""
+    """Return the step [s] of a counter for which the likeliest units fit."""
     ticks = [bare.raw * bare.assumed * _factor(position) / _factor(speed) for position, speed in pairs]
     made = [
         _combination(channels, None, "", pair, rank, replace(bare, tick=tick))
@@ -190,7 +190,7 @@ def _combination(
     kind = "length" if _si(pair[0]) == "m" else "angle"
     if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
         unlikely += 0.5  # m with mm/s
-    # Without any word one joint slides, and several turn.
+    # If no word indicates otherwise, one joint slides and several rotate.
     unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 else "length"))
     for channel, logged in zip(("position", "speed"), pair, strict=True):
         stream = channels.found[channel].stream

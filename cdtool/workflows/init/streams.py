@@ -1,4 +1,4 @@
-"""What a log may have for channels: single columns, columns that differ by a number only, fields of topics."""
+"""Candidates for channels in a log: single columns, columns that differ only by a number, fields of topics."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
 _NUMBER = re.compile(r"\d+")
-# `position[:]` with more elements than this is no list of joints.
+# `position[:]` with more elements than this is not a list of joints.
 _MOST_JOINTS = 64
 
 
 @dataclass(frozen=True)
 class Stream:
-    """Numbers over time that may be a channel: `values` (n, k) at `time` (n,) s, of k columns or of one field."""
+    """Values over time that may be a channel: `values` (n, k) at `time` (n,) s, from k columns or one field."""
 
     name: str
     columns: tuple[str, ...]
@@ -32,16 +32,16 @@ class Stream:
 
     @property
     def width(self) -> int:
-        """How many joints it could serve."""
+        """Return the number of joints it can serve."""
         return int(self.values.shape[1])
 
     @property
     def moves(self) -> bool:
-        """False where no value ever changes, or none is there."""
+        """Whether any value changes; False without values."""
         return any(np.ptp(part[np.isfinite(part)], axis=0) > 0.0 for part in self.values.T if np.isfinite(part).any())
 
     def element(self, index: int) -> Stream:
-        """One of its columns alone."""
+        """Return one of its columns."""
         values = self.values[:, index : index + 1]
         if self.topic:
             field = self.field.replace("[:]", f"[{index}]")
@@ -52,7 +52,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Found:
-    """A stream taken for a channel, why, and what is to be checked (empty: its name tells it)."""
+    """A stream guessed to be a channel, the reason, and what to check (empty: certain by its name)."""
 
     stream: Stream
     why: str
@@ -68,7 +68,7 @@ class Channels:
     found: dict[str, Found] = dataclasses.field(default_factory=dict)
 
     def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
-        """Note a guess; streams that share a column with it are taken with it."""
+        """Record a guess; streams that share a column with it are no longer free."""
         self.found[channel] = Found(stream, why, check)
         used = set(stream.columns)
         self.free = [
@@ -80,14 +80,14 @@ class Channels:
         ]
 
     def of_joints(self) -> list[Stream]:
-        """Free streams with one column a joint that change."""
+        """Return the free streams with one column per joint whose values change."""
         return [stream for stream in self.free if stream.width == self.joints and stream.moves]
 
 
 def streams_of(source: Source, table_time: FloatArray | None, clock: str | None, topics: bool) -> list[Stream]:
-    """Every column with its times, families of them first; the clock itself is none.
+    """Return every column with its times, families of columns first; without the clock itself.
 
-    A table without a clock gets sample numbers for times: its rates are then per sample.
+    A table without a clock gets sample numbers as times, so its rates are per sample.
     """
     if topics:
         return [_of_topic(name, source) for name in source.columns if source.columns[name].values.shape[0] > 1]
@@ -110,9 +110,9 @@ def _of_topic(name: str, source: Source) -> Stream:
 
 
 def _families(singles: Mapping[str, Stream]) -> list[Stream]:
-    """`tau_1, tau_2`, `q[0] ... q[5]`, `axis1_speed, axis2_speed`: names that differ by one number, counted up by 1."""
+    """Find families: `tau_1, tau_2`, `q[0] ... q[5]`, `axis1_speed, axis2_speed`: names with one consecutive number."""
     if all(name.isdigit() for name in singles):
-        return []  # a table without a header: its names are but places
+        return []  # a table without a header: its names are column numbers
     members: dict[tuple[str, str], dict[int, Stream]] = {}
     for name, stream in singles.items():
         for number in _NUMBER.finditer(split_unit(name)[0]):
@@ -133,6 +133,6 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
 
 
 def joined(streams: list[Stream], name: str) -> Stream:
-    """Streams of one column each, on one clock, as one of many columns."""
+    """Join streams of one column each, on one clock, to one of several columns."""
     values = np.hstack([stream.values for stream in streams])
     return Stream(name, tuple(stream.columns[0] for stream in streams), streams[0].unit, streams[0].time, values)

@@ -1,4 +1,4 @@
-"""Which column is a table's clock, and does anything tell its unit? Else its steps and the ratio must."""
+"""Find a table's clock column and its unit; without a stated unit, its steps and the ratio determine it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _UNITS = ("s", "ms", "us", "ns", "min")
-# Sampling rates [Hz] that logs of a machine have, and those that a log may have.
+# Sampling rates [Hz] that logs of a machine usually have, and those that are possible.
 _USUAL, _POSSIBLE = (20.0, 20e3), (0.5, 500e3)
-_RARE = 2.0  # how much less likely minutes are than a rate beyond the usual ones
+_RARE = 2.0  # minutes are this much less likely than an unusual rate
 
 
 @dataclass(frozen=True)
 class TableClock:
-    """A table's clock: the median `step` of its stamps, in its own unit, and the seconds of one that were assumed.
+    """A table's clock: the median `step` of its stamps, in its own unit, and the seconds assumed per unit.
 
-    `told` says what names the unit for sure; empty: `unit` is what the steps are likely to be in.
+    `told` is the certain source of the unit; if empty, `unit` is guessed from the steps.
     """
 
     column: str
@@ -36,13 +36,13 @@ class TableClock:
     counts: bool = False
 
     def units(self) -> tuple[str, ...]:
-        """Units that its stamps may be in; none of a mere counter."""
+        """Return the possible units of its stamps; empty for a counter."""
         if self.told:
             return (self.unit,)
         return () if self.counts else tuple(unit for unit in _UNITS if self.unlikely(unit) < 2 * _RARE)
 
     def unlikely(self, unit: str) -> float:
-        """0 where the unit gives a usual sampling rate, more where not."""
+        """Return 0 if the unit gives a usual sampling rate, more otherwise."""
         rate = 1.0 / (self.step * seconds(unit))
         rare = _RARE if unit == "min" else 0.0
         if _USUAL[0] <= rate <= _USUAL[1]:
@@ -51,7 +51,7 @@ class TableClock:
 
 
 def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
-    """The clock of a table and its times; None where no column looks like one."""
+    """Return the clock of a table and its times; None if no column looks like a clock."""
     found = _complete(source) or guess_clock(source)
     if found is None:
         return None
@@ -64,11 +64,11 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     stated = find_unit(column.unit) if column.unit else None
     against = ""
     if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):
-        against, stated = f", against its header, which says {column.unit}", None
+        against, stated = f", although its header states {column.unit}", None
     if stated is not None and stated.si == "s":
-        return replace(clock, unit=str(column.unit), told="the header, which names the unit"), found
+        return replace(clock, unit=str(column.unit), told="the header, which states the unit"), found
     if taken_off:
-        # A table's reader makes seconds of days.
+        # The reader of a table converts days to seconds.
         days = assumed > 2.0 * seconds("min")
         return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
@@ -78,13 +78,13 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
 
 
 def seconds(unit: str) -> float:
-    """A unit of time in seconds."""
+    """Return a unit of time in seconds."""
     known = find_unit(unit)
     return known.factor if known is not None else 1.0
 
 
 def _complete(source: Source) -> GuessedClock | None:
-    """The clock among columns without empty cells; None where these hold no column whose name tells of one."""
+    """Return the clock among columns without empty cells; None if the name of none of these indicates a clock."""
     whole = {name: column for name, column in source.columns.items() if np.isfinite(column.values).all()}
     if len(whole) == len(source.columns) or not whole:
         return None
@@ -95,10 +95,10 @@ def _complete(source: Source) -> GuessedClock | None:
 
 
 def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:
-    """Seconds of one unit of the stamps, as the guess took them; and whether it took the start off."""
+    """Return the seconds per unit of the stamps, as guessed, and whether the start was subtracted."""
     known = column.values[np.isfinite(column.values)]
     steps = np.diff(known)
-    steps = steps[steps > 0.0]  # the median of them: a wild stamp must not decide
+    steps = steps[steps > 0.0]  # the median, so that a wrong stamp does not matter
     factor = float(np.median(np.diff(found.time)) / np.median(steps)) if len(steps) and len(found.time) > 1 else 1.0
     return abs(factor) or 1.0, found.time[0] == 0.0 and bool(np.median(known) > 0.0 and known[0] != 0.0)
 

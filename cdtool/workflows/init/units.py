@@ -1,4 +1,4 @@
-"""In which unit is a channel logged? Header, message type, ratio of position to speed or name; else a question."""
+"""Guess a channel's unit from header, message type, ratio of position to speed or name; otherwise ask for it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.units_in_names import label
 
 _RAW = ("A", "V", "1", "count")
-# Types of messages whose numbers are in SI units by the convention of ROS (REP 103).
+# Message types with SI units by the ROS convention (REP 103).
 _SI_PACKAGES = ("sensor_msgs", "geometry_msgs", "nav_msgs", "control_msgs", "trajectory_msgs")
 _MOTION = ("position", "speed")
 
 
 @dataclass(frozen=True)
 class Logged:
-    """A unit with its scale (None: 1), why it is thought so, and what is to be checked (empty: it is known).
+    """A unit with its scale (None: 1), the reason, and what to check (empty: certain).
 
-    An empty unit is that of the messages' type, which a machine file need not name.
+    An empty unit is that of the message type, which a machine file need not name.
     """
 
     unit: str
@@ -34,7 +34,7 @@ class Logged:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that tells of units: the channels, the machine they are of, the ratio, the clock, types of messages."""
+    """All evidence for units: the channels, the machine, the ratio, the clock, and message types."""
 
     channels: Channels
     side: Side
@@ -44,7 +44,7 @@ class Evidence:
     message_types: dict[str, str]
 
     def logged(self, channel: str) -> Logged:
-        """Unit and scale of one channel; a raw one's scale, and what no evidence tells, is to be checked."""
+        """Return unit and scale of a channel; the scale of a raw channel, and all without evidence, must be checked."""
         stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
         quantity = channel.removeprefix("reference_")
         told = stated(channel, stream)
@@ -59,7 +59,7 @@ class Evidence:
                 same.unit or accepted[0],
                 f"as the measured {quantity}",
                 same.scale,
-                same.check or "not told: is it logged alike?",
+                same.check or "not stated: does it have the same unit?",
             )
         if quantity in _MOTION:
             return self._of_motion(channel)
@@ -69,21 +69,21 @@ class Evidence:
             return _of_torque(stream, accepted, self.channels.joints)
         largest = float(np.nanmax(np.abs(stream.values)))
         return Logged(
-            accepted[0], "", check=f"the unit is not told; values reach {largest:.3g}: {others(accepted[0])}?"
+            accepted[0], "", check=f"the unit is not stated; values reach {largest:.3g}: {others(accepted[0])}?"
         )
 
     def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
         if si in accepted:
-            return Logged(unit, "the log says so", check=self._contradicted(channel))
+            return Logged(unit, "stated in the log", check=self._contradicted(channel))
         if si in _RAW:
-            return _raw(unit, accepted[0], self.channels.joints, "the log says so")
-        return Logged(unit, "the log says so", check=f"with this type and these coordinates it is {accepted[0]}")
+            return _raw(unit, accepted[0], self.channels.joints, "stated in the log")
+        return Logged(unit, "stated in the log", check=f"with this type and these coordinates it is {accepted[0]}")
 
     def _named(self, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
         if si in _RAW:
-            return _raw(unit, accepted[0], self.channels.joints, "read off its name")
+            return _raw(unit, accepted[0], self.channels.joints, "from its name")
         check = "" if si in accepted else f"with this type and these coordinates it is {accepted[0]}"
-        return Logged(unit, "read off its name", check=check or "only its name tells it")
+        return Logged(unit, "from its name", check=check or "known only from its name")
 
     def _of_motion(self, channel: str) -> Logged:
         quantity = channel.removeprefix("reference_")
@@ -91,8 +91,8 @@ class Evidence:
         told = stated(channel, stream)
         if channel == quantity and self.side.gear is not None:
             unit = self.side.gear.position if quantity == "position" else self.side.gear.speed
-            why = "read off its name" if told.unit else "" if quantity == "position" else "its name"
-            return Logged(unit, why, check=f"not told for certain: {others(unit)}? The transmission ratio hangs on it")
+            why = "from its name" if told.unit else "" if quantity == "position" else "its name"
+            return Logged(unit, why, check=f"not certain: {others(unit)}? The transmission ratio depends on it")
         if channel == quantity and self.ratio is not None and self.ratio.fitting and told.si not in _RAW:
             return self._fitting(quantity)
         if quantity == "position" and (told.si == "count" or self._counts(channel)):
@@ -100,7 +100,7 @@ class Evidence:
         if told.unit:
             return self._named(told.unit, told.si, accepted)
         usual = self._usual(quantity, stream, accepted)
-        return Logged(usual, "", check=f"not told: {others(usual)}?")
+        return Logged(usual, "", check=f"not stated: {others(usual)}?")
 
     def _fitting(self, quantity: str) -> Logged:
         assert self.ratio is not None
@@ -114,18 +114,18 @@ class Evidence:
         )
         check = ""
         if not (self.ratio.certain or (agreed and self.clock_told)):
-            check = f"not told for certain; {self._rest(len(rest) > 0)}"
+            check = f"not certain; {self._rest(len(rest) > 0)}"
         return Logged(getattr(first, quantity), text, check=check)
 
     def _rest(self, several: bool) -> str:
         assert self.ratio is not None
         if not several:
             off = 100 * self.ratio.fitting[0].off
-            return "a gear may have this ratio, too" if off < 1.0 else f"the ratio is {off:.1f} % off"
+            return "a gear may also have this ratio" if off < 1.0 else f"the ratio is {off:.1f} % off"
         return f"{fits_as_well(self.ratio, self.clock_told)} as well"
 
     def _counts(self, channel: str) -> bool:
-        """True for a position that no unit explains: an encoder's counts."""
+        """Whether no unit explains a position: an encoder's counts."""
         stream = self.channels.found[channel].stream
         own = self.ratio is not None and channel == "position"
         return not stated(channel, stream).unit and (own or whole_numbers(stream))
@@ -142,7 +142,7 @@ class Evidence:
         slope = self.ratio.per_second(self.clock_unit)
         scale = (float(f"{factor / slope:.5g}"),) * joints
         per = f"{si.removesuffix('/s')} per count, from the ratio {slope:.4g} to the speed in {speed.unit or si}"
-        return Logged(unit, per, scale, check="right only if the speed's unit, its scale and the clock are")
+        return Logged(unit, per, scale, check="correct only if the speed's unit, its scale and the clock are")
 
     def _usual(self, quantity: str, stream: Stream, accepted: tuple[str, ...]) -> str:
         if quantity == "speed" and "rad/s" in accepted and (usual := rotation_unit(stream)):
@@ -152,12 +152,12 @@ class Evidence:
         return accepted[0]
 
     def _contradicted(self, channel: str) -> str:
-        """What is odd about units of position and speed that are told, both."""
+        """Return the contradiction between the stated units of position and speed, or an empty text."""
         if channel not in _MOTION or self.ratio is None or self.ratio.fitting or self.side.gear is not None:
             return ""
         streams = [self.channels.found[name].stream for name in _MOTION]
         if all(is_si(self.message_types.get(stream.topic, "")) for stream in streams):
-            return f"the position's derivative is {self.ratio.raw:.4g} of the speed: in SI units it were 1"
+            return f"the position's derivative is {self.ratio.raw:.4g} of the speed: it must be 1 in SI units"
         known = [find_unit(stated(name, stream).unit) for name, stream in zip(_MOTION, streams, strict=True)]
         factors = [unit.factor for unit in known if unit is not None and unit.si not in _RAW]
         if len(factors) < 2:
@@ -167,12 +167,12 @@ class Evidence:
 
 
 def is_si(message_type: str) -> bool:
-    """True for a type of message whose units are SI by convention: `sensor_msgs/msg/JointState`."""
+    """Whether units of a message type are SI by convention: `sensor_msgs/msg/JointState`."""
     return message_type.split("/")[0].split(".")[0] in _SI_PACKAGES
 
 
 def fits_as_well(ratio: Ratio, clock_told: bool) -> str:
-    """The combinations that fit besides the first: "s with m, mm/s; ms with mm, mm/s fit"."""
+    """Return the other combinations that fit: "s with m, mm/s; ms with mm, mm/s fit"."""
     texts = [
         f"{'' if clock_told or not item.clock else f'{item.clock} with '}{item.position}, {item.speed}"
         for item in ratio.fitting[1:]
@@ -181,7 +181,7 @@ def fits_as_well(ratio: Ratio, clock_told: bool) -> str:
 
 
 def others(unit: str) -> str:
-    """A unit and those that it may be instead."""
+    """Return a unit and the units it may be instead."""
     alike = {
         "N": "N or kN", "N m": "N m or mN m", "m/s2": "m/s2 or g", "rad": "rad or deg", "rad/s": "rad/s or deg/s",
         "m": "m or mm", "mm": "mm or m", "m/s": "m/s or mm/s", "rad/s2": "rad/s2 or deg/s2", "rpm": "rpm or rad/s",

@@ -1,4 +1,4 @@
-"""Units in names: `LogTime_ms`, `velocity_mps`, `motor_torque_nm`, `rpm`; and what of a name is left without them."""
+"""Units in names: `LogTime_ms`, `velocity_mps`, `motor_torque_nm`, `rpm`; and names without their units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, 
 from cdtool.workflows.init.streams import Stream
 
 _QUANTITIES = (*MEASURED, "force")
-# What can be logged for a quantity, whatever the machine: SI units, and those that a scale makes one of these.
+# Possible logged units of a quantity on any machine: SI units, and those that a scale converts.
 _MEASURES: Mapping[str, tuple[str, ...]] = {
     "time": ("s",),
     "position": ("rad", "m", "count", "1", "V"),
@@ -21,7 +21,7 @@ _MEASURES: Mapping[str, tuple[str, ...]] = {
     "torque": ("N m", "N", "A", "count", "1", "V"),
     "force": ("N", "count", "1", "V"),
 }
-# Tails of names in lower case; of one letter only the first kind stands for itself, `F_N`, where case tells.
+# Endings of names in lower case; a single letter counts only in the first form, `F_N`, where the case matters.
 _CAPITALS = {"N": "N", "A": "A", "V": "V"}
 _TAILS = {
     "s": "s", "ms": "ms", "us": "us", "ns": "ns", "min": "min", "sec": "s",
@@ -37,7 +37,7 @@ _SEPARATOR = re.compile(r"[\W_]+")
 
 
 def own_name(stream: Stream) -> str:
-    """A column's name or a field's; a topic's says something only where the field's does not (`data`)."""
+    """Return the name of a column or field; a topic's name only if the field's is generic (`data`)."""
     if not stream.topic:
         return split_unit(stream.name)[0] if stream.unit else stream.name
     plain = stream.field.split("[")[0] == "data"
@@ -45,7 +45,7 @@ def own_name(stream: Stream) -> str:
 
 
 def label(stream: Stream) -> str:
-    """A stream's name without the unit that it ends with."""
+    """Return a stream's name without the unit at its end."""
     name = own_name(stream)
     rest, tail, unit = _split(name)
     if not rest or not unit:
@@ -57,9 +57,9 @@ def label(stream: Stream) -> str:
 
 
 def unit_in_name(quantity: str, name: str) -> str:
-    """The unit at the end of a name, where it measures that quantity; empty where there is none.
+    """Return the unit at the end of a name if it measures that quantity, else an empty text.
 
-    Not every tail is one: `tau_m` is a motor's torque, `phi_m` its angle.
+    Not every ending is a unit: `tau_m` is a motor's torque, `phi_m` its angle.
     """
     rest, _, unit = _split(name)
     if not unit or not _measures(quantity, unit):
@@ -75,7 +75,7 @@ def unit_in_name(quantity: str, name: str) -> str:
 
 
 def may_be(quantity: str, stream: Stream) -> bool:
-    """False where the unit in the header, or one in the name that means nothing else, is none of that quantity."""
+    """Return False if the unit in the header, or an unambiguous one in the name, does not measure that quantity."""
     if stream.unit and find_unit(stream.unit):
         return _measures(quantity, stream.unit)
     rest, tail, unit = _split(own_name(stream))
@@ -88,7 +88,7 @@ def _measures(quantity: str, unit: str) -> bool:
 
 
 def _split(name: str) -> tuple[str, str, str]:
-    """(what stands before it, the tail, its unit); empty where a name has no such tail."""
+    """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
     parts = [part for part in _SEPARATOR.split(name) if part]
     for count in (2, 1):
         tail = "_".join(parts[-count:])
@@ -99,5 +99,5 @@ def _split(name: str) -> tuple[str, str, str]:
 
 
 def _stands_for_itself(rest: str, tail: str) -> bool:
-    """True for a tail that is a unit whatever stands before it: `_mm`, `pulses_N`; not `MOTOR_N`, `tau_m`."""
+    """Whether an ending is a unit after any name: `_mm`, `pulses_N`; not `MOTOR_N`, `tau_m`."""
     return len(tail) > 1 if tail not in _CAPITALS else rest != rest.upper()

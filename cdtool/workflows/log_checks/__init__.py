@@ -1,1 +1,1 @@
-"""What is wrong with a log itself: the same checks in every command."""
+"""Checks of a log itself, identical in every command."""

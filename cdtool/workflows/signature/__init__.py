@@ -1,1 +1,1 @@
-"""`cdtool learn-signature` and `cdtool signature`: thresholds and normal motions, learned from impact-free runs."""
+"""`cdtool learn-signature` and `cdtool signature`: thresholds and normal motions from impact-free runs."""

@@ -11,25 +11,25 @@ from cdtool.evaluation.results import Skipped
 from cdtool.pipeline import Detection, judge
 from cdtool.workflows.signature.fitting import Fit, Pair
 
-# Runs are judged by what the other nine tenths teach.
+# Runs are tested with thresholds learned from the other nine tenths.
 FOLDS = 10
 
 
 def in_fixed_order(pairs: Sequence[Pair]) -> list[Pair]:
-    """The runs in an order that is not that of their files: which runs judge which must not hang on it."""
+    """Return the runs in an order independent of their files, so that the folds do not depend on it."""
     return sorted(pairs, key=lambda pair: (pair[0].recording.digest, pair[0].number, pair[0].name))
 
 
 def kept(pairs: Sequence[Pair], skipped: Sequence[Skipped]) -> list[Pair]:
-    """The runs that were not left out."""
+    """Return the runs that were not left out."""
     names = {item.recording for item in skipped}
     return [pair for pair in pairs if pair[0].name not in names]
 
 
 def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, activation: Activation) -> Calibrated:
-    """The safety factor for a budget, set on every run, each judged by thresholds learned from runs of other folds.
+    """Return the safety factor for a budget, set on every run with thresholds learned from runs of other folds.
 
-    Raises UsageError where the runs are too few for the budget, or nine tenths of them to learn from.
+    Raises UsageError if there are too few runs for the budget, or to learn from nine tenths of them.
     """
     if budget.per == "operation":
         budget.check(len(pairs), detector)
@@ -52,5 +52,5 @@ def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, ac
 def _too_few(budget: Budget, detector: str, why: str) -> UsageError:
     return UsageError(
         f"false-alarm budget {budget}: {detector} cannot learn from nine tenths of the runs: {why}",
-        "add runs (of each class of motion), or do without a budget",
+        "add runs (of each class of motion), or remove the budget",
     )

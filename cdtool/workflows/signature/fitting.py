@@ -1,4 +1,4 @@
-"""Fitting a threshold to impact-free runs: a detector's signals, classes of motion, what was used and left out."""
+"""Fit a threshold to impact-free runs: signals of a detector, classes of motion, runs used and left out."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Pair = tuple[Operation, Signal]
 
 
 class NoUsableRunError(SignatureError):
-    """A detector can be used on none of the runs: mostly they lack a channel that it needs; `reason` is the first."""
+    """A detector cannot be used on any run, mostly because of a missing channel; `reason` is that of the first run."""
 
     def __init__(self, detector: str, reason: str) -> None:
         first = f"; first reason: {reason}" if reason else ""
-        super().__init__(f"no run that {detector} can be used on{first}", "check with cdtool info")
+        super().__init__(f"{detector} cannot be used on any run{first}", "check with cdtool info")
         self.reason = reason
 
 
@@ -42,7 +42,7 @@ class Fitted:
 
     @property
     def used(self) -> tuple[Operation, ...]:
-        """All operations that were learned from."""
+        """Return all operations that were learned from."""
         return tuple(operation for operations in self.learned_from for operation in operations)
 
 
@@ -50,9 +50,9 @@ Fit = Callable[[Sequence[Pair]], Fitted]
 
 
 def fitting(rule: Threshold) -> Fit:
-    """How that rule learns of runs: each class of motion apart where it is `by_class`, all together otherwise.
+    """Return how the rule learns from runs: each class of motion separately if `by_class`, all together otherwise.
 
-    The function raises SignatureError where nothing can be learned.
+    The function raises SignatureError if nothing can be learned.
     """
     by_class = getattr(rule, "by_class", False)
     return lambda pairs: _fit_classes(rule, pairs) if by_class else _fit_all(rule, pairs)
@@ -65,9 +65,9 @@ def signals_of(
     watched: Sequence[str] = (),
     unread: Sequence[Skipped] = (),
 ) -> tuple[list[Pair], list[Skipped]]:
-    """A detector's signal of each operation, and what was left out; raises NoUsableRunError where none is left.
+    """Return a detector's signal of each operation, and what was left out; NoUsableRunError if no run remains.
 
-    `unread`: what was left out before, for the reason in that error.
+    `unread`: what was left out before, used as the reason in that error.
     """
     skipped: list[Skipped] = []
     refused: list[CdtoolError] = []
@@ -86,7 +86,7 @@ def signals_of(
 
 
 def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
-    """The same fit; where the runs are too few, its error names what was left out before."""
+    """Return the same fit, with an error for too few runs that also states how many were left out before."""
 
     def told(pairs: Sequence[Pair]) -> Fitted:
         try:
@@ -109,14 +109,14 @@ def fit_operations(
     unread: Sequence[Skipped] = (),
     watched: Sequence[str] = (),
 ) -> Fitted:
-    """What the rule learns of impact-free operations of a machine with a detector; raises SignatureError."""
+    """Learn the rule from impact-free operations of a machine with a detector; raises SignatureError."""
     pairs, skipped = signals_of(operations, machine, detector, watched, unread)
     fitted = fitting(for_machine(rule, machine))(pairs)
     return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 
 def for_machine(rule: Threshold, machine: Machine) -> Threshold:
-    """The rule with the machine's own sides where it leaves them open, in its signature too."""
+    """Return the rule with the machine's default sides if it has none, also in its signature."""
     sides = machine.default_sides
     return with_context(rule, sides, Signature(sides=sides))
 
@@ -139,7 +139,7 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
             fitted.append(_fit(rule, members))
             used.append(tuple(operation for operation, _ in members))
         except SignatureError as fault:
-            # A stray run of another class does not stop the others; without any class to learn it is an error.
+            # A stray run of another class does not stop the others; without a class to learn it is an error.
             refused.append(fault)
             motion = members[0][0].motion.described
             skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]

@@ -1,4 +1,4 @@
-"""Impact-free runs by class of motion: those that run alike, and the odd ones by name."""
+"""Group impact-free runs by class of motion, and leave out runs that differ from their class."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from cdtool.operations import Operation
 from cdtool.recording import FloatArray
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 
-# Nominal speeds that differ by more than this share from the next one are those of two classes.
+# Nominal speeds that differ from the next one by more than this share belong to two classes.
 _STEP = 0.05
-# A run is odd where its speed is off by this share of the nominal one over this share of the stroke.
+# A run is left out if its speed is off by this share of the nominal one over this share of the stroke.
 _OFF, _OFF_SHARE = 0.1, 0.1
-# Fewer runs show no common speed along the stroke.
+# With fewer runs no common speed along the stroke can be determined.
 _ENOUGH = 3
 _POINTS = 100
 _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5.0
@@ -35,7 +35,7 @@ class _Run:
 
 
 def by_class(operations: Sequence[Operation]) -> tuple[list[list[Operation]], list[Skipped]]:
-    """Return the runs by class of motion, in order of the first of each, and those that are odd in theirs, left out.
+    """Return the runs by class of motion, in order of the first of each, and the runs left out as different.
 
     A class: one leading joint and direction, nominal speeds close together and at most 10 % from their median.
     """
@@ -74,7 +74,7 @@ def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
 
 
 def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
-    """The runs of a class whose speed along the stroke is that of the others, and the others by name."""
+    """Return the runs of a class with the common speed along the stroke, and the others with the reason."""
     if len(runs) < _ENOUGH or runs[0].motion.direction == 0:
         return runs, []
     nominal = float(np.median([run.motion.nominal_speed for run in runs]))
@@ -82,7 +82,7 @@ def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
     furthest = float(np.median([travel[-1] if len(travel) else 0.0 for travel, _ in courses]))
     grid, nowhere = np.linspace(0.0, furthest, _POINTS), np.full(_POINTS, np.nan)
     speeds = np.array([np.interp(grid, *course, right=np.nan) if len(course[0]) else nowhere for course in courses])
-    # The ends apart: each stroke begins and stops where it does.
+    # Without the ends: each stroke begins and stops at different positions.
     inner = slice(1, -max(1, _POINTS // 20))
     known = np.isfinite(speeds[:, inner])
     usual = np.array(
@@ -111,7 +111,7 @@ def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
 
 
 def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
-    """The runs whose nominal speed lies near the median of those that stay, and the others by name."""
+    """Return the runs with a nominal speed near the median of those that remain, and the others with the reason."""
     left_out: list[Skipped] = []
     while True:
         median = float(np.median([run.motion.nominal_speed for run in runs]))
@@ -128,7 +128,7 @@ def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
 
 
 def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
-    """Averaged forward speed over rising travel."""
+    """Return the averaged forward speed over increasing travel."""
     motion, recording = run.motion, run.operation.recording
     series = recording["speed"]
     where = stroke_progress(recording, motion.direction, nominal, motion.joint)

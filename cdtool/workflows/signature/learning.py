@@ -1,4 +1,4 @@
-"""Learning a threshold from impact-free logs for a signature file."""
+"""Learn a threshold from impact-free logs for a signature file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cdtool.workflows.signature.threshold_settings import set_by_hand
 
 @dataclass(frozen=True)
 class Learned:
-    """A signature file's content, how many runs each class gave (None: all classes together), and what was left out."""
+    """The content of a signature file, the number of runs per class (None: all classes), and what was left out."""
 
     signature: SignatureFile
     runs: tuple[tuple[MotionClass | None, int], ...]
@@ -112,7 +112,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     """
     machine, joints, operations = options.machine, options.joints, options.operations
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before anything is read
+    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before reading
     budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
     wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
@@ -155,11 +155,11 @@ learn_signature = by_keywords(LearningOptions, learn)
 def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:
     if budget and set_by_hand(rule):
         raise UsageError(
-            f"a safety factor or limits set by hand, and a false-alarm budget {budget} that would set them",
+            f"a safety factor or limits set by hand cannot be combined with a false-alarm budget {budget}",
             "give one of the two",
         )
 
 
 def learned_run(operation: Operation) -> LearnedRun:
-    """How a signature file notes an operation that it was learned from."""
+    """Return the entry of an operation in the list of runs of a signature file."""
     return LearnedRun(operation.name, operation.recording.digest, operation.number)

@@ -1,4 +1,4 @@
-"""What every channel normally looks like, learned from impact-free operations, each class of motion apart."""
+"""The normal motion of every channel, learned from impact-free operations for each class of motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdtool.workflows.signature.grouping import by_class
 
 
 def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
-    """Return the normal motion of each class of motion of which there are enough runs with speed and position."""
+    """Return the normal motion of each class of motion with enough runs that have speed and position."""
     able = [item for item in operations if "speed" in item.recording and "position" in item.recording]
     learned = []
     for members in by_class(able)[0] if able else []:
@@ -30,21 +30,21 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
 
 
 def normals_of(file: SignatureFile) -> NormalMotions:
-    """Return the normal motions of a signature file, or why there are none."""
+    """Return the normal motions of a signature file, or why they are missing."""
     return NormalMotions(file.normal or (), Absence.OLDER_FILE if file.normal is None else Absence.FEW_RUNS)
 
 
 def notes_on(file: SignatureFile) -> list[Skipped]:
-    """Return what is to be said of a signature file of an earlier version, under its name; else nothing."""
+    """Return the notes on a signature file of an earlier version, under its name; else empty."""
     return [Skipped(file.source, file.of_earlier_version)] if file.of_earlier_version else []
 
 
 def with_operation(
     file: SignatureFile, operation: Operation, cap: float, forget: float | None
 ) -> tuple[NormalMotion, ...] | None:
-    """Return a file's normal motions with one more impact-free operation in that of its class; None where it has none.
+    """Return a file's normal motions with one more impact-free operation in that of its class; None without one.
 
-    The run is clipped to `cap` spreads and counts as it does in the signature (`forget`).
+    The run is clipped to `cap` spreads and weighted as in the signature (`forget`).
     """
     if file.normal is None:
         return None

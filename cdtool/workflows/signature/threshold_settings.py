@@ -23,7 +23,7 @@ _DEFAULT = "signature"
 def read_signature(table: Table, default_sides: str) -> Signature:
     """Return the signature rule that the table [signature] describes."""
     if "debounce" in table:
-        raise table.fault("debounce", "belongs to another table", "write it in [activation]")
+        raise table.fault("debounce", "belongs in another table", "move it to [activation]")
     settings: dict[str, Any] = {
         "rule": table.choice("rule", RULES, "pooled"),
         "sides": table.choice("sides", SIDES, default_sides),
@@ -39,11 +39,11 @@ def read_signature(table: Table, default_sides: str) -> Signature:
 
 
 def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
-    """The threshold's name and its rule; raises ConfigurationError for an unknown name or key, or a wrong value.
+    """Return the threshold's name and rule; raises ConfigurationError for an unknown name or key, or a wrong value.
 
-    `threshold = "NAME"` takes NAME's default settings, a table [threshold] has `name` and NAME's own fields. The
-    settings of the signature, also where another rule learns one, are in [signature]; so is the safety factor of any
-    rule for which [threshold] gives none.
+    `threshold = "NAME"` selects NAME with default settings; a table [threshold] has `name` and NAME's own fields. The
+    settings of the signature, also if another rule learns one, are in [signature]; so is the safety factor of any rule
+    if [threshold] does not set it.
     """
     names = THRESHOLDS.names(plugins=True)
     if not isinstance(root.raw("threshold"), dict):
@@ -54,14 +54,14 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
     if name == _DEFAULT:
         for key in table.values:
             if key != "name":
-                raise table.fault(key, "is no key of this table", "the signature's settings are in [signature]")
+                raise table.fault(key, "is not a key of this table", "the signature's settings are in [signature]")
         return name, signature
     rule = THRESHOLDS.load(name)
     own = [item for item in fields(rule) if item.name != "signature"]
     settings = {item.name: _value(table, item) for item in own if item.name in table}
     table.finish()
     if "limits" in settings and ("safety_factor" in settings or signature.safety_factor is not None):
-        raise table.fault("safety_factor", "is given beside limits set by hand", "leave one of the two out")
+        raise table.fault("safety_factor", "cannot be combined with limits set by hand", "remove one of the two")
     if "safety_factor" not in settings and signature.safety_factor is not None:
         settings["safety_factor"] = signature.safety_factor
     try:
@@ -71,7 +71,7 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
 
 
 def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Threshold:
-    """The rule of that name for a command line: `given` are its settings as KEY=VALUE, `signature` the signature's.
+    """Return the rule of that name for a command line: `given` are KEY=VALUE settings, `signature` the signature's.
 
     Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
     """
@@ -86,10 +86,10 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
 
 
 def _setting(text: str) -> tuple[str, Any]:
-    """KEY=VALUE, the value as TOML has it; a bare word is a text."""
+    """Parse KEY=VALUE with a TOML value; a bare word is a text."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
-        raise UsageError(f"--set is '{text}'", "KEY=VALUE, as drift=0.5; docs/thresholds.md names the keys")
+        raise UsageError(f"--set is '{text}'", "give KEY=VALUE, as drift=0.5; the keys are in docs/thresholds.md")
     try:
         return name, parse_toml(f"value = {value}")["value"]
     except ContentError:
@@ -97,12 +97,12 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def set_by_hand(rule: Threshold) -> bool:
-    """Whether the rule's limits, or its safety factor, are other than what it has by itself."""
+    """Whether the rule's limits or its safety factor differ from the default."""
     return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
 
 
 def _value(table: Table, item: Field[Any]) -> Any:
-    """A key's value, checked against the type of the field."""
+    """Return a key's value, checked against the type of the field."""
     kind = item.type
     if kind == "bool":
         return table.flag(item.name, False)
@@ -111,14 +111,14 @@ def _value(table: Table, item: Field[Any]) -> Any:
     if kind in ("float", "float | None"):
         return table.number(item.name)
     if kind == "tuple[int, ...]":
-        return _numbers(table, item.name, int, "a list of whole numbers is needed")
+        return _numbers(table, item.name, int, "give a list of whole numbers")
     if kind == "tuple[float, ...]":
-        return _numbers(table, item.name, (int, float), "a list of numbers is needed")
+        return _numbers(table, item.name, (int, float), "give a list of numbers")
     return table.texts(item.name) if kind == "tuple[str, ...]" else table.text(item.name)
 
 
 def _numbers(table: Table, name: str, kind: type | tuple[type, ...], wanted: str) -> tuple[Any, ...]:
-    """A list of numbers, or one alone."""
+    """Return a list of numbers; a single number is a list of one."""
     values = table.raw(name)
     values = values if isinstance(values, list) else [values]
     if not values or any(isinstance(x, bool) or not isinstance(x, kind) for x in values):

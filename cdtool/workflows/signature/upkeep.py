@@ -1,4 +1,4 @@
-"""Keeping a signature: do its runs suffice, has the machine drifted since, and adding runs without learning a fault."""
+"""Check the coverage and drift of a signature, and add runs to it without learning a fault."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
 
-# The chance of a false alarm in an operation that the runs have to show, and the least that can be asked.
+# False-alarm probability per operation that the runs must demonstrate, and the smallest one that can be required.
 TARGET, LEAST_TARGET = 1e-3, 1e-9
 
 
 @dataclass(frozen=True)
 class CheckedClass:
-    """One class of motion: coverage by the runs learned from, drift in the others; None where none were given.
+    """One class of motion: coverage by the runs learned from, drift in later runs; None without such runs.
 
-    `signature` is what counts, `first` what was first learned.
+    `signature` is the current one, `first` the one first learned.
     """
 
     signature: FittedSignature
@@ -50,13 +50,13 @@ class CheckedClass:
 
     @property
     def advice(self) -> str:
-        """What to do, in a line."""
+        """Return what to do, in one line."""
         return advice(self.coverage, self.drift)
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What a check of a signature found, class by class, and what was left out."""
+    """The result of checking a signature, per class, and what was left out."""
 
     file: SignatureFile
     classes: tuple[CheckedClass, ...]
@@ -75,17 +75,17 @@ class Updated:
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:
-    """The current and the first signature of each class; raises SignatureError where the file holds another threshold.
+    """Return the current and the first signature of each class; SignatureError if the file has another threshold.
 
-    What is learned afresh has no curve along the stroke that could be held against a season's runs.
+    A threshold without a curve along the stroke cannot be compared with the runs of a season.
     """
     pairs: list[tuple[FittedSignature, FittedSignature]] = []
     for current, first in zip(file.current, file.first, strict=True):
         ours = isinstance(file.rule, Signature)
         if not ours or not isinstance(current, FittedSignature) or not isinstance(first, FittedSignature):
             raise SignatureError(
-                f"{file.source or 'file'}: holds the threshold {file.threshold}, no signature",
-                "such a threshold is not updated run by run: learn it again with learn-signature",
+                f"{file.source or 'file'}: contains the threshold {file.threshold}, not a signature",
+                "relearn it with learn-signature: such a threshold cannot be updated run by run",
             )
         pairs.append((current, first))
     return tuple(pairs)
@@ -124,7 +124,7 @@ class SeasonOptions:
         return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
 
     def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
-        """Read the logs for a signature file; raises SignatureError where they are cut otherwise than for learning."""
+        """Read the logs for a signature file; SignatureError if they are cut differently than for learning."""
         operations = _cut(file, self.operations)
         reading = RunReading(operations, onset=self.onset, jobs=self.jobs, progress=self.progress)
         return load_runs([Path(log) for log in self.logs], machine_file, reading, file.plausible)
@@ -200,7 +200,7 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
     """
     target = options.target
     if not LEAST_TARGET <= target < 1.0:
-        raise UsageError(f"target is {target:g}", f"a chance of a false alarm from {LEAST_TARGET:g} to below 1")
+        raise UsageError(f"target is {target:g}", f"give a probability from {LEAST_TARGET:g} to below 1")
     machine_file = options.machine_file()
     file = read_signature(path)
     signatures = signatures_in(file)
@@ -212,8 +212,8 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
     known = {(run.sha256, run.operation) for run in file.runs}
     learned = [(item.recording.digest, item.number) in known for item, _ in pairs]
     if 0 < sum(learned) < len(file.runs):
-        some = f"given: only {sum(learned)} of the {counted(len(file.runs), 'run')} that it was learned from"
-        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these alone"))
+        some = f"only {sum(learned)} of the {counted(len(file.runs), 'run')} learned from are given"
+        skipped.append(Skipped(str(path), f"{some}; coverage is that of a signature of these runs only"))
     classes, served = [], set()
     for current, first in signatures:
         own = [i for i, (item, _) in enumerate(pairs) if current.motion.matches(item.motion, SPEED_TOLERANCE)]
@@ -244,12 +244,12 @@ check_signature = by_keywords(CheckOptions, check_by)
 
 
 def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
-    """The rule as the file uses it: with the safety factor that a budget set, and for any number of runs."""
+    """Return the rule as used by the file: with the safety factor set by a budget, and for any number of runs."""
     return replace(cast(Signature, file.rule), safety_factor=current.safety_factor, force=True)
 
 
 def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
-    """What the work gives; None without runs, or where they are too few, which is named."""
+    """Return the result of the work; None without runs, or if there are too few, which is reported."""
     if not pairs:
         return None
     try:
@@ -299,10 +299,10 @@ def update_by(path: str | Path, options: UpdateOptions) -> Updated:
     """
     forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
-        raise UsageError(f"forget is {forget:g}", "an effective number of runs above 1, e.g. 20 to 50")
+        raise UsageError(f"forget is {forget:g}", "give an effective number of runs above 1, e.g. 20 to 50")
     for name, value in (("cap", cap), ("reserve", reserve)):
         if not value > 0.0:
-            raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
+            raise UsageError(f"{name} is {value:g}", "give a number of spreads above 0")
     machine_file = options.machine_file()
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
@@ -328,11 +328,11 @@ update_with_runs = by_keywords(UpdateOptions, update_by)
 
 
 def _cut(file: SignatureFile, operations: str | None) -> str:
-    """How logs are cut: as for learning, since a stroke cut otherwise would be taken for another one."""
+    """Return how logs are cut: as for learning, since strokes cut differently are not comparable."""
     if operations not in (None, file.operations):
         raise SignatureError(
             f"{file.source}: learned from logs cut by '{file.operations}', not by '{operations}'",
-            "leave --operations out, or learn another signature",
+            "omit --operations, or learn another signature",
         )
     return file.operations
 
@@ -342,7 +342,7 @@ def _with_operation(
 ) -> SignatureFile:
     run = learned_run(operation)
     if any((item.sha256, item.operation) == (run.sha256, run.operation) for item in file.runs):
-        raise SignatureError("this run is in the signature already")
+        raise SignatureError("this run is already in the signature")
     detection = detect_operation(operation, machine, detector, file.current, file.activation, file.joints)
     if detection.verdict.outcome == "alarm":
         raise SignatureError(f"alarm at {detection.verdict.alarms[0].time:.3f} s: not an impact-free run")

@@ -1,1 +1,1 @@
-"""`cdtool study`: which sensor sees an impact first, before a machine is built."""
+"""`cdtool study`: rank the sensors by when they detect an impact, before a machine is built."""

@@ -1,4 +1,4 @@
-"""Which sensor sees an impact first, before a machine is built: what `cdtool study` does."""
+"""Rank the sensors by when they detect an impact, before a machine is built: the work of `cdtool study`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from cdtool.workflows.study.study_file import read_study
 
 @dataclass(frozen=True)
 class SensorStudy:
-    """The ranking for one joint of a machine, and in words what was assumed because neither file nor option gave it.
+    """The ranking for one joint of a machine, and the assumptions made for values that were not given.
 
-    `waves` says whether the load counts as rigid in this impact (thesis 3.1.4); None where its first natural frequency
-    is not given.
+    `waves` states whether the load counts as rigid in this impact (thesis 3.1.4); None without its first natural
+    frequency.
     """
 
     machine: str

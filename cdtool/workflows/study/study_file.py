@@ -1,6 +1,7 @@
-"""A machine and a study file -> the impact to simulate and the sensors to rank; every value that is not given is said.
+"""Read the impact to simulate and the sensors to rank from a machine and a study file; defaults are reported.
 
-All on the load side. A rotary axis is taken at the contact: with the lever l inertia J/l^2, ratio n l, stiffness k/l^2.
+All values are on the load side. A rotary axis is referred to the contact: with the lever l inertia J/l^2, ratio n l,
+stiffness k/l^2.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class Study:
-    """What is simulated and looked at, the load's first natural frequency [Hz] if it is known, and what was assumed."""
+    """What to simulate and rank, the load's first natural frequency [Hz] if known, and the assumptions made."""
 
     joint: str
     case: ImpactCase
@@ -42,19 +43,19 @@ class Study:
 def read_study(
     machine: MachineFile, file: str | Path | None, joint: str = "", options: Mapping[str, float] | None = None
 ) -> Study:
-    """The impact and the sensors; `options` by key (impact.speed) win over the file.
+    """Read the impact and the sensors; `options` by key (impact.speed) override the file.
 
-    Raises UsageError, ConfigurationError naming file and key; without the inertias nothing can be said.
+    Raises UsageError, or ConfigurationError naming file and key; the inertias are required.
     """
     options = options or {}
     for name, value in options.items():
         if not 0.0 < value < math.inf:
-            raise UsageError(f"{name} is {value:g}", "a number above 0 is needed")
+            raise UsageError(f"{name} is {value:g}", "give a number above 0")
     root = Table(_merged(read_toml(Path(file)) if file else {}, options), str(file or "study"))
     reader = StudyReader(root)
     part = _studied_joint(machine, joint, reader)
     case = _case(part, reader)
-    frequency = reader.optional("impact", "first_frequency", "the load is rigid but for its drive")
+    frequency = reader.optional("impact", "first_frequency", "the load is rigid except for its drive")
     sensors = _sensors(part, reader)
     reader.finish()
     return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
@@ -75,12 +76,12 @@ def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
     stiffness = reader.number("impact", "stiffness", 5e5, "N/m", above=0.0)
     factor = reader.number("impact", "damping_factor", 0.0, "s/m", minimum=0.0)
     obstacle = HuntCrossley(stiffness, factor * stiffness, 1.0)
-    window = reader.number("impact", "window", 0.5, "s", "how long to look", above=0.0)
+    window = reader.number("impact", "window", 0.5, "s", "length of the simulation", above=0.0)
     angular = 2.0 * math.pi * _DRIVE_FREQUENCY
-    why = f"the load swings at {_DRIVE_FREQUENCY:g} Hz on the drive while the motor stands"
+    why = f"the load oscillates at {_DRIVE_FREQUENCY:g} Hz on the drive with the motor at rest"
     default = part.load_mass * angular**2 * part.square
     drive = reader.number("drive", "stiffness", default, part.unit("N/m"), why, above=0.0) / part.square
-    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that swing", minimum=0.0)
+    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that oscillation", minimum=0.0)
     square = part.ratio**2
     transmission = ElasticTransmission(
         part.motor_inertia,
@@ -96,8 +97,8 @@ def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
         unit = part.unit("N")
         limit, steady = (value / part.ratio * part.lever for value in (controller.torque_limit, needed))
         raise UsageError(
-            f"controller.force_limit is {limit:.4g} {unit}, steady motion takes {steady:.4g} {unit}",
-            "a larger limit, or less friction or speed",
+            f"controller.force_limit is {limit:.4g} {unit}, but steady motion requires {steady:.4g} {unit}",
+            "use a larger limit, or less friction or speed",
         )
     return ImpactCase(transmission, controller, obstacle, speed, window)
 
@@ -114,7 +115,7 @@ def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
     filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative", above=0.0)
     table = reader.table("controller")
     slew = table.number("slew_limit", above=0.0) if "slew_limit" in table else math.inf
-    limit = reader.optional("controller", "force_limit", "nothing stops the drive") or math.inf
+    limit = reader.optional("controller", "force_limit", "the drive is not stopped") or math.inf
     to_motor, to_torque = part.ratio**2 / part.square, part.ratio / part.lever
     return SpeedController(
         0.0,
@@ -131,10 +132,10 @@ def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
 def _sensors(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, ...]:
     """Return the sensors from the contact to the controller, with stated or assumed noise, steps and filters.
 
-    An encoder counts as two: the motor's position and its speed.
+    An encoder counts as two sensors: the motor's position and its speed.
     """
     lever = part.lever
-    why = f"what accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
+    why = f"accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
     rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why, above=0.0) / lever
     torque = (part, reader, rated, lever)
     return (
@@ -174,7 +175,7 @@ def _accelerometer(reader: StudyReader) -> Sensor:
     bandwidth = reader.number(table, "bandwidth", 100.0, "Hz", above=0.0)
     density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)", minimum=0.0)
     vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms", minimum=0.0)
-    # A first-order low-pass lets noise of pi/2 times its corner through.
+    # A first-order low-pass has a noise bandwidth of pi/2 times its corner frequency.
     noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
     resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g", minimum=0.0)
     rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
@@ -187,7 +188,7 @@ def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
     rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
     bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference", above=0.0)
     speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed", minimum=0.0)
-    noise = reader.number(table, "position_noise", 0.0, "m", "scatter of the impact-free position", minimum=0.0)
+    noise = reader.number(table, "position_noise", 0.0, "m", "variation of the impact-free position", minimum=0.0)
     step = 2.0 * math.pi * part.ratio / counts
     return (
         Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
@@ -199,8 +200,8 @@ def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
 class StudiedJoint:
     """A joint referred to the contact: `load_mass` [kg], `motor_inertia` [kg m2], `ratio` [m/rad], `motor_friction`.
 
-    `motor_friction` is at the motor [N m s/rad]. A rotary joint is hit `lever` l [m] from its axis, so that its inertia
-    there is J/l^2 and its ratio n l; of a linear one the lever is 1.
+    `motor_friction` is at the motor [N m s/rad]. The contact with a rotary joint is at `lever` l [m] from its axis, so
+    its inertia there is J/l^2 and its ratio n l; the lever of a linear joint is 1.
     """
 
     name: str
@@ -213,42 +214,41 @@ class StudiedJoint:
 
     @property
     def square(self) -> float:
-        """l^2 [m2]: a stiffness of the joint [N m/rad] over it is that at the contact [N/m]."""
+        """Return l^2 [m2]: a joint stiffness [N m/rad] divided by it is that at the contact [N/m]."""
         return self.lever**2
 
     @property
     def mass(self) -> float:
-        """Load and motor together at the contact [kg]."""
+        """Return the mass of load and motor at the contact [kg]."""
         return self.load_mass + self.motor_inertia / self.ratio**2
 
     def unit(self, linear: str) -> str:
-        """The load-side unit: N/m of a linear axis is N m/rad of a rotary one."""
+        """Return the load-side unit: N/m of a linear axis is N m/rad of a rotary one."""
         return linear.replace("/m", "/rad").replace("N", "N m") if self.rotary else linear
 
 
 def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> StudiedJoint:
-    """The joint `wanted` ("" where there is only one) of any machine with joints.
+    """Return the joint `wanted` ("" if there is only one) of a machine with joints.
 
-    Of an arm or a robot, whose joints are coupled, the others are taken to stand: the inertia is the diagonal of M.
-    Raises UsageError for an unknown joint and a lever that is missing or without meaning, ConfigurationError where an
-    inertia is missing.
+    For an arm or a robot with coupled joints, the others are assumed at rest: the inertia is the diagonal of M. Raises
+    UsageError for an unknown joint and a missing or meaningless lever, ConfigurationError for a missing inertia.
     """
     machine = file.machine
     if not isinstance(machine, Axis | CoupledMachine) or machine.load_units not in (LINEAR_UNITS, ROTARY_UNITS):
         raise ConfigurationError(
-            f"{file.path}: no joint of this machine can be studied", "its joints have to turn all or slide all"
+            f"{file.path}: no joint of this machine can be studied", "its joints must all rotate or all slide"
         )
     if not wanted and len(machine.joints) > 1:
         names = ", ".join(machine.joints)
-        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"name one with --joint: {names}")
+        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"select one with --joint: {names}")
     if wanted and wanted not in machine.joints:
         raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
     at = machine.joints.index(wanted) if wanted else 0
     load, motor = _load_inertia(machine, at), machine.motor_inertia[at]
     key = machine.inertia_key if isinstance(machine, Axis) else "the load's inertia"
-    needs = "a study needs the inertias of load and motor"
+    needs = "a study requires the inertias of load and motor"
     if machine.coordinates == "load":
-        needs += ", so coordinates = 'motor' with motor_inertia and transmission_ratio"
+        needs += ": set coordinates = 'motor' with motor_inertia and transmission_ratio"
     for name, value in ((key, load), ("motor_inertia", motor)):
         if value <= 0.0:
             raise ConfigurationError(f"{file.path}: machine.{name} is missing or 0", needs)
@@ -256,13 +256,13 @@ def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> Studi
     lever = _lever(machine, rotary, reader)
     if not isinstance(machine, Axis):
         inertia = f"{load:.4g} {'kg m2' if rotary else 'kg'}"
-        reader.assumed.append(f"the other joints stand: {inertia} at {machine.joints[at]}, without its motor")
+        reader.assumed.append(f"the other joints are at rest: {inertia} at {machine.joints[at]}, without its motor")
     ratio = abs(machine.transmission_ratio[at]) * lever
     return StudiedJoint(machine.joints[at], load / lever**2, motor, ratio, machine.viscous_friction[at], lever, rotary)
 
 
 def _load_inertia(machine: Axis | CoupledMachine, at: int) -> float:
-    """Without the motor [kg m2, kg]; of coupled joints on the diagonal of M, at home."""
+    """Return the inertia without the motor [kg m2, kg]; for coupled joints the diagonal of M in the home position."""
     if isinstance(machine, Axis):
         return machine.load_inertia[at]
     return float(machine.nominal_inertia[at] - machine.reflected_inertia[at])
@@ -272,36 +272,36 @@ def _lever(machine: JointMachine, rotary: bool, reader: StudyReader) -> float:
     given = "lever" in reader.table("impact")
     if not rotary:
         if given:
-            raise UsageError("a lever is given for a linear axis", "it belongs to a rotary axis")
+            raise UsageError("a lever is given for a linear axis", "use it only for a rotary axis")
         return 1.0
     if not given and not isinstance(machine, Axis):
-        raise UsageError("no lever is given", "--lever: how far from the joint's axis the contact is [m]")
+        raise UsageError("no lever is given", "give --lever, the distance from the joint's axis to the contact [m]")
     return reader.number("impact", "lever", 1.0, "m", "contact to axis", above=0.0)
 
 
 class StudyReader:
-    """Tables by their names; `assumed` has a line for every default that was taken."""
+    """Tables by their names; `assumed` has a line for every default used."""
 
     def __init__(self, root: Table) -> None:
         self._tables = {"": root}
         self.assumed: list[str] = []
 
     def table(self, name: str) -> Table:
-        """A table such as sensors.encoder, always the same one."""
+        """Return a table such as sensors.encoder, always the same object."""
         if name not in self._tables:
             above, _, last = name.rpartition(".")
             self._tables[name] = self.table(above).table(last)
         return self._tables[name]
 
     def number(self, table: str, key: str, default: float, unit: str, why: str = "", **bounds: float) -> float:
-        """A number of a table; the default is told with its reason."""
+        """Return a number of a table; a default is reported with its reason."""
         part = self.table(table)
         if key not in part:
             self.assumed.append(f"{table}.{key} = {default:.4g} {unit}".rstrip() + (f": {why}" if why else ""))
         return part.number(key, default, **bounds)
 
     def optional(self, table: str, key: str, none: str) -> float | None:
-        """A positive number that may be absent; then it is told what its absence means."""
+        """Return a positive number that may be missing; the consequence of a missing one is reported."""
         part = self.table(table)
         if key in part:
             return part.number(key, above=0.0)
@@ -309,6 +309,6 @@ class StudyReader:
         return None
 
     def finish(self) -> None:
-        """Raise ConfigurationError if a key of any table is left that nobody asked for."""
+        """Raise ConfigurationError if a table has a key that was not read."""
         for table in self._tables.values():
             table.finish()

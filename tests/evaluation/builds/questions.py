@@ -1,4 +1,4 @@
-"""What is asked of two made-up builds."""
+"""The questions in a comparison of two made-up builds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two builds: what is shown, what is not, what is paired, and what is refused."""
+"""Comparison of two builds: shown changes, pairing and refusals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.made_up.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
 from tests.report.hostile import HOSTILE
 
 
-def test_a_shift_of_every_latency_is_told_with_its_size_both_ways():
+def test_a_shift_of_every_latency_is_shown_with_its_size_in_both_directions():
     old = latencies()
     slower = [x + 5.0 for x in old]
     worse, better = compare_builds(single(old), single(slower)), compare_builds(single(slower), single(old))
@@ -42,15 +42,15 @@ def test_the_interval_of_a_change_is_the_same_in_both_directions():
     assert f"faster by {-back.value:.1f} ms ({-back.high:.1f} to {-back.low:.1f})" in words
 
 
-def test_equal_results_show_no_change_and_say_that_all_is_the_same():
+def test_equal_results_show_no_change_and_are_reported_as_identical():
     results = single(latencies(), false_alarms={KEY: 2})
     found = compare_builds(results, single(latencies(), false_alarms={KEY: 2}, benchmark_sha256="another"))
     assert found.verdict == "no change shown" and not found.changed and not found.notes
     assert row_of(found).words == "no change shown (every latency is the same)"
-    assert compare_builds(results, results).words == "no change shown: both files hold the same results"
+    assert compare_builds(results, results).words == "no change shown: both files contain the same results"
 
 
-def test_no_change_shown_tells_the_change_that_would_have_been():
+def test_no_change_shown_states_the_detectable_change():
     old = latencies()
     noise = latencies(mean=0.0, std=3.0, seed=4)
     found = compare_builds(
@@ -59,7 +59,7 @@ def test_no_change_shown_tells_the_change_that_would_have_been():
     assert found.verdict == "no change shown" and found.asked == 1
     least = detectable_difference(30, float(np.std(noise, ddof=1)), 0.8, 0.95)
     assert asked(found, "latency_ms").detectable == pytest.approx(least, rel=1e-3)
-    assert row_of(found).words == f"no change shown (a change of {least:.1f} ms would have been)"
+    assert row_of(found).words == f"no change shown (a change of {least:.1f} ms would have been shown)"
 
 
 def test_a_change_of_the_size_said_to_be_shown_is_shown_in_some_80_of_100():
@@ -73,7 +73,7 @@ def test_a_change_of_the_size_said_to_be_shown_is_shown_in_some_80_of_100():
 
 
 @pytest.mark.parametrize("n", [10, 25])
-def test_the_unpaired_change_that_would_have_been_shown_is_what_so_many_impacts_are_planned_for(n):
+def test_the_detectable_unpaired_change_agrees_with_the_planned_sample_size(n):
     drawn = np.random.default_rng(6).normal(size=n)
     standard = 40.0 + 3.0 * (drawn - drawn.mean()) / drawn.std(ddof=1)
     old, new = (single(x.tolist(), force=None, bytes_of=b, names=b) for x, b in ((standard, "a"), (standard, "b")))
@@ -109,7 +109,7 @@ def test_misses_that_only_one_build_has_do_not_touch_the_latency_of_the_others()
     assert latency.old == pytest.approx(np.mean(old[5:]))
 
 
-def test_a_pair_that_one_build_cannot_assess_is_counted_apart():
+def test_a_pair_not_assessable_in_one_build_is_counted_separately():
     old = [*latencies(30), BLIND, MISSED]
     new = [BLIND, *latencies(30)[1:], BLIND, MISSED]
     found = compare_builds(single(old), single(new))
@@ -117,10 +117,10 @@ def test_a_pair_that_one_build_cannot_assess_is_counted_apart():
     assert row.one_not_assessable == 1 and row.pairs == 32
     assert asked(found, "latency_ms").old_of == 29 and asked(found, "missed").old_of == 30
     assert (asked(found, "not_assessable").old, asked(found, "not_assessable").new) == (1, 2)
-    assert row.words.endswith("; 1 of 32 contacts apart: one build could not assess them")
+    assert row.words.endswith("; 1 of 32 contacts not assessable in one of the builds")
 
 
-def test_a_build_that_has_become_blind_is_worse():
+def test_a_build_that_can_no_longer_assess_is_worse():
     found = compare_builds(single(latencies()), single([BLIND] * 30))
     assert found.verdict == "worse"
     assert "nothing is assessable: not assessable 30 of 30, before 0 of 30" in row_of(found).words
@@ -142,7 +142,7 @@ def test_an_impact_free_group_says_how_many_false_alarms_would_have_been_shown()
     old = build({}, holdout=["momentum"])
     found = compare_builds(old, build({}, holdout=["momentum"], benchmark_sha256="another"))
     least = int(asked(found, "false_alarms").detectable)
-    assert row_of(found).words == f"no change shown ({least} false alarms instead of 0 would have been)"
+    assert row_of(found).words == f"no change shown ({least} false alarms instead of 0 would have been shown)"
     shown = {
         count: compare_builds(
             old, build({}, holdout=["momentum"], false_alarms={("momentum", "holdout"): count})
@@ -172,22 +172,24 @@ def test_the_misses_that_would_have_been_shown_are_the_least_that_are(other):
         assert asked(compare_builds(old, new), "missed").outcome == outcome, count
 
 
-def test_where_even_all_misses_would_show_nothing_it_is_said():
+def test_if_even_all_misses_would_show_nothing_this_is_stated():
     old = single([MISSED] * 2 + latencies(9), force=None)
     assert asked(compare_builds(old, single(latencies(11), force=None)), "missed").detectable == math.inf
 
 
-def test_a_detector_that_watched_nothing_has_no_false_alarms_to_compare():
+def test_a_detector_without_monitored_time_has_no_false_alarms_to_compare():
     found = compare_builds(single(latencies(), hours=1.0), single(latencies(), hours=0.0))
-    assert asked(found, "false_alarms").reason == "nothing was watched in one of them"
+    assert asked(found, "false_alarms").reason == "nothing was monitored in one of them"
 
 
-def test_operations_that_one_build_cannot_judge_count_where_there_are_no_contacts():
+def test_operations_not_assessable_in_one_build_count_without_contacts():
     old = build({}, holdout=["momentum"])
     new = replace(old, exposure=tuple(replace(item, not_assessable=40) for item in old.exposure))
     found = compare_builds(old, new)
     assert found.verdict == "worse"
-    assert row_of(found).words.startswith("nothing is assessable: not assessable 40 of 40, before 0 of 40 (by chance")
+    assert row_of(found).words.startswith(
+        "nothing is assessable: not assessable 40 of 40, before 0 of 40 (probability by chance"
+    )
 
 
 def test_all_questions_are_corrected_together():
@@ -227,11 +229,11 @@ def test_a_stricter_level_shows_less():
 
 
 @pytest.mark.parametrize(("unpaired", "n"), [(False, 4), (True, 3)])
-def test_too_few_recordings_to_show_anything_are_said_to_be_so(unpaired, n):
+def test_too_few_recordings_to_show_anything_are_reported(unpaired, n):
     other = {"bytes_of": "other", "names": "x"} if unpaired else {}
     found = compare_builds(single(latencies(n)), single([x + 100.0 for x in latencies(n)], **other))
     assert found.words == "inconclusive: this sample is too small to detect any change"
-    assert "too few recordings for 2 questions" in row_of(found).words
+    assert "too few recordings for 2 tests" in row_of(found).words
     assert row_of(found).words.startswith("inconclusive: latency ")
     assert asked(found, "latency_ms").detectable == math.inf
 
@@ -272,7 +274,7 @@ def test_a_recording_is_the_partner_of_one_only():
     swapped = (replace(first, sha256=second.sha256), replace(second, recording="stiff/new.csv", sha256="new"), *others)
     found = compare_builds(old, replace(new, recordings=swapped))
     assert row_of(found).pairs == 29
-    assert found.notes[0].startswith("stiff: 29 recordings are paired; 1 that only old holds and 1 that only new holds")
+    assert found.notes[0].startswith("stiff: 29 recordings are paired; 1 only in old and 1 only in new")
 
 
 def test_a_converted_recording_with_more_contacts_is_another_one():
@@ -286,7 +288,7 @@ def test_other_bytes_are_paired_by_name_where_the_onset_is_within_its_uncertaint
     new = single([x + 5.0 for x in latencies()], bytes_of="converted", begins=ONSET + moved * UNCERTAINTY)
     found = compare_builds(single(latencies()), new)
     assert row_of(found).paired is paired
-    assert found.notes == (() if paired else ("stiff: unpaired, the recordings are others (30 and 30)",))
+    assert found.notes == (() if paired else ("stiff: unpaired, the recordings differ (30 and 30)",))
 
 
 def test_some_onsets_that_agree_by_chance_do_not_choose_the_contacts():
@@ -296,13 +298,13 @@ def test_some_onsets_that_agree_by_chance_do_not_choose_the_contacts():
     assert not row_of(found).paired and asked(found, "latency_ms").old_of == 30
 
 
-def test_recordings_that_only_one_build_holds_are_counted_and_left_out_of_the_pairs():
+def test_recordings_of_only_one_build_are_counted_and_not_paired():
     more = single([*latencies(), *[500.0] * 10])
     found = compare_builds(single(latencies()), more)
     row = row_of(found)
     assert found.verdict == "no change shown" and (row.pairs, row.old_contacts, row.new_contacts) == (30, 30, 40)
     (note,) = found.notes
-    assert note.startswith("stiff: 30 recordings are paired; 0 that only old holds and 10 that only new holds")
+    assert note.startswith("stiff: 30 recordings are paired; 0 only in old and 10 only in new")
 
 
 def test_other_contacts_in_the_same_bytes_are_refused():
@@ -336,7 +338,7 @@ def test_other_rules_are_refused_by_their_key(key):
     value, words = OTHER_RULES[key]
     with pytest.raises(ConfigurationError, match=words) as fault:
         compare_builds(single(latencies()), single(latencies(), **{key: value}))
-    assert "run one of them again" in fault.value.hint
+    assert "run one again" in fault.value.hint
 
 
 def test_what_is_under_test_may_differ_and_is_listed():
@@ -376,7 +378,7 @@ def test_results_from_a_file_are_compared_with_results_in_memory(tmp_path):
     assert compare_builds(read_results(tmp_path / "results.json"), results).verdict == "no change shown"
 
 
-def test_what_only_one_file_holds_is_named_and_not_compared():
+def test_content_of_only_one_file_is_named_and_not_compared():
     old = build({KEY: latencies(), ("pure_torque", "stiff"): latencies(), ("momentum", "soft"): latencies()})
     new = build({KEY: latencies(), ("energy", "stiff"): latencies(), ("momentum", "wet"): latencies()})
     found = compare_builds(old, new)
@@ -385,7 +387,7 @@ def test_what_only_one_file_holds_is_named_and_not_compared():
     assert found.only_new == ("detector energy", "group wet")
 
 
-def test_a_detector_that_gave_no_figures_in_a_group_of_one_build_is_named():
+def test_a_detector_without_results_in_a_group_of_one_build_is_named():
     old = build({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
     lost = replace(
         old,

@@ -1,4 +1,4 @@
-"""The likely cause of an alarm, and what left its normal band first: on logs that are shipped, with known changes."""
+"""The likely cause of an alarm, and the first departures, on sample logs with known changes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def explained(
     detector: str = "momentum",
     activation: Activation = NINE,
 ) -> AlarmExplanation:
-    """The first alarm of a detector against a constant limit."""
+    """Return the first alarm of a detector with a constant limit."""
     file = machine(folder)
     (operation,) = operations_of(recording)
     instance = file.detector(detector)
@@ -77,7 +77,7 @@ def changed(recording: Recording, channel: str, change: Callable[[np.ndarray, np
 
 
 def glitch(recording: Recording, height: float, start: float = 4.0, length: float = 0.006) -> Recording:
-    """The speed is off by `height` for `length` from `start` [s]; downward it looks to an observer like a contact."""
+    """Change the speed by `height` for `length` from `start` [s]; downward, an observer sees a contact."""
 
     def added(time: np.ndarray, values: np.ndarray) -> np.ndarray:
         values[(time >= start) & (time < start + length), 0] += height
@@ -98,7 +98,7 @@ def test_a_joint_that_is_stopped_is_not_within_its_usual_range(arm):
     assert not any("speed of arm" in line or "torque" in line.split("forearm")[0] for line in usual)
 
 
-def test_every_channel_that_left_its_band_is_told_with_value_mean_spread_and_unit(gate):
+def test_every_channel_outside_its_band_is_listed_with_value_mean_spread_and_unit(gate):
     item = explained("gate", log("gate", "stiff/03.csv"), gate, 300.0)
     first = next(found for found in item.moved if found.channel == "acceleration")
     assert first.unit == "m/s2" and abs(first.value - first.mean) > 5.0 * first.spread > 0.0
@@ -132,7 +132,7 @@ def test_a_speed_that_the_position_confirms_is_no_glitch(gate):
     assert item.cause.kind is not CauseKind.SPEED_GLITCH
 
 
-def test_the_load_cell_is_no_input_of_the_cause(gate):
+def test_the_load_cell_is_not_an_input_of_the_cause(gate):
     whole = log("gate", "stiff/03.csv")
     bare = whole.without_ground_truth()
     wild = changed(whole, "force", lambda time, _: 1e4 * np.sin(40.0 * time)[:, np.newaxis])
@@ -148,7 +148,7 @@ def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number
         gone = (series.time > 4.0) & (series.time < 4.021)
         parts[name] = replace(series, time=series.time[~gone], values=series.values[~gone])
     lost = replace(clean, channels=parts)
-    # An alarm that comes 10 ms after the gap whatever the signal is: every sample from there on is outside.
+    # An alarm 10 ms after the gap, independent of the signal: every later sample is outside.
     after = int(np.searchsorted(lost["torque"].time, 4.031))
     low = changed(lost, "torque", lambda _, values: values)
     file = machine("gate")
@@ -164,7 +164,7 @@ def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number
     assert all(math.isnan(found.time) or found.time > item.alarm.time for found in item.moved)
 
 
-def test_a_quiet_channel_is_told_as_within_its_usual_range_with_its_numbers(gate):
+def test_a_channel_within_its_usual_range_is_listed_with_its_numbers(gate):
     clean = log("gate", "holdout/03.csv")
     item = explained("gate", glitch(clean, -0.02), gate, 255.0, activation=Activation(2))
     torque = next(found for found in item.moved if found.channel == "torque")
@@ -182,24 +182,24 @@ def test_a_torque_that_is_off_from_the_start_is_never_called_usual(gate):
 @pytest.mark.parametrize(
     ("absent", "told"),
     [
-        (Absence.BY_HAND, "with limits set by hand nothing was learned"),
-        (Absence.OLDER_FILE, "learn it again with cdtool learn-signature"),
+        (Absence.BY_HAND, "limits set by hand are not learned"),
+        (Absence.OLDER_FILE, "relearn it with cdtool learn-signature"),
         (Absence.FEW_RUNS, "too few impact-free runs"),
     ],
 )
-def test_without_impact_free_runs_it_says_what_it_compares_with_and_why(absent, told):
+def test_without_impact_free_runs_the_comparison_and_its_reason_are_stated(absent, told):
     item = explained("gate", log("gate", "stiff/03.csv"), NormalMotions((), absent), 300.0)
     assert item.absent is absent and item.runs == 0
     text = " ".join(words(item))
-    assert "Nothing to compare with: " in text and "this log's own past alone" in text and told in text
-    # Nothing was learned, so nothing is called normal, and the next step is named.
-    assert "usual range" not in text and "normal" not in text.replace("holds no normal motion", "")
+    assert "No impact-free runs to compare with: " in text and "this log's own past" in text and told in text
+    # Nothing was learned, so nothing is called normal, and the next step is given.
+    assert "usual range" not in text and "normal" not in text.replace("has no normal motion", "")
     assert item.cause.kind is CauseKind.CONTACT and "Likely cause: a contact: speed of gate" in text
-    assert "learn" in text.partition("Nothing to compare with")[2]
+    assert "learn" in text.partition("No impact-free runs to compare with")[2]
 
 
-def test_a_speed_that_wanders_within_its_band_departs_where_it_bends(gate):
-    # The speed is up to half of its limit off for 60 ms before this contact, and falls from 35 ms after it on.
+def test_a_drifting_speed_within_its_band_departs_at_the_bend(gate):
+    # The speed deviates by up to half of its limit for 60 ms before this contact, and falls 35 ms after it.
     item = explained("gate", log("gate", "stiff/04.csv"), gate, 300.0)
     speed = next(each for each in item.moved if each.channel == "speed")
     assert 0.03 <= speed.time - 5.939 <= 0.05
@@ -207,7 +207,7 @@ def test_a_speed_that_wanders_within_its_band_departs_where_it_bends(gate):
 
 
 @pytest.mark.parametrize("wandering", [0.3, 0.45, 0.5, 0.6])
-def test_a_departure_after_a_slow_wandering_begins_where_its_course_bends(wandering):
+def test_a_departure_after_a_slow_drift_begins_at_the_bend(wandering):
     time = np.arange(0.0, 1.0, 1e-3)
     noise = 0.02 * np.random.default_rng(1).normal(size=len(time))
     shares = noise + np.clip(wandering * (time - 0.2) / 0.4, 0.0, wandering) + np.maximum(time - 0.8, 0.0) * 20.0
@@ -216,7 +216,7 @@ def test_a_departure_after_a_slow_wandering_begins_where_its_course_bends(wander
     assert time[began] == pytest.approx(0.8, abs=0.012)
 
 
-def test_a_stroke_of_another_speed_is_compared_with_no_class_that_was_learned(gate):
+def test_a_stroke_at_another_speed_is_not_compared_with_a_learned_class(gate):
     (normal,) = gate.motions
     faster = NormalMotions((replace(normal, motion=replace(normal.motion, nominal_speed=0.5)),))
     item = explained("gate", log("gate", "stiff/03.csv"), faster, 300.0)

@@ -1,4 +1,4 @@
-"""No explanation of a shipped impact log names a departure before the contact: nothing departs there."""
+"""No explanation of a sample impact log names a departure before the contact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why an alarm came and why a contact was missed: figures that can be worked out by hand."""
+"""Why an alarm was raised and why a contact was missed, with numbers that can be calculated by hand."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def detection(
     threshold: Any = None,
     activation: Activation = NINE,
 ) -> Detection:
-    """A statistic (n,) or (n, J) against hand-set limits, judged as the pipeline does."""
+    """A statistic (n,) or (n, J) with limits set by hand, assessed as in the pipeline."""
     columns = values.reshape(len(time), -1)
     joints = ("hip", "knee")[: columns.shape[1]]
     given = {"torque": columns, **{name: np.column_stack([part] * len(joints)) for name, part in channels.items()}}
@@ -56,7 +56,7 @@ def matching(item: Detection, *contacts: Contact) -> Matching:
 
 
 def pulse(start: int, count: int, height: float = 1.5, rest: float = 0.2) -> np.ndarray:
-    """Samples start to start + count - 1 at a height, all others at rest."""
+    """Samples start to start + count - 1 at a height, all others at zero."""
     values = np.full(len(TIME), rest)
     values[start : start + count] = height
     return values
@@ -64,7 +64,7 @@ def pulse(start: int, count: int, height: float = 1.5, rest: float = 0.2) -> np.
 
 @dataclass(frozen=True)
 class Upper:
-    """A one-sided band: 2 + k * 0.5 above, nothing below."""
+    """A one-sided band: 2 + k * 0.5 above, unlimited below."""
 
     safety_factor: float = 4.0
 
@@ -94,7 +94,7 @@ def test_with_one_limit_the_share_counts_from_the_middle_of_the_band():
     assert margin.margin[:4] == pytest.approx([0.0, 1.0, 3.0, 2.0])
 
 
-def test_a_sample_that_is_not_judged_has_no_margin_and_says_why():
+def test_a_sample_not_assessable_has_no_margin_but_a_reason():
     status = np.zeros(len(TIME))
     status[10] = Status.START_UP
     (margin,) = joint_margins(detection(np.zeros(len(TIME)), status=status))
@@ -102,9 +102,9 @@ def test_a_sample_that_is_not_judged_has_no_margin_and_says_why():
     assert math.isnan(moment.margin) and math.isnan(moment.share) and moment.reason == "start-up"
 
 
-def test_an_alarm_is_traced_to_the_sample_that_left_the_band_for_good():
+def test_an_alarm_is_traced_to_the_last_exit_from_the_band():
     values = pulse(3020, 200)
-    values[3010:3013] = 1.5  # three samples outside, then back: not yet for good
+    values[3010:3013] = 1.5  # three samples outside, then inside again: not the last exit
     item = detection(values)
     (alarm,) = item.verdict.alarms
     found = explain_alarm(item, alarm, NINE, CONTACT)
@@ -121,7 +121,7 @@ def test_missing_samples_are_skipped_as_the_activation_skips_them():
     found = explain_alarm(item, alarm, NINE)
     assert (found.left, found.skipped) == (pytest.approx(3.020), 2)
     assert alarm.time == pytest.approx(3.030)
-    status[3025] = Status.NOT_APPLICABLE  # breaks the succession
+    status[3025] = Status.NOT_APPLICABLE  # interrupts the sequence
     item = detection(pulse(3020, 200), status=status)
     found = explain_alarm(item, item.verdict.alarms[0], NINE)
     assert (found.left, found.skipped) == (pytest.approx(3.026), 0)
@@ -143,8 +143,8 @@ def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(s
         assert (np.abs(values[inside][marks == Status.VALID]) > 1.0).all()
 
 
-def test_the_margin_is_told_at_fixed_times_before_the_alarm_and_at_the_onset():
-    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is that at 3.080
+def test_the_margin_is_given_at_fixed_times_before_the_alarm_and_at_the_onset():
+    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is at 3.080 s
     (alarm,) = item.verdict.alarms
     found = explain_alarm(item, alarm, NINE, CONTACT)
     after = [round(1e3 * (moment.time - alarm.time)) for moment in found.moments]
@@ -167,7 +167,7 @@ def test_a_slow_signal_gives_each_sample_once():
     assert [moment.time for moment in found.moments] == pytest.approx([0.9, 0.94, 0.98, 1.0])
 
 
-def test_a_miss_tells_how_near_it_came_for_how_long_and_when():
+def test_a_miss_states_its_closest_approach_with_duration_and_time():
     values = pulse(3040, 5)
     values[3060:3080] = 0.9
     values[3050] = -1.7
@@ -179,7 +179,7 @@ def test_a_miss_tells_how_near_it_came_for_how_long_and_when():
     assert (near.longest, near.outside_from) == pytest.approx((5, 3.04))
     assert near.held == pytest.approx(0.9)
     assert math.isnan(near.latched_from)
-    assert any("5 consecutive samples outside; 9 are needed" in line for line in words(found))
+    assert any("5 consecutive samples outside; 9 are required" in line for line in words(found))
 
 
 def test_a_limit_just_below_the_share_that_was_held_would_have_alarmed_and_one_above_not():
@@ -195,7 +195,7 @@ def test_a_limit_just_below_the_share_that_was_held_would_have_alarmed_and_one_a
     assert not detection(values, (2.0 * held * (1.0 + 1e-9),), status=status).verdict.alarms
 
 
-def test_the_joint_that_came_nearest_is_told_first_and_one_without_a_limit_not_at_all():
+def test_the_nearest_joint_is_listed_first_and_one_without_a_limit_is_omitted():
     values = np.column_stack((pulse(3040, 30, 0.6), pulse(3040, 30, 0.8)))
     item = detection(values, (1.0, 1.0))
     (found,) = explain(item, matching(item, CONTACT), NINE)
@@ -210,17 +210,17 @@ def test_the_joint_that_came_nearest_is_told_first_and_one_without_a_limit_not_a
     assert isinstance(found, MissExplanation) and [near.joint for near in found.approaches] == ["hip"]
 
 
-def test_a_statistic_that_is_outside_since_before_the_contact_is_told_as_such():
+def test_a_statistic_outside_since_before_the_contact_is_reported():
     item = detection(pulse(2900, 600))
     early, missed = explain(item, matching(item, CONTACT), NINE)
     assert isinstance(early, AlarmExplanation) and early.role == "false alarm"
     assert isinstance(missed, MissExplanation) and missed.outcome == "missed"
     assert missed.approaches[0].latched_from == pytest.approx(2.9)
     assert missed.approaches[0].longest == 0
-    assert any("outside the band since 2.900 s already" in line for line in words(missed))
+    assert any("already outside the band since 2.900 s" in line for line in words(missed))
 
 
-def test_what_could_not_be_judged_is_told_by_share_and_a_blind_contact_by_its_reason():
+def test_unassessable_samples_are_given_by_share_and_an_unassessable_contact_by_reason():
     status = np.zeros(len(TIME))
     status[3000:3250] = Status.START_UP
     item = detection(np.full(len(TIME), 0.2), status=status)
@@ -277,7 +277,7 @@ def test_an_alarm_that_is_latched_still_explains_the_contact_it_detected():
     assert [part.role for part in found if isinstance(part, AlarmExplanation)] == ["false alarm", "detection"]
 
 
-def test_a_miss_that_no_threshold_judged_has_no_approach():
+def test_a_miss_without_a_threshold_has_no_approach():
     item = detection(np.zeros(len(TIME)))
     status = np.full(item.statistic.values.shape, Status.NO_LIMIT, dtype=np.uint8)
     bare = replace(item, threshold=None, statistic=replace(item.statistic, status=status))
@@ -292,13 +292,13 @@ def test_the_words_name_joint_limit_debounce_and_what_moved_first():
     (found,) = explain(item, matching(item, CONTACT), NINE, inputs=("torque",))
     assert words(found) == [
         "alarm at 3.028 s, 28 ms after the contact (onset at 3.000 s, load cell)",
-        "hip: above its upper limit, 1.5 against 1 N m. It left the band for good 20 ms after the onset, 8 ms before "
-        "the alarm, which needs 9 consecutive samples outside.",
+        "hip: above its upper limit, 1.5 against 1 N m. Last exit from the band 20 ms after the onset, 8 ms before "
+        "the alarm (debounce: 9 consecutive samples outside).",
         "Likely cause: not clear.",
-        "Nothing to compare with: with limits set by hand nothing was learned; learn a signature with cdtool "
-        "learn-signature and give it with --signature. Until then what follows is against this log's own past alone.",
+        "No impact-free runs to compare with: limits set by hand are not learned from runs; learn a signature with "
+        "cdtool learn-signature and give it with --signature. Compared with this log's own past instead.",
         "Moved first: acceleration down 5 ms after the onset, torque up 20 ms.",
-        "The first that momentum reads: torque, 20 ms after the onset.",
+        "First input of momentum: torque, 20 ms after the onset.",
     ]
 
 
@@ -312,7 +312,7 @@ def test_a_reference_that_moves_first_points_to_the_command():
     assert not any("command" in line for line in words(answered))
 
 
-def test_what_moves_after_the_alarm_is_told_apart():
+def test_movement_after_the_alarm_is_listed_separately():
     item = detection(pulse(3020, 200), channels={"speed": 0.2 - 2.0 * np.clip(TIME - 3.1, 0.0, None)})
     (found,) = explain(item, matching(item, CONTACT), NINE)
     assert "After the alarm: speed down 101 ms after the onset." in words(found)

@@ -1,4 +1,4 @@
-"""Which channel moved first: on channels whose steps are known, and on the simulated gate."""
+"""The first channel to move, on channels with known steps and on the simulated gate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ONSET = 3.0
 
 
 def kink(at: float, slope: float, noise: float, seed: int) -> np.ndarray:
-    """Noise on a slow line whose slope changes at a known time."""
+    """Noise on a slow ramp whose slope changes at a known time."""
     rng = np.random.default_rng(seed)
     return 0.3 * TIME + slope * np.clip(TIME - at, 0.0, None) + noise * rng.normal(size=len(TIME))
 
@@ -56,7 +56,7 @@ def test_channels_come_in_the_order_of_their_known_changes_with_time_and_directi
     assert (found[3].reason, math.isnan(found[3].time)) == ("no departure found", True)
 
 
-def test_a_change_outside_the_stretch_that_is_looked_at_is_not_told():
+def test_a_change_outside_the_analysed_interval_is_not_reported():
     assert "torque" not in moved(which_moved_first(THREE, "axis", ONSET, after=0.1))
     late = recording(torque=step(2.9, 5.0, 0.1, 1))
     assert moved(which_moved_first(late, "axis", 3.3)) == {}
@@ -111,18 +111,18 @@ def test_a_channel_without_any_value_says_so():
     assert found.reason == "too few samples"
 
 
-def test_a_log_with_half_a_second_before_the_event_still_tells():
+def test_half_a_second_before_the_event_is_sufficient():
     found = moved(which_moved_first(THREE.between(2.5, 5.0), "axis", ONSET))
     assert list(found) == ["acceleration", "speed", "torque"]
 
 
-def test_neither_load_cell_nor_label_is_looked_at():
+def test_load_cell_and_label_are_not_used():
     truth = {"force": Series(TIME, step(2.99, 900.0, 1.0, 5), "N"), "label": Series(TIME, 1.0 * (TIME > 3.0), "1")}
     with_truth = replace(THREE, channels={**THREE.channels, **truth})
     assert which_moved_first(with_truth, "axis", ONSET) == which_moved_first(THREE, "axis", ONSET)
 
 
-def test_a_joint_is_told_alone_and_the_whole_machine_joint_by_joint():
+def test_a_joint_is_listed_alone_and_the_whole_machine_joint_by_joint():
     torque = np.column_stack((step(3.05, 5.0, 0.1, 6), step(3.02, -5.0, 0.1, 7)))
     robot = Recording("r", "r", ("hip", "knee"), {"torque": Series(TIME, torque, "N m")})
     (alone,) = which_moved_first(robot, "hip", ONSET)

@@ -1,4 +1,4 @@
-"""The file of force limits: what ships, and what is refused."""
+"""The file of force limits: its shipped content, and refused content."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_file_of_the_user_replaces_the_shipped_one(tmp_path):
         ("at_most_n = 80", "at_most_n = 0", r"door.steps\[1\].at_most_n", "above 0"),
         ("at_most_n = 80", "at_most_n = inf", r"door.steps\[1\].at_most_n", "above 0"),
         ("at_most_n = 80", "at_most = 80", r"door.steps\[1\].at_most_n: is missing", "number"),
-        ('"clamped"', '"impact"', r"door.steps\[1\].name: 'impact' names two steps", "own"),
+        ('"clamped"', '"impact"', r"door.steps\[1\].name: 'impact' names two steps", "different"),
         ('"clamped" }', '"clamped", unit = "N" }', r"door.steps\[1\].unit: unknown key", "at_most_n"),
         ("[door]", "limit = 3\n[door]", "limit: is 3", "table"),
         ("[door]", "[door", "not valid TOML", ""),

@@ -1,4 +1,4 @@
-"""Force curves that were kept belong to their contact's verdict, from the beginning of the contact on."""
+"""Stored force curves match their contact's verdict, from the beginning of the contact."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.traced import force_profiles, traced_forces
 from cdtool.evaluation.force.verdict import judge
@@ -27,15 +27,15 @@ PROFILE = ForceProfile("gap", "A gap", "a standard", False, STEPS)
 def scored(recording: Recording, contacts: list[Contact]) -> Results:
     """The rows of one log, every contact detected after 30 ms by one detector."""
     log = RecordingResult(recording.name, "stiff", "", 1.0, 1, len(contacts))
-    courses = {i: force_course(recording, contact) for i, contact in enumerate(contacts, 1)}
-    verdicts = {i: judge(course, PROFILE) for i, course in courses.items()}
+    curves = {i: force_time_curve(recording, contact) for i, contact in enumerate(contacts, 1)}
+    verdicts = {i: judge(curve, PROFILE) for i, curve in curves.items()}
     late = [
         ContactResult(
             recording.name, "stiff", "direct", None, item.start, 0.0, None, 30.0, "detected", None, None, contact=i
         )
         for i, item in enumerate(contacts, 1)
     ]
-    rows = tuple(force_rows(log, verdicts, courses))
+    rows = tuple(force_rows(log, verdicts, curves))
     provenance = {"force_profiles": {"stiff": asdict(PROFILE)}}
     return Results(provenance, ("direct",), ("stiff",), tuple(late), (), (), forces=rows)
 
@@ -55,14 +55,14 @@ def contacts(hit: Recording) -> list[Contact]:
 
 
 def test_a_kept_curve_is_the_contacts_force_with_its_verdict_and_alarms(hit, contacts):
-    results, course = scored(hit, contacts), force_course(hit, contacts[0])
+    results, curve = scored(hit, contacts), force_time_curve(hit, contacts[0])
     (found,) = traced_forces(results, [traced(hit, contacts)])
     assert (found.recording, found.group, found.contact) == (hit.name, "stiff", 1)
     assert found.time[0] >= 0.0 and np.all(np.diff(found.time) > 0.0)
-    assert found.force.max() == pytest.approx(course.peak, rel=0.01)
-    assert np.interp(found.time, course.time, course.force) == pytest.approx(found.force, abs=2.0)
+    assert found.force.max() == pytest.approx(curve.peak, rel=0.01)
+    assert np.interp(found.time, curve.time, curve.force) == pytest.approx(found.force, abs=2.0)
     assert found.alarms == {"direct": pytest.approx(0.03)}
-    verdict = judge(course, PROFILE)
+    verdict = judge(curve, PROFILE)
     assert [step.outcome for step in found.verdict.steps] == [step.outcome for step in verdict.steps]
     assert found.verdict.time_budget == pytest.approx(verdict.time_budget)
     assert found.verdict.steps[0].peak_at == pytest.approx(verdict.steps[0].peak_at, abs=0.02)

@@ -1,4 +1,4 @@
-"""Pass, fail and not assessable: one test, and several at one point."""
+"""Pass, fail and not assessable, for one test and for several at one point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
 from cdtool.evaluation.force.verdict import ForceVerdict, averaged, judge
 from cdtool.recording import FloatArray
@@ -24,26 +24,26 @@ TIME = np.arange(6001) * 1e-3
 ORDER = ("fail", "not_assessable", "pass")
 
 
-def course(force: FloatArray, time: FloatArray = TIME, clipped: FloatArray | None = None) -> ForceCourse:
+def curve(force: FloatArray, time: FloatArray = TIME, clipped: FloatArray | None = None) -> ForceTimeCurve:
     stuck = np.zeros(len(time), dtype=bool) if clipped is None else clipped
-    return ForceCourse(time, force, stuck, float(time[-1]))
+    return ForceTimeCurve(time, force, stuck, float(time[-1]))
 
 
-def leaf(scale: float = 1.0) -> ForceCourse:
+def leaf(scale: float = 1.0) -> ForceTimeCurve:
     phase = RATE * TIME
-    return course(scale * np.where(phase < np.pi, PEAK * np.sin(phase), 0.0))
+    return curve(scale * np.where(phase < np.pi, PEAK * np.sin(phase), 0.0))
 
 
-def pressing(first: float, then: float = 0.0, last: float = 0.0) -> ForceCourse:
-    """A push of constant force in each step of the gate's profiles."""
-    return course(np.select([TIME < 0.75, TIME < 5.0], [first, then], last))
+def pressing(first: float, then: float = 0.0, last: float = 0.0) -> ForceTimeCurve:
+    """A constant force in each step of the gate's profiles."""
+    return curve(np.select([TIME < 0.75, TIME < 5.0], [first, then], last))
 
 
 def outcomes(verdict: ForceVerdict) -> list[str]:
     return [item.outcome for item in verdict.steps]
 
 
-def test_a_rigid_leaf_of_620_kg_leaves_4_ms_to_stay_below_400_n_and_14_ms_below_1400_n():
+def test_a_rigid_leaf_of_620_kg_exceeds_400_n_after_4_ms_and_1400_n_after_14_ms():
     for profile, budget in ((GAP, 4.0085e-3), (WIDE, 14.398e-3)):
         verdict = judge(leaf(), profile)
         assert outcomes(verdict) == ["fail", "pass", "pass"]
@@ -62,16 +62,16 @@ def test_a_force_at_the_limit_passes_and_just_above_it_fails():
     assert outcomes(judge(pressing(400.1, 150.1, 25.1), GAP)) == ["fail", "fail", "fail"]
 
 
-def test_a_limit_that_comes_to_hold_under_load_is_exceeded_from_that_moment():
+def test_a_limit_that_starts_under_load_is_exceeded_from_its_start():
     verdict = judge(pressing(300.0, 300.0), GAP)
     assert outcomes(verdict) == ["pass", "fail", "pass"]
     assert verdict.time_budget == 0.75
     assert judge(pressing(500.0), GAP).time_budget == 0.0
 
 
-def test_a_record_that_ends_early_is_not_assessable_where_it_is_silent():
+def test_a_record_that_ends_early_is_not_assessable_after_its_end():
     short = TIME <= 1.2
-    verdict = judge(course(pressing(100.0).force[short], TIME[short]), GAP)
+    verdict = judge(curve(pressing(100.0).force[short], TIME[short]), GAP)
     assert outcomes(verdict) == ["pass", "not_assessable", "not_assessable"]
     assert verdict.outcome == "not_assessable"
     assert verdict.reason == "static: the record ends 1.2 s after the onset, the limit holds until 5 s"
@@ -81,42 +81,42 @@ def test_a_record_that_ends_early_is_not_assessable_where_it_is_silent():
 
 def test_a_record_that_reaches_the_end_of_a_step_to_a_sample_is_whole():
     short = TIME < 0.75
-    assert judge(course(pressing(100.0).force[short], TIME[short]), GAP).steps[0].outcome == "pass"
+    assert judge(curve(pressing(100.0).force[short], TIME[short]), GAP).steps[0].outcome == "pass"
 
 
-def test_what_is_exceeded_fails_although_the_record_ends_and_samples_are_missing():
+def test_an_exceeded_limit_fails_despite_missing_samples():
     kept = (TIME < 0.3) & ((TIME < 0.01) | (TIME > 0.03))
-    verdict = judge(course(leaf().force[kept], TIME[kept]), GAP)
+    verdict = judge(curve(leaf().force[kept], TIME[kept]), GAP)
     assert verdict.steps[0].outcome == verdict.outcome == "fail"
 
 
 def test_missing_samples_make_a_step_not_assessable_and_only_that_one():
     kept = (TIME < 2.0) | (TIME > 2.1)
-    verdict = judge(course(pressing(100.0).force[kept], TIME[kept]), GAP)
+    verdict = judge(curve(pressing(100.0).force[kept], TIME[kept]), GAP)
     assert outcomes(verdict) == ["pass", "not_assessable", "pass"]
     assert verdict.steps[1].reason == "load-cell samples are missing for 102 ms"
 
 
 def test_samples_that_are_missing_over_a_boundary_concern_both_steps():
     kept = (TIME < 0.7) | (TIME > 0.8)
-    verdict = judge(course(pressing(100.0).force[kept], TIME[kept]), GAP)
+    verdict = judge(curve(pressing(100.0).force[kept], TIME[kept]), GAP)
     assert outcomes(verdict) == ["not_assessable", "not_assessable", "pass"]
 
 
-def test_behind_missing_samples_the_time_budget_is_counted_from_where_they_begin():
+def test_after_missing_samples_the_time_budget_counts_from_their_beginning():
     kept = (TIME <= 0.002) | (TIME > 0.020)
-    assert judge(course(leaf().force[kept], TIME[kept]), GAP).time_budget == pytest.approx(0.002)
+    assert judge(curve(leaf().force[kept], TIME[kept]), GAP).time_budget == pytest.approx(0.002)
 
 
 def test_a_cell_at_its_stop_below_the_limit_is_not_assessable_and_above_it_fails():
     true = leaf(0.3)  # 1056 N
     for stop, expected in ((800.0, "not_assessable"), (3000.0, "pass")):
         force = np.minimum(true.force, stop)
-        verdict = judge(course(force, clipped=force >= stop), WIDE)
+        verdict = judge(curve(force, clipped=force >= stop), WIDE)
         assert outcomes(verdict) == [expected, "pass", "pass"]
     force = np.minimum(true.force, 800.0)
-    assert judge(course(force, clipped=force >= 800.0), GAP).steps[0].outcome == "fail"
-    assert "at its stop, 800 N, below" in judge(course(force, clipped=force >= 800.0), WIDE).reason
+    assert judge(curve(force, clipped=force >= 800.0), GAP).steps[0].outcome == "fail"
+    assert "at its stop, 800 N, below" in judge(curve(force, clipped=force >= 800.0), WIDE).reason
 
 
 def test_a_step_between_two_samples_is_not_assessable():
@@ -133,11 +133,11 @@ masks = arrays(np.bool_, 61)
 limits = st.lists(st.floats(1.0, 700.0), min_size=3, max_size=3)
 
 
-def random_course(force: FloatArray, kept: FloatArray, stuck: FloatArray) -> ForceCourse:
+def random_curve(force: FloatArray, kept: FloatArray, stuck: FloatArray) -> ForceTimeCurve:
     time = np.arange(61) * 0.1
     kept = kept.copy()
     kept[0] = True
-    return ForceCourse(time[kept], force[kept], stuck[kept], 6.0)
+    return ForceTimeCurve(time[kept], force[kept], stuck[kept], 6.0)
 
 
 def with_limits(values: Sequence[float]) -> ForceProfile:
@@ -148,7 +148,7 @@ def with_limits(values: Sequence[float]) -> ForceProfile:
 @given(forces, masks, masks, limits, st.lists(st.floats(1.0, 3.0), min_size=3, max_size=3))
 @settings(deadline=None)
 def test_a_higher_limit_never_makes_a_verdict_worse(force, kept, stuck, low, factors):
-    tested = random_course(force, kept, stuck)
+    tested = random_curve(force, kept, stuck)
     strict = judge(tested, with_limits(low))
     mild = judge(tested, with_limits([value * factor for value, factor in zip(low, factors, strict=True)]))
     for before, after in zip(strict.steps, mild.steps, strict=True):
@@ -160,8 +160,8 @@ def test_a_higher_limit_never_makes_a_verdict_worse(force, kept, stuck, low, fac
 @given(forces, masks, masks, limits, st.sampled_from([0.125, 2.0, 1024.0]))
 @settings(deadline=None)
 def test_scaling_force_and_limits_together_changes_nothing(force, kept, stuck, low, factor):
-    one = judge(random_course(force, kept, stuck), with_limits(low))
-    other = judge(random_course(force * factor, kept, stuck), with_limits([value * factor for value in low]))
+    one = judge(random_curve(force, kept, stuck), with_limits(low))
+    other = judge(random_curve(force * factor, kept, stuck), with_limits([value * factor for value in low]))
     assert outcomes(one) == outcomes(other)
     assert [item.time_budget for item in one.steps] == pytest.approx([item.time_budget for item in other.steps])
     assert one.utilisation == pytest.approx(other.utilisation)
@@ -170,7 +170,7 @@ def test_scaling_force_and_limits_together_changes_nothing(force, kept, stuck, l
 @given(forces, masks, masks, limits)
 @settings(deadline=None)
 def test_a_step_fails_exactly_where_a_sample_exceeds_it_and_its_budget_lies_within_it(force, kept, stuck, low):
-    tested = random_course(force, kept, stuck)
+    tested = random_curve(force, kept, stuck)
     profile = with_limits(low)
     for i, verdict in enumerate(judge(tested, profile).steps):
         inside = (tested.time >= verdict.step.from_s) & (tested.time < profile.ends(i))
@@ -205,9 +205,9 @@ def test_fewer_tests_than_are_averaged_are_not_assessable_and_more_are_all_avera
     assert averaged([], GAP).outcome == "not_assessable"
 
 
-def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails():
+def test_an_unassessable_test_makes_a_step_unassessable_unless_its_mean_fails():
     short = TIME <= 1.2
-    cut = judge(course(pressing(100.0, 600.0).force[short], TIME[short]), with_limits([400.0, 700.0, 25.0]))
+    cut = judge(curve(pressing(100.0, 600.0).force[short], TIME[short]), with_limits([400.0, 700.0, 25.0]))
     whole = judge(pressing(100.0, 100.0), with_limits([400.0, 700.0, 25.0]))
     point = averaged([whole, whole, cut], with_limits([400.0, 700.0, 25.0]))
     assert [item.outcome for item in point.steps] == ["pass", "not_assessable", "not_assessable"]
@@ -215,12 +215,12 @@ def test_a_test_that_could_not_be_assessed_spoils_a_step_unless_its_mean_fails()
     assert np.isnan(point.steps[2].force)
     lower = with_limits([400.0, 650.0, 25.0])
     loud = judge(pressing(100.0, 900.0), lower)
-    cut = judge(course(pressing(100.0, 600.0).force[short], TIME[short]), lower)
+    cut = judge(curve(pressing(100.0, 600.0).force[short], TIME[short]), lower)
     assert cut.steps[1].outcome == "not_assessable"
     assert averaged([loud, loud, cut], lower).steps[1].outcome == "fail"
 
 
-def test_where_each_test_counts_by_itself_the_highest_is_judged_and_nothing_is_averaged_away():
+def test_without_averaging_the_highest_test_counts():
     face = profile_of(read_force_limits(), "iso_ts_15066_face")
     tests = [judge(pressing(force), face) for force in (10.0, 10.0, 70.0)]
     point = averaged(tests, face)
@@ -228,8 +228,8 @@ def test_where_each_test_counts_by_itself_the_highest_is_judged_and_nothing_is_a
     assert (point.steps[0].force, point.note) == (70.0, "highest of 3 tests")
     assert averaged(tests[:1], face).note == "highest of 1 test"
     short = TIME <= 0.3
-    cut = judge(course(pressing(10.0).force[short], TIME[short]), face)
-    late = judge(course(np.where(TIME < 0.5, 0.0, 80.0)), face)
+    cut = judge(curve(pressing(10.0).force[short], TIME[short]), face)
+    late = judge(curve(np.where(TIME < 0.5, 0.0, 80.0)), face)
     assert averaged([cut, late], face).steps[1].outcome == "fail"
 
 

@@ -1,8 +1,8 @@
-"""BCa intervals, against R 4.2.2 with boot 1.3-28.1.
+"""BCa intervals, compared with R 4.2.2 with boot 1.3-28.1.
 
 R: b <- boot(data, statistic, R = 199999), set.seed(1), then the BCa formula with the acceleration from leaving one
-cluster out and, as scipy does, with resamples that equal the statistic counted by half for the bias. (boot.ci counts
-them not at all, which moves the median's interval.)
+cluster out. For the bias, resamples equal to the statistic count half, as in scipy. (boot.ci does not count them, which
+shifts the median's interval.)
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def test_a_higher_level_gives_a_longer_interval():
 def test_five_thousand_contacts_take_little_memory():
     values = np.random.default_rng(1).lognormal(3.4, 0.5, 5000)
     bca(values[:3], range(3), "mean", resamples=1)
-    with noted(5.0):  # some 0.5 s
+    with noted(5.0):  # about 0.5 s
         bca(values, range(5000), "mean")
     tracemalloc.start()
     bca(values, range(5000), "median", resamples=999)
@@ -132,12 +132,12 @@ def test_five_thousand_contacts_take_little_memory():
     ("values", "clusters", "statistic", "said"),
     [
         ([1.0, 2.0], [0, 1], "avarage", "unknown statistic 'avarage'"),
-        ([1.0, 2.0], [0], "mean", "do not fit"),
+        ([1.0, 2.0], [0], "mean", "do not match"),
         ([1.0, math.nan], [0, 1], "mean", "missing or infinite"),
         ([1.0, math.inf], [0, 1], "mean", "missing or infinite"),
     ],
 )
-def test_wrong_arguments_are_told(values, clusters, statistic, said):
+def test_wrong_arguments_are_reported(values, clusters, statistic, said):
     with pytest.raises(UsageError, match=said) as fault:
         bca(values, clusters, statistic)
     assert fault.value.hint

@@ -1,7 +1,7 @@
-"""Quantiles of latencies of which some are missed, against R 4.2.2 with survival 3.5-3.
+"""Quantiles of latencies with missed contacts, compared with R 4.2.2 with survival 3.5-3.
 
-R: s <- survfit(Surv(time, event) ~ 1, conf.type = "log-log"); quantile(s, p); s$surv, s$lower, s$upper. Where R gives
-NA for a limit that is never passed, the interval is open (infinite).
+R: s <- survfit(Surv(time, event) ~ 1, conf.type = "log-log"); quantile(s, p); s$surv, s$lower, s$upper. If R returns NA
+for a limit that is never crossed, the interval is open (infinite).
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def test_a_detection_comes_before_a_miss_at_the_same_time():
     assert curve.share.tolist() == [1.0, 0.5]
 
 
-def test_nothing_watched_gives_nothing_known():
+def test_without_observation_nothing_is_known():
     quantile = latency_quantile([], [], 0.5)
     assert not quantile.known and math.isnan(quantile.low) and math.isnan(quantile.high)
     assert survival([], []).share.tolist() == [1.0]
@@ -152,7 +152,7 @@ def test_neither_order_nor_unit_of_time_matters(pairs, random, share):
 
 
 @given(LATENCIES, st.sampled_from([0.1, 0.25, 0.5, 0.75, 0.9, 0.95]))
-def test_the_interval_holds_the_value_and_a_later_quantile_is_not_earlier(pairs, share):
+def test_the_interval_contains_the_value_and_a_higher_quantile_is_not_earlier(pairs, share):
     latency, missed = columns(pairs)
     quantile = latency_quantile(latency, missed, share)
     later = latency_quantile(latency, missed, min(0.99, share + 0.1))
@@ -173,14 +173,14 @@ def test_a_detection_that_becomes_a_miss_makes_no_quantile_earlier(pairs, which)
 @pytest.mark.parametrize(
     ("latency", "missed", "share", "level", "said"),
     [
-        ([1.0, 2.0], [False], 0.5, 0.95, "do not fit"),
+        ([1.0, 2.0], [False], 0.5, 0.95, "do not match"),
         ([1.0, math.nan], [False, True], 0.5, 0.95, "missing or below 0"),
         ([-1.0], [False], 0.5, 0.95, "missing or below 0"),
-        ([1.0], [False], 95, 0.95, "quantile asked for is 95"),
+        ([1.0], [False], 95, 0.95, "quantile is 95"),
         ([1.0], [False], 0.5, 95, "confidence level is 95"),
     ],
 )
-def test_wrong_arguments_are_told(latency, missed, share, level, said):
+def test_wrong_arguments_are_reported(latency, missed, share, level, said):
     with pytest.raises(UsageError, match=said) as fault:
         latency_quantile(latency, missed, share, level)
     assert fault.value.hint

@@ -1,4 +1,4 @@
-"""Comparisons of detectors and builds, against R 4.2.2 (calls named beside the figures) and Fisher's own figure."""
+"""Comparisons of detectors and builds, checked with R 4.2.2 (calls next to the numbers) and Fisher's own result."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.paired import fisher_p, holm, mcnemar_p, paired_difference, unpaired_difference
 
-# Darwin's maize: height of the crossed less that of the self-fertilised plant of a pair, eighths of an inch
+# Darwin's maize: height of the crossed minus that of the self-fertilised plant of a pair, eighths of an inch
 # (Fisher, The Design of Experiments, 1935): 863 of the 32768 sign patterns give a sum as large; two-sided twice that.
 DARWIN = [49, -67, 8, 16, 6, 23, 28, 41, 14, 29, 56, 24, 75, 60, -48]
 DARWIN_P = 1726 / 32768
-# R's data set `sleep` (Student 1908): hours gained with the second drug less those with the first.
+# R's data set `sleep` (Student 1908): hours gained with the second drug minus those with the first.
 SLEEP = [1.2, 2.4, 1.3, 1.3, 0.0, 1.0, 1.8, 0.8, 4.6, 1.4]
 UNTIED = [1.1, -2.3, 3.9, 5.2, 0.4, 6.1, 2.7, -0.8]
 # Recordings of several contacts: sums 8, 3, 6, 4, -1, 18.
@@ -60,7 +60,7 @@ def test_signed_ranks_are_rs():
 
 
 def test_the_contacts_of_a_recording_change_sign_together():
-    # 2 of the 2^6 sign patterns of the sums reach 38 (themselves, and with -1 turned round); both sides: 4 of 64.
+    # 2 of the 2^6 sign patterns of the sums reach 38 (themselves, and with -1 inverted); both sides: 4 of 64.
     values, recording = flat(RECORDINGS)
     found = paired_difference(values, recording)
     assert found.p == 4 / 64
@@ -77,7 +77,7 @@ def test_no_difference_at_all_is_no_evidence():
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_one_recording_or_none_says_nothing(number):
+def test_one_recording_or_none_is_no_evidence(number):
     values = [3.0] * number
     for found in (
         paired_difference(values, range(number)),
@@ -167,7 +167,7 @@ def test_holms_correction_keeps_the_order_and_lies_between_p_and_bonferroni(p_va
     ("call", "said"),
     [
         (lambda: paired_difference([1.0, math.nan], [0, 1]), "missing or infinite"),
-        (lambda: paired_difference([1.0], [0, 1]), "do not fit"),
+        (lambda: paired_difference([1.0], [0, 1]), "do not match"),
         (lambda: unpaired_difference([1.0], [math.inf], [0], [0]), "missing or infinite"),
         (lambda: unpaired_difference([1.0], [1.0], [0], [0], level=5.0), "confidence level is 5"),
         (lambda: mcnemar_p(-1, 2), "only_first is -1"),
@@ -175,7 +175,7 @@ def test_holms_correction_keeps_the_order_and_lies_between_p_and_bonferroni(p_va
         (lambda: holm([0.5, 1.5]), "outside 0 to 1"),
     ],
 )
-def test_impossible_arguments_are_told(call, said):
+def test_impossible_arguments_are_reported(call, said):
     with pytest.raises(UsageError, match=said) as fault:
         call()
     assert fault.value.hint

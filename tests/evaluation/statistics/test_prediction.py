@@ -1,4 +1,4 @@
-"""The predicted chance of the next maximum: against Student's closed form, and right on average."""
+"""The predicted probability of the next maximum: Student's closed form, and correct on average."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_higher_limit_is_exceeded_no_more_often(n, one, other):
     assert prediction.chance_above(high) <= prediction.chance_above(low)
 
 
-def test_more_runs_of_the_same_kind_make_the_prediction_surer_up_to_the_tail_itself():
+def test_more_runs_of_the_same_kind_make_the_prediction_more_certain():
     chances = [Prediction(n, 2.5, 0.6).chance_above(5.0) for n in (5, 10, 20, 40, 100, MOST_RUNS)]
     assert chances == sorted(chances, reverse=True)
     rng = np.random.default_rng(1)
@@ -61,7 +61,7 @@ def test_more_runs_of_the_same_kind_make_the_prediction_surer_up_to_the_tail_its
     assert chances[-1] == pytest.approx(np.mean(2.5 + 0.6 * drawn_once > 5.0), rel=0.15)
 
 
-def test_the_runs_needed_are_the_fewest_that_keep_the_chance():
+def test_the_runs_required_are_the_fewest_that_meet_the_probability():
     needed = Prediction(14, 2.5, 0.7).runs_for(5.5, 1e-3)
     assert needed is not None and 20 < needed < 100
     assert Prediction(needed, 2.5, 0.7).chance_above(5.5) <= 1e-3 < Prediction(needed - 1, 2.5, 0.7).chance_above(5.5)

@@ -1,4 +1,4 @@
-"""Exact intervals of rare events, against R 4.2.2: poisson.test and binom.test, for "at most" alternative = "less"."""
+"""Exact intervals of rare events, compared with R 4.2.2: poisson.test and binom.test, one-sided with "less"."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_interval_of_no_event_is_two_sided_since_the_one_sided_bound_would_n
     assert binomial_share(0, 30).high == pytest.approx(1.0 - 0.025 ** (1 / 30), rel=1e-9)
 
 
-def test_nothing_watched_leaves_everything_open():
+def test_without_observation_the_interval_is_unbounded():
     for interval, high in (
         (poisson_rate(0, 0.0), math.inf),
         (poisson_rate(2, 0.0), math.inf),
@@ -127,7 +127,7 @@ def test_two_rates_are_compared_as_in_r():
         (lambda: poisson_difference_p(1, -1.0, 1, 1.0), "exposure is -1"),
     ],
 )
-def test_impossible_arguments_are_told(call, said):
+def test_impossible_arguments_are_reported(call, said):
     with pytest.raises(UsageError, match=said) as fault:
         call()
     assert fault.value.hint

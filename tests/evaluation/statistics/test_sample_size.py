@@ -1,4 +1,4 @@
-"""How large a test must be, against R 4.2.2: power.t.test(delta, sd, power, type, strict = TRUE)$n, rounded up."""
+"""Sample sizes, compared with R 4.2.2: power.t.test(delta, sd, power, type, strict = TRUE)$n, rounded up."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_that_exposure_just_shows_the_rate(rate, allowed):
         (lambda: exposure_for_rate(0.1, -1), "number of events is -1"),
     ],
 )
-def test_impossible_arguments_are_told(call, said):
+def test_impossible_arguments_are_reported(call, said):
     with pytest.raises(UsageError, match=said) as fault:
         call()
     assert fault.value.hint

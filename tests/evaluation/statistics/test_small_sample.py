@@ -1,4 +1,4 @@
-"""Below ten contacts: no interval of a mean, and one of the median only where it holds what it says."""
+"""Below ten contacts: no interval of a mean, and one of the median only if it has its coverage."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_differences_of_few_recordings_have_a_p_and_no_interval():
 @pytest.mark.parametrize("n", range(6, 10))
 def test_the_ranks_of_the_median_hold_it_in_95_of_100_samples_of_any_distribution(n):
     rank = median_rank(n)
-    # Every pattern of below and above the median is as likely: the interval fails where too few lie on one side.
+    # All patterns of below and above the median are equally likely: the interval fails if too few are on one side.
     held = [rank <= sum(pattern) <= n - rank for pattern in product((0, 1), repeat=n)]
     assert np.mean(held) >= 0.95
     narrower = [rank + 1 <= sum(pattern) <= n - rank - 1 for pattern in product((0, 1), repeat=n)]
@@ -65,7 +65,7 @@ def test_below_six_contacts_no_ranks_do_and_there_is_no_interval(n):
 
 
 @pytest.mark.parametrize("n", range(4, 10))
-def test_what_is_shown_of_few_contacts_with_slow_cases_holds_what_it_says(n):
+def test_the_interval_of_few_contacts_with_slow_cases_has_its_coverage(n):
     rng, held, shown, total = np.random.default_rng(n), 0, 0, 1500
     for _ in range(total):
         values = mixture(rng, n)
@@ -74,7 +74,7 @@ def test_what_is_shown_of_few_contacts_with_slow_cases_holds_what_it_says(n):
         shown += not math.isnan(interval.low)
         held += interval.low <= MIXTURE_MEDIAN <= interval.high
     assert shown == (total if n >= 6 else 0)
-    # 0.95 less three standard errors of 1500 tests.
+    # 0.95 minus three standard errors of 1500 tests.
     assert not shown or held / shown >= 0.933
 
 
@@ -85,10 +85,10 @@ def test_a_missed_contact_is_later_than_all_in_the_upper_bound_and_counts_from_i
     assert (early.low, early.high) == (12.0, math.inf)
 
 
-def test_contacts_of_one_recording_are_alike_so_that_few_recordings_give_no_interval():
+def test_correlated_contacts_of_few_recordings_have_no_interval():
     found = median_of(np.arange(30) + 20.0, [False] * 30, np.arange(30) % 5)
     assert math.isnan(found.low) and found.value == 34.5
-    assert "there are 5, and contacts of one recording are alike" in found.reason
+    assert "there are 5, and contacts of one recording are correlated" in found.reason
     assert not math.isnan(median_of(np.arange(30) + 20.0, [False] * 30, np.arange(30) % 10).low)
 
 

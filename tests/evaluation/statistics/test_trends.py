@@ -1,4 +1,4 @@
-"""Drift, step or neither: rank tests against closed forms, and how often steady values show something."""
+"""Drift, step or neither: rank tests compared with closed forms, and the false-positive rate on steady values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def noise(seed: int, n: int = 40) -> np.ndarray:
 def test_a_line_has_its_slope_and_the_least_p_of_so_few_runs():
     trend = trend_of(3.0 + 0.5 * np.arange(6.0), np.arange(6))
     assert (trend.slope.value, trend.slope.low, trend.slope.high) == pytest.approx((0.5, 0.5, 0.5))
-    assert trend.p == pytest.approx(2.0 / 720.0)  # one order of 6 runs rises all along, one falls
+    assert trend.p == pytest.approx(2.0 / 720.0)  # one order of 6 runs only rises, one only falls
     assert trend.at(4.0) == pytest.approx(5.0)
 
 
@@ -36,13 +36,13 @@ def test_a_missing_run_neither_shifts_the_slope_nor_the_step():
 
 def test_pettitts_statistic_is_that_of_all_pairs():
     values = noise(4, 25)
-    signs = np.sign(values[np.newaxis, :] - values[:, np.newaxis])  # of each later less each earlier
+    signs = np.sign(values[np.newaxis, :] - values[:, np.newaxis])  # each later minus each earlier value
     pairs = [abs(signs[:t, t:].sum()) for t in range(1, 25)]
     largest = max(pairs)
     assert pettitt_p(values) == pytest.approx(min(1.0, 2.0 * np.exp(-6.0 * largest**2 / (25**3 + 25**2))))
 
 
-def test_a_drift_is_told_as_a_drift_and_a_step_as_a_step():
+def test_a_drift_is_reported_as_a_drift_and_a_step_as_a_step():
     drift, step = course_of(noise(2) + 0.1 * RUNS), course_of(noise(2) + 4.0 * (RUNS >= 22))
     assert (drift.kind, step.kind) == ("drift", "step")
     assert drift.trend.slope.low < 0.1 < drift.trend.slope.high
@@ -75,14 +75,14 @@ def test_equal_values_and_few_runs_are_steady():
     st.floats(-1.0, 1.0),
     st.integers(1, 50),
 )
-def test_the_quick_look_says_what_the_course_says(values, slope, comparisons):
+def test_the_quick_check_agrees_with_the_full_test(values, slope, comparisons):
     given_values = np.array(values) + slope * np.arange(len(values))
     assert may_change(given_values, comparisons) == (course_of(given_values, comparisons).kind != "steady")
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000), st.floats(-0.2, 0.2), st.floats(-9.0, 9.0))
-def test_mirrored_values_have_the_mirrored_course(seed, slope, shift):
+def test_mirrored_values_have_the_mirrored_trend(seed, slope, shift):
     values = noise(seed, 20) + slope * np.arange(20)
     one, other = course_of(values + shift), course_of(-values)
     assert one.kind == other.kind

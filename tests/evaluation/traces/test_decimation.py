@@ -1,4 +1,4 @@
-"""What is left of a series after decimation draws as the whole would."""
+"""A decimated series draws the same as the whole one."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_least_largest_first_and_last_value_stay_and_the_size_is_bounded(values,
 
 
 @given(series, pixels)
-def test_what_is_kept_are_samples_and_a_gap_stays_a_gap(values, pixels):
+def test_kept_values_are_samples_and_a_gap_stays_a_gap(values, pixels):
     time = clock(values)
     kept = kept_samples(time, values, pixels)
     assert np.all(np.diff(kept) > 0)

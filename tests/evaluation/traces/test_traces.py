@@ -1,4 +1,4 @@
-"""Traces: what is kept of an operation, which operations, and the file beside results.json."""
+"""Traces: stored data, selection of operations, and the file next to results.json."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def trace(seed: int = 1, why: str = "sample") -> Trace:
     return make_trace("stiff", operation, [CONTACT], [found], [matching], [["because"]], why)
 
 
-def test_a_trace_keeps_extremes_the_view_and_what_became_of_the_contact():
+def test_a_trace_keeps_extremes_the_view_and_the_outcome_of_the_contact():
     kept, found = trace(), detection(1)
     (panel,) = kept.panels
     assert len(panel.course.time) <= 4 * (200 + 250) < len(TIME)
@@ -68,7 +68,7 @@ def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_t
     assert encode_traces([read]) == encode_traces([blind])
 
 
-def test_what_is_above_a_limit_stays_above_it_and_no_limit_stays_none(tmp_path):
+def test_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(tmp_path):
     kept = trace()
     course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))
     one_sided = replace(kept, panels=(replace(kept.panels[0], course=course),))
@@ -89,14 +89,14 @@ def test_what_is_above_a_limit_stays_above_it_and_no_limit_stays_none(tmp_path):
         gzip.compress(b'{"schema_version": 7, "traces": []}', mtime=0),
     ],
 )
-def test_what_is_no_traces_file_is_one_clear_error(tmp_path, content):
+def test_an_invalid_traces_file_is_one_clear_error(tmp_path, content):
     path = tmp_path / "t.json.gz"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"t\.json\.gz"):
         read_traces(path)
 
 
-def test_the_file_is_strict_json_whatever_the_detector_could_not_judge(tmp_path):
+def test_the_file_is_strict_json_with_unassessable_samples(tmp_path):
     text = gzip.decompress(encode_traces([trace()])).decode()
     json.loads(text, parse_constant=lambda name: pytest.fail(name))
 
@@ -119,10 +119,10 @@ def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
     assert {7, 507, 1007, 1507, 2007, 2507} <= set(numbers)
     slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
     assert set(slowest) <= set(numbers)
-    assert sum(item.chosen == "taken evenly from all" for item in kept) == 20
+    assert sum(item.chosen == "evenly sampled from all" for item in kept) == 20
 
 
-def test_more_misses_than_there_is_room_for_are_counted():
+def test_misses_beyond_the_maximum_are_counted():
     choice = TraceChoice(500)
     base = trace()
     for number in range(500):

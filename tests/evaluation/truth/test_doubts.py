@@ -1,4 +1,4 @@
-"""Warnings about a load cell as the truth: it follows the torque without lag, or its rest level wandered."""
+"""Warnings about a load cell as ground truth: it follows the torque without lag, or its rest level drifted."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def warnings_of(recording: Recording) -> list[str]:
 
 @pytest.mark.parametrize("scale", [0.8, -25.0])
 @pytest.mark.parametrize("rate", [1e-3, 3e-3])
-def test_a_force_that_is_made_from_the_torque_is_no_independent_truth(scale, rate):
+def test_a_force_computed_from_the_torque_is_not_independent_truth(scale, rate):
     clock = np.arange(0.0, 6.0, rate)
     torque = np.column_stack((np.sin(clock), 2.0 + press(clock) / abs(scale)))
     force = np.sign(scale) * press(TIME) + noise(2.0, 1)
@@ -45,14 +45,14 @@ def test_a_force_that_is_made_from_the_torque_is_no_independent_truth(scale, rat
 
 
 @pytest.mark.parametrize("lag", [0.01, 0.03, 0.08])
-def test_a_drive_that_answers_the_contact_later_follows_the_force_not_the_force_the_drive(lag):
+def test_a_drive_that_responds_to_the_contact_is_not_a_source_of_the_force(lag):
     torque = np.column_stack((np.sin(TIME), 2.0 + press(TIME - lag)))
     recording = log(press(TIME) + noise(2.0, 1), torque)
     assert warnings_of(recording) == []
     assert np.isnan(follows_torque(recording, find_contacts(recording, RULE))[1])
 
 
-def test_without_contacts_or_without_what_it_takes_nothing_is_said():
+def test_without_contacts_or_required_channels_nothing_is_reported():
     torque = np.column_stack((np.sin(TIME), np.cos(TIME)))
     assert warnings_of(log(noise(2.0, 1), torque)) == []
     assert warnings_of(log(np.zeros(6000), torque)) == []
@@ -61,7 +61,7 @@ def test_without_contacts_or_without_what_it_takes_nothing_is_said():
     assert warnings_of(Recording("r", "r", ("a", "b"), {"force": only["force"]})) == []
 
 
-def test_a_rest_level_that_wandered_further_than_the_lower_level_is_named_with_its_drift():
+def test_a_rest_level_that_drifted_beyond_the_lower_level_is_reported():
     torque = np.column_stack((np.sin(TIME), np.cos(TIME)))
     (text,) = warnings_of(log(press(TIME) + noise(2.0, 1) + 30.0 * TIME / 7.0, torque))
     assert text.startswith("force: the reading at rest shifted by 16")
@@ -81,7 +81,7 @@ def test_a_force_next_to_nothing_that_stays_to_the_end_of_the_log_is_named():
 @needs_data("ur10e")
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
-    """UR10e pushed by hand, 10 and 12 ms a sample: the "force" is what shoulder or elbow say themselves."""
+    """UR10e pushed by hand, one sample per 10 and 12 ms: the "force" is the shoulder's or elbow's own torque."""
     table = np.loadtxt(data("ur10e") / "ur-static.csv", delimiter=",")
     time, current = table[:, 0] - table[0, 0], table[:, 13:19]
     force = 10.0 * current[:, joint] + np.random.default_rng(1).normal(0.0, 0.5, len(time))
@@ -89,12 +89,12 @@ def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
     recording = Recording("ur-static", "", tuple("abcdef"), channels)
     found = find_contacts(recording, OnsetRule(8.0, 4.0))
     assert found and not any(item.in_progress for item in found)
-    assert found[0].start == pytest.approx(3.3, abs=0.3)  # the first push, by the observer: 3.4 s
+    assert found[0].start == pytest.approx(3.3, abs=0.3)  # first push according to the observer: 3.4 s
     name, r = follows_torque(recording, found)
     assert (name, r) == ("abcdef"[joint], pytest.approx(1.0, abs=0.02))
 
 
-def test_of_a_single_sample_nothing_is_followed_and_numpy_has_nothing_to_say():
+def test_a_single_sample_causes_neither_a_doubt_nor_a_warning():
     one = np.zeros((1, 1))
     channels = {"torque": Series(np.zeros(1), one, "N m"), "force": Series(np.zeros(1), one, "N")}
     recording = Recording("one", "made up", ("axis",), channels)

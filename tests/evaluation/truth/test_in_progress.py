@@ -1,4 +1,4 @@
-"""A contact that is in progress when the recording begins: never detected or missed, and its alarms are not false."""
+"""A contact in progress at the start of a recording: never detected or missed, and its alarms are not false."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def row(outcome: str, number: int, latency: float | None = None, clipped: bool =
     )
 
 
-def test_it_is_counted_by_itself_and_in_no_other_figure():
+def test_it_is_counted_separately_and_in_no_other_result():
     rows = (row("in_progress", 1), row("detected", 2, 0.0, True), row("detected", 3, 30.0), row("missed", 4))
     results = Results({}, ("gm",), ("stiff",), rows, (), ())
     (item,) = summarise(results)
@@ -60,4 +60,4 @@ def test_it_is_counted_by_itself_and_in_no_other_figure():
     assert len(results.scored_contacts) == 3 and len(latencies(rows)[0]) == 3
     alone = summarise(Results({}, ("gm",), ("stiff",), rows[:1], (), ()))[0]
     assert alone.contacts == 0 and np.isnan(alone.mean_ms)
-    assert alone.why_undefined("missed") == "1 of 1 contacts had begun when the recording did"
+    assert alone.why_undefined("missed") == "1 contact was in progress when the recording began"

@@ -47,7 +47,7 @@ def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
         ("recording,start_s,end_s\na.csv,nan,3\n", "line 2: start_s is 'nan'"),
         ("recording,start_s,end_s\na.csv,1,5,2,0\n", "line 2: 5 cells under 3 columns"),
         ("recording,start_s,end_s\na.csv,1\n", "line 2: 2 cells under 3 columns"),
-        ("recording,start_s,end_s,end_s\n", "line 1: column 'end_s' is there twice"),
+        ("recording,start_s,end_s,end_s\n", "line 1: column 'end_s' is repeated"),
     ],
 )
 def test_a_wrong_file_is_one_line_that_names_the_line(tmp_path, text, said):

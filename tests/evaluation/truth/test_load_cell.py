@@ -1,4 +1,4 @@
-"""Contacts from load cells that drift, jump, read coarsely, slowly or with jitter, and from logs that begin in one."""
+"""Contacts on load cells with drift, jumps, coarse steps, slow sampling or jitter, and logs that begin in a contact."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ END = 8.0
 
 
 def clock(rate: float, jitter: float = 0.0, seed: int = 0) -> FloatArray:
-    """Times of a cell of so many samples a second, each late by up to a share of its period."""
+    """Times of a cell at that sample rate, each delayed by up to a share of its period."""
     rng = np.random.default_rng(seed)
     return (np.arange(int(END * rate)) + jitter * rng.uniform(0.0, 1.0, int(END * rate))) / rate
 
@@ -64,7 +64,7 @@ def test_the_drift_before_the_onset_is_reported():
 def test_a_drifting_cell_without_a_contact_shows_none(drift, sigma):
     for seed in range(5):
         assert contacts(T, noise(T, sigma, seed) + DRIFTS[drift]) == []
-    if drift != "step at rest":  # by eight deviations of the noise a step of 12 N is a contact
+    if drift != "step at rest":  # with a level of eight deviations of the noise, a step of 12 N is a contact
         assert contacts(T, noise(T, sigma) + DRIFTS[drift], OnsetRule()) == []
 
 
@@ -85,9 +85,9 @@ def test_a_log_that_begins_in_contact_has_it_in_progress_and_its_release_is_no_c
 @pytest.mark.parametrize(
     "course",
     [
-        lambda t: 800.0 * np.exp(-t / 0.15) * (t < 0.6),  # from the peak on, falling
+        lambda t: 800.0 * np.exp(-t / 0.15) * (t < 0.6),  # falling from the peak
         lambda t: np.where(t < 0.5, 100.0 + 1200.0 * t, 0.0),  # still rising
-        lambda t: np.where(t < 0.4, 500.0, np.where(t < 2.0, 150.0, 0.0)),  # a shock, then a steady push
+        lambda t: np.where(t < 0.4, 500.0, np.where(t < 2.0, 150.0, 0.0)),  # an impact, then a steady push
     ],
     ids=["falling", "rising", "in two levels"],
 )
@@ -99,7 +99,7 @@ def test_whatever_the_force_does_at_the_start_its_release_is_never_an_onset(cour
 
 @pytest.mark.parametrize("offset", [300.0, -300.0])
 @pytest.mark.parametrize("peak", [1000.0, -1000.0, 200.0, -200.0])
-def test_a_cell_that_is_not_tared_is_at_rest_as_long_as_it_comes_back(offset, peak):
+def test_an_untared_cell_is_at_rest_if_it_returns_to_its_level(offset, peak):
     (found,) = contacts(T, offset + noise(T) + pulse(T, 5.0, peak=peak))
     assert not found.in_progress
     assert found.start == pytest.approx(5.003, abs=4e-3)
@@ -134,7 +134,7 @@ def test_the_onset_is_within_its_uncertainty_of_the_truth_at_every_rate(rate, ji
 
 @pytest.mark.parametrize(("rate", "jitter"), [(62.5, 0.0), (60, 0.9), (100, 0.0)])
 @pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
-def test_of_a_slow_cell_one_sample_of_157_newtons_is_a_contact(rate, jitter, rule):
+def test_one_sample_of_157_newtons_of_a_slow_cell_is_a_contact(rate, jitter, rule):
     time = clock(rate, jitter)
     force = noise(time)
     hit = int(5.0 * rate)
@@ -143,14 +143,14 @@ def test_of_a_slow_cell_one_sample_of_157_newtons_is_a_contact(rate, jitter, rul
     assert (found.start, found.peak_force) == (time[hit], pytest.approx(157.0, abs=3.0))
 
 
-def test_of_a_cell_of_1_khz_one_sample_is_none_and_three_are_one():
+def test_three_samples_at_1_khz_are_a_contact_and_one_is_not():
     for samples, count in ((1, 0), (2, 0), (3, 1)):
         force = noise(T)
         force[5000 : 5000 + samples] = 157.0
         assert len(contacts(T, force)) == count
 
 
-def test_a_burst_of_noise_is_no_contact_and_hides_none():
+def test_a_burst_of_noise_is_not_a_contact_and_hides_none():
     for seed in range(20):
         burst = np.where((T > 3.0) & (T < 3.03), noise(T, 60.0, 100 + seed), 0.0)
         (found,) = contacts(T, pulse(T, 6.0) + noise(T, seed=seed) + burst)
@@ -166,7 +166,7 @@ def test_an_impact_that_rings_is_a_contact(frequency):
 
 
 @pytest.mark.parametrize("step", [1.0, 5.0, 10.0])
-def test_coarse_steps_and_drift_together_move_the_onset_by_no_more_than_the_steps_say(step):
+def test_coarse_steps_and_drift_shift_the_onset_within_the_step_size(step):
     force = pulse(T, 6.0) + noise(T, 1.0) + DRIFTS["rising, 30 N over 7 s"]
     (found,) = contacts(T, step * np.round(force / step))
     assert found.start == pytest.approx(6.001, abs=2e-3)
@@ -182,7 +182,7 @@ def test_missing_samples_and_gaps_are_skipped_and_a_hole_before_the_onset_is_in_
     (found,) = contacts(T, force)
     assert found.start - found.uncertainty <= 6.0 < found.start
     assert found.resolution > 0.06
-    kept = (T < 2.0) | (T > 3.5)  # rows that are not there at all
+    kept = (T < 2.0) | (T > 3.5)  # rows that do not exist
     assert contacts(T[kept], (pulse(T, 6.0) + noise(T))[kept])[0].start == pytest.approx(6.001, abs=1.1e-3)
 
 
@@ -226,12 +226,12 @@ def test_a_rebound_within_the_separation_is_the_same_contact_whatever_the_cell_r
     force = noise(T) + pulse(T, 3.0, 0.1) + pulse(T, 3.6, 0.1, 400.0) + 20.5 * ((T > 3.1) & (T < 3.6))
     (found,) = contacts(T, force)
     assert (found.start, found.end) == (pytest.approx(3.001, abs=1.1e-3), pytest.approx(3.7, abs=3e-3))
-    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from what had begun before
+    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from a contact that began before
     assert begun.in_progress and begun.end == pytest.approx(1.3, abs=3e-3)
 
 
-def test_a_cell_whose_rest_shifts_in_the_contact_is_not_taken_for_one_that_began_in_it():
-    """The pushes of the UR10e: friction keeps a part of what was felt."""
+def test_a_shift_of_rest_during_a_contact_is_not_a_contact_in_progress():
+    """The pushes of the UR10e: friction keeps part of the measured force."""
     for before, after in ((-29.0, -25.0), (30.0, 20.0)):
         (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
         assert not found.in_progress and found.start == pytest.approx(3.003, abs=5e-3)
@@ -255,7 +255,7 @@ def test_a_short_contact_is_found_where_the_cell_rests_at_one_constant_reading(r
 
 
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0, 50.0])
-def test_no_flicker_of_a_coarse_cell_is_a_contact_beside_one_that_it_felt(step):
+def test_flicker_of_a_coarse_cell_is_not_a_contact_next_to_a_real_one(step):
     time = clock(62.5)
     force = step * np.round(pulse(time, 6.0, peak=60.0 * step) / step)
     force[[100, 200, 201, 300]] += step * np.array([1.0, 1.0, 1.0, -1.0])
@@ -281,8 +281,8 @@ def test_a_cell_that_is_not_tared_is_at_rest_where_the_log_ends_in_a_contact_aga
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("offset", [200.0, 291.0, 400.0])
-def test_a_touch_that_is_held_before_the_impact_is_no_release_to_zero(offset, sign):
-    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, and then hit."""
+def test_a_touch_held_before_the_impact_is_not_a_release(offset, sign):
+    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, then hit."""
     felt = np.interp(T, [6.0, 6.1, 6.35, 6.7, 7.2], [0.0, 290.0, 290.0, 2466.0, 600.0])
     kept = T < 7.2
     for rule in (OnsetRule(), GATE):

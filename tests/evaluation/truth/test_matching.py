@@ -23,7 +23,7 @@ def alarm(time: float) -> Alarm:
 
 
 def match(alarms: list[Alarm], contacts: list[Contact], signal: Signal) -> Matching:
-    """Every alarm is a crossing."""
+    """A detection in which every alarm is a crossing."""
     return match_verdict(Verdict("alarm", tuple(alarms), crossings=tuple(alarms)), contacts, signal)
 
 
@@ -51,7 +51,7 @@ def test_no_alarm_in_the_window_is_missed_and_a_late_one_is_false():
     assert len(matching.false_alarms) == 1
 
 
-def test_an_alarm_while_the_contact_still_presses_is_not_false():
+def test_an_alarm_during_the_contact_is_not_false():
     matching = match([alarm(5.04), alarm(7.0)], [Contact(5.0, 7.5, 0.01)], statistic())
     assert matching.false_alarms == ()
 

@@ -1,4 +1,4 @@
-"""Load-cell samples that are missing where a contact begins or presses: no latency and no force that nobody saw."""
+"""Missing load-cell samples at the beginning of or during a contact: no unmeasured latency or force is reported."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.detection import Alarm, Signal, Status, Verdict
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.truth.doubts import truth_findings
@@ -52,13 +52,13 @@ def test_a_hole_over_the_onset_is_in_its_uncertainty_and_marked(begin, end, own_
 
 
 @pytest.mark.parametrize("own_clock", [False, True])
-def test_a_rebound_after_a_hole_that_hid_the_first_touch_is_not_taken_for_the_onset(own_clock):
+def test_a_rebound_after_a_hole_over_the_first_touch_is_not_the_onset(own_clock):
     force = bump(TIME) + np.where(TIME > ONSET + 0.3, bump(TIME, 400.0, ONSET + 0.4), 0.0)
     (contact,) = find_contacts(recording(force, ONSET - 0.02, ONSET + 0.22, own_clock), RULE)
     assert contact.start == pytest.approx(ONSET + 0.4, abs=3e-3)
     assert contact.hole == pytest.approx(0.24, abs=2e-3)
     assert contact.start - contact.uncertainty <= ONSET
-    # A hole in which no contact of this kind fits says nothing about the onset.
+    # A hole too short for a contact of this kind does not affect the onset.
     (whole,) = find_contacts(recording(bump(TIME), ONSET - 0.4, ONSET - 0.38, own_clock), RULE)
     assert whole.hole == 0.0 and whole.uncertainty < 2e-3
 
@@ -71,10 +71,10 @@ def test_without_a_hole_and_with_single_samples_lost_nothing_is_marked():
         one = Recording("a", "a.csv", ("x",), {"force": Series(TIME, force, "N")})
         (contact,) = find_contacts(one, RULE)
         assert contact.hole == 0.0 and contact.uncertainty < 5e-3
-        assert judge(force_course(one, contact), LENIENT).outcome == "pass"
+        assert judge(force_time_curve(one, contact), LENIENT).outcome == "pass"
 
 
-def test_a_slow_cell_with_jitter_and_one_sample_lost_is_judged_unless_the_limit_is_near():
+def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the_limit():
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 9.0, 1 / 60)
     time = time + rng.uniform(-0.4, 0.4, len(time)) / 60
@@ -83,11 +83,11 @@ def test_a_slow_cell_with_jitter_and_one_sample_lost_is_judged_unless_the_limit_
     keep[np.searchsorted(time, ONSET + 0.095)] = False
     one = Recording("a", "a.csv", ("x",), {"force": Series(time[keep], force[keep], "N")})
     (contact,) = find_contacts(one, RULE)
-    course = force_course(one, contact)
+    curve = force_time_curve(one, contact)
     assert contact.hole == 0.0
-    assert judge(course, LENIENT).outcome == "pass"
-    near = ForceProfile("n", "n", "own", True, (ForceStep(0.0, course.peak + 10.0, "dynamic"),))
-    verdict = judge(course, near)
+    assert judge(curve, LENIENT).outcome == "pass"
+    near = ForceProfile("n", "n", "own", True, (ForceStep(0.0, curve.peak + 10.0, "dynamic"),))
+    verdict = judge(curve, near)
     assert verdict.outcome == "not_assessable" and "may have reached" in verdict.reason
 
 
@@ -103,37 +103,37 @@ def test_a_hole_as_long_as_the_window_makes_the_contact_not_assessable():
 
 @pytest.mark.parametrize("own_clock", [False, True])
 @pytest.mark.parametrize("begin, end", [(-0.003, 0.138), (-0.05, 0.1), (0.05, 0.17), (-0.003, 0.186), (0.08, 0.12)])
-def test_a_force_that_nobody_saw_never_passes(begin, end, own_clock):
+def test_an_unmeasured_force_never_passes(begin, end, own_clock):
     one = recording(bump(TIME), ONSET + begin, ONSET + end, own_clock)
     (contact,) = find_contacts(one, RULE)
-    course = force_course(one, contact)
-    verdict = judge(course, LENIENT)
+    curve = force_time_curve(one, contact)
+    verdict = judge(curve, LENIENT)
     assert verdict.outcome == "not_assessable"
     assert f"missing for {1e3 * (end - begin) + 1:.0f} ms" in verdict.reason
-    assert course.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
+    assert curve.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
 
 
-def test_a_violation_that_was_seen_stands():
+def test_a_measured_violation_counts():
     one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
     (contact,) = find_contacts(one, RULE)
-    verdict = judge(force_course(one, contact), PROFILE)
+    verdict = judge(force_time_curve(one, contact), PROFILE)
     assert verdict.outcome == "fail"
     (failed,) = [item for item in verdict.steps if item.outcome == "fail"]
     assert "ms after it was first seen" in failed.reason and "after the onset" not in failed.reason
 
 
 def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
-    # 300 N until 0.70 s after the onset: allowed until 0.75 s, but the onset may lie 0.1 s earlier.
+    # 300 N until 0.70 s after the onset: allowed until 0.75 s, but the onset may be 0.1 s earlier.
     force = np.where((TIME >= ONSET) & (TIME < ONSET + 0.8), 300.0, 0.0)
     one = recording(force, ONSET - 0.01, ONSET + 0.09, True)
     (contact,) = find_contacts(one, RULE)
     assert contact.start == pytest.approx(ONSET + 0.09, abs=2e-3)
-    verdict = judge(force_course(one, contact), LENIENT)
+    verdict = judge(force_time_curve(one, contact), LENIENT)
     assert [item.outcome for item in verdict.steps] == ["not_assessable", "not_assessable"]
     assert "onset" in verdict.steps[1].reason
 
 
-def test_a_cell_that_begins_shortly_before_the_contact_is_warned_of_and_one_that_was_masked_there_is_a_hole():
+def test_a_cell_starting_just_before_the_contact_is_a_warning_and_a_masked_one_a_hole():
     lost = TIME < ONSET + 0.3
     force = bump(TIME) + np.where(TIME > ONSET + 0.3, bump(TIME, 400.0, ONSET + 0.6), 0.0)
     cell = Series(TIME[~lost], force[~lost], "N")
@@ -156,11 +156,11 @@ def test_samples_that_are_stamped_in_batches_have_onsets_no_finer_than_a_batch()
     assert contact.start - contact.uncertainty <= ONSET + 1e-3 and contact.resolution >= 9e-3
 
 
-def test_a_cell_that_ends_in_the_contact_while_the_log_goes_on_gives_no_pass():
+def test_a_cell_that_ends_during_the_contact_prevents_a_pass():
     for end, outcome in ((ONSET + 0.05, "not_assessable"), (ONSET + 0.25, "pass")):
         kept = end > TIME
         cell = Series(TIME[kept], bump(TIME)[kept], "N")
         one = Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
         (contact,) = find_contacts(one, RULE)
         single = ForceProfile("s", "s", "own", True, (ForceStep(0.0, 9000.0, "all"),))
-        assert judge(force_course(one, contact), single).outcome == outcome
+        assert judge(force_time_curve(one, contact), single).outcome == outcome

@@ -1,4 +1,4 @@
-"""The onset rule on load-cell curves whose onset is known."""
+"""The onset rule on load-cell curves with a known onset."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ def test_noise_alone_is_no_contact():
 @pytest.mark.parametrize("offset", [0.0, 312.7])
 def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset):
     force = np.full(4000, offset)
-    force[2000:2010] += step  # the only one: the noise, by its median, is 0
+    force[2000:2010] += step  # the only step: the median noise is 0
     assert find_contacts(recording(force), OnsetRule()) == []
     force[3000:3010] -= step
     assert find_contacts(recording(force), OnsetRule()) == []
 
 
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
-def test_of_a_load_cell_without_noise_a_contact_begins_above_eight_deviations_of_its_rounding(step):
-    heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms from 2 s on
+def test_without_noise_a_contact_begins_above_eight_deviations_of_the_rounding(step):
+    heights = step * np.floor(np.clip(TIME - 2.0, 0.0, 0.5) * 100.0 + 1e-9)  # a step every 10 ms after 2 s
     (contact,) = find_contacts(recording(heights), OnsetRule())
     assert 8.0 / np.sqrt(12.0) == pytest.approx(2.309, abs=1e-3)
-    # Upper level 2.31 steps, first above it at 3; lower level 1.15 steps, left where the reading comes to 2.
+    # Upper level 2.31 steps, first exceeded at 3; lower level 1.15 steps, exceeded where the reading reaches 2.
     assert contact.start == pytest.approx(2.020)
     assert contact.uncertainty == pytest.approx(0.0005 + 0.010)
     assert contact.peak_force == pytest.approx(50 * step)
@@ -75,7 +75,7 @@ def test_steps_finer_than_the_noise_change_nothing():
     assert (stepped.start, stepped.end) == (smooth.start, smooth.end)
 
 
-def test_what_arithmetic_rounds_is_no_step_of_the_load_cell():
+def test_rounding_errors_are_not_steps_of_the_load_cell():
     reading = np.zeros(4000)
     reading[2000:2010] = 3.0
     reading[3000:3010] = 3.0 * (1.0 + 1e-15)
@@ -101,7 +101,7 @@ def test_a_contact_from_the_first_sample_on_is_in_progress_until_its_release():
     assert contact.peak_force == 500.0
 
 
-def test_labels_serve_where_there_is_no_load_cell():
+def test_labels_replace_a_missing_load_cell():
     label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
     (contact,) = find_contacts(recording(label, "label"), GATE_RULE)
     assert (contact.start, contact.end) == (pytest.approx(1.001), pytest.approx(1.5))

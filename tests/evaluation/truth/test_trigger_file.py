@@ -1,4 +1,4 @@
-"""Trigger files: which rows mean what, and that nothing is read silently wrong."""
+"""Trigger files: the meaning of rows, and no silent misreading."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read(folder: Path, text: str | bytes) -> TriggerFile:
     return read_triggers(path)
 
 
-def test_rows_are_alarms_quiet_recordings_and_stretches_without_sight(tmp_path):
+def test_rows_are_alarms_recordings_without_alarms_and_unassessable_sections(tmp_path):
     rows = "a.csv,1.5,gm,\na.csv,2.5,gm,\na.csv,3,gm,4.5\nb.csv,,gm,\nb.csv,0.5,edge,\n"
     given = read(tmp_path, HEADER + rows)
     assert given.rows["gm"] == {"a.csv": Triggered([1.5, 2.5], [(3.0, 4.5)]), "b.csv": Triggered()}
@@ -26,7 +26,7 @@ def test_rows_are_alarms_quiet_recordings_and_stretches_without_sight(tmp_path):
     assert list(given.rows) == ["gm", "edge"]
 
 
-def test_without_a_detector_the_files_own_name_stands_for_it(tmp_path):
+def test_without_a_detector_the_file_name_is_used(tmp_path):
     assert list(read(tmp_path, "recording,time_s\na.csv,1\n").rows) == ["plc"]
     assert list(read(tmp_path, "recording,time_s,detector\na.csv,1, \n").rows) == ["plc"]
 
@@ -58,8 +58,8 @@ def test_a_file_name_that_fits_several_recordings_is_refused(tmp_path):
         ("recording\na.csv\n", "line 1: column 'time_s' is missing"),
         ("recording,time_s,detecter\n", "line 1: unknown column 'detecter'"),
         ("recording;time_s\na.csv;1\n", "line 1: unknown column 'recording;time_s'"),
-        ("recording,time_s,time_s\na.csv,1,2\n", "line 1: column 'time_s' is there twice"),
-        ("recording,time_s\n", "holds no row"),
+        ("recording,time_s,time_s\na.csv,1,2\n", "line 1: column 'time_s' is repeated"),
+        ("recording,time_s\n", "contains no row"),
         ("recording,time_s\na.csv,1\n\n,2\n", "line 4: no recording is named"),
         ("recording,time_s\na.csv,6,123\n", "line 2: 3 cells under 2 columns"),
         ("recording,time_s\na.csv\n", "line 2: 1 cell under 2 columns"),
@@ -68,9 +68,9 @@ def test_a_file_name_that_fits_several_recordings_is_refused(tmp_path):
         ("recording,time_s\na.csv,1e999\n", "line 2: time_s is '1e999'"),
         (HEADER + "a.csv,2,gm,1\n", "line 2: blind from 2 until 1"),
         (HEADER + "a.csv,,gm,1\n", "line 2: blind_until_s is 1, time_s is missing"),
-        ('recording,time_s\n"a.csv,1\n', "no trigger file: damaged at line 2"),
-        (b"recording,time_s\n\xff\xfe,1\n", "no trigger file: no UTF-8 text"),
-        (b"\x89PNG\r\n\x1a\n\x00\x00", "no trigger file"),
+        ('recording,time_s\n"a.csv,1\n', "not a trigger file: damaged at line 2"),
+        (b"recording,time_s\n\xff\xfe,1\n", "not a trigger file: not UTF-8 text"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "not a trigger file"),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, said):
@@ -79,6 +79,6 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, said):
     assert "plc.csv" in fault.value.message and fault.value.hint
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match=r"none\.csv"):
         read_triggers(tmp_path / "none.csv")

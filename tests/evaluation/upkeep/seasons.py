@@ -1,4 +1,4 @@
-"""Made-up runs that the tests of upkeep share: white noise about a mean on clean strokes, and what changes in them."""
+"""Made-up runs shared by the tests of upkeep: white noise about a mean on clean strokes, with changes."""
 
 from __future__ import annotations
 
@@ -38,6 +38,6 @@ def season(count: int, change: Change | None = None, seed: int = 0, direction: i
 
 
 def learned(pairs: list[tuple[Operation, Signal]], **settings: object) -> FittedSignature:
-    """A signature of these runs; one-sided unless `sides` says otherwise."""
+    """Return a signature of these runs; one-sided unless `sides` is given."""
     rule = Signature(**{"sides": "one", **settings})
     return rule.fit([(item.recording, found) for item, found in pairs])

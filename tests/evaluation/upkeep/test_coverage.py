@@ -1,4 +1,4 @@
-"""Coverage: runs judged by all the others, the chance that the next one alarms, where there is no limit."""
+"""Coverage: runs checked against all others, the probability of the next alarm, and sections without a limit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def coverage(**changed: object) -> Coverage:
 
 
 @pytest.mark.parametrize("alignment", ["time", "position", "time_then_position"])
-def test_taking_a_run_out_gives_what_learning_from_the_others_gives(alignment):
+def test_removing_a_run_equals_learning_from_the_others(alignment):
     rule = replace(RULE, alignment=alignment)
     bare = [(item.recording, found) for item, found in RUNS]
     whole = rule.fit(bare)
@@ -85,17 +85,17 @@ def test_the_verdict_says_how_many_runs_or_which_factor():
     assert "14 assessable runs: too few" in coverage(chance=math.nan).verdict
 
 
-def test_a_part_without_a_limit_is_told_with_its_place_and_the_share_of_runs():
+def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs():
     blind = season(14)
     for _, signal in blind[:5]:
         signal.status[2400:2600] = Status.GAP
     gap, *others = check_coverage(blind, RULE, ACTIVATION).gaps
     travel = blind[0][0].recording["position"].values[:, 0]
     assert gap.axis == "travel" and gap.share == pytest.approx(9 / 14)
-    # The first sample behind it stands for the last two grid points before it.
+    # The first sample after it counts for the last two grid points before it.
     assert gap.start == pytest.approx(travel[2400] - travel[402], abs=0.003)
     assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
-    assert "valid in at most 64 % of the runs; 80 % are needed" in gap.described
+    assert "valid in at most 64 % of the runs; 80 % are required" in gap.described
     assert not others
 
 
@@ -107,19 +107,19 @@ def test_while_accelerating_a_part_without_a_limit_is_a_time():
     assert (gap.axis, gap.share) == ("time", 0.0)
     assert (gap.start, gap.end) == (pytest.approx(0.2, abs=0.02), pytest.approx(0.3 - 2 * 0.01, abs=0.015))
     assert "s after the motion began" in gap.described
-    # Without the runs it is not known where time stops to count: both curves are looked at.
+    # Without the runs, the end of the time-based part is unknown: both curves are checked.
     assert {item.axis for item in gaps_of(learned(blind))} == {"time", "travel"}
 
 
-def test_a_run_that_can_be_judged_nowhere_is_named_and_not_counted():
+def test_an_unassessable_run_is_named_and_not_counted():
     blind = season(14)
     blind[3][1].status[:] = Status.NOT_APPLICABLE
     found = check_coverage(blind, RULE, ACTIVATION)
     assert found.not_assessable == ("run3",) and len(found.runs) == 13
 
 
-def test_too_few_runs_and_a_target_that_is_no_chance_are_refused():
-    with pytest.raises(SignatureError, match="2 runs to judge by the others"):
+def test_too_few_runs_and_an_invalid_target_are_refused():
+    with pytest.raises(SignatureError, match="2 runs to check against the others"):
         check_coverage(RUNS[:2], replace(RULE, force=True), ACTIVATION)
     with pytest.raises(SignatureError, match="9 impact-free runs"):
         check_coverage(RUNS[:9], RULE, ACTIVATION)

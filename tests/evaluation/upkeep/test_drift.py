@@ -1,4 +1,4 @@
-"""The audit of a season: what drifts, where it grows, what is a step, and how long the margin lasts."""
+"""The audit of a season: drift, local growth, steps, and the runs left."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def audited(change=None, count: int = 40, seed: int = 1, **settings: object):
 
 
 def near(travel: np.ndarray, place: float) -> np.ndarray:
-    """1 within 3 cm of a place, 1 cm of travel behind where the axis began to move."""
+    """Return 1 within 3 cm of a position, measured 1 cm after the start of the motion."""
     return (np.abs(travel - place - 0.01) < 0.03).astype(float)
 
 
@@ -42,12 +42,12 @@ def test_a_steady_season_shows_nothing():
     assert advice(None, found) == "keep the signature"
 
 
-def test_hardly_a_steady_season_shows_anything():
+def test_a_steady_season_rarely_shows_anything():
     shown = [audited(seed=seed, count=12).drifts for seed in range(2, 22)]
     assert sum(shown) <= 1
 
 
-def test_a_drift_of_the_whole_stroke_is_told_with_its_slope_and_the_runs_left():
+def test_a_drift_of_the_whole_stroke_is_reported_with_slope_and_runs_left():
     (joint,) = audited(lambda number, _: 0.04 * number).joints
     assert joint.local is None
     slope = joint.overall.course.trend.slope
@@ -62,8 +62,8 @@ def test_a_drift_of_the_whole_stroke_is_told_with_its_slope_and_the_runs_left():
     assert line.startswith("drifts by +0.0") and "used up in about" in line and line.endswith(": relearn")
 
 
-def test_the_runs_left_come_true():
-    """A season that goes on: a typical run alarms about when the first half said it would."""
+def test_the_predicted_runs_left_are_right():
+    """A season that continues: a typical run alarms about when the first half predicted it."""
 
     def change(number: int, _: np.ndarray) -> float:
         return 0.06 * number
@@ -75,7 +75,7 @@ def test_the_runs_left_come_true():
     assert alarmed and half - 40 == pytest.approx(joint.runs_left, rel=0.35)
 
 
-def test_what_grows_at_one_place_is_told_with_its_place_and_is_no_drift_of_the_whole():
+def test_a_local_growth_is_reported_with_its_location_and_not_as_a_whole_drift():
     found = audited(lambda number, travel: 0.1 * number * near(travel, 0.40))
     (joint,) = found.joints
     assert joint.overall is None and joint.local.outward
@@ -87,7 +87,7 @@ def test_what_grows_at_one_place_is_told_with_its_place_and_is_no_drift_of_the_w
     assert joint.runs[-1].local > 3.0 > abs(joint.runs[-1].overall)
 
 
-def test_both_at_once_are_told_both_the_place_first():
+def test_both_at_once_are_reported_with_the_location_first():
     found = audited(lambda number, travel: 0.04 * number + 0.1 * number * near(travel, 0.25))
     (joint,) = found.joints
     assert joint.local.place == pytest.approx(0.25, abs=0.021)
@@ -96,12 +96,12 @@ def test_both_at_once_are_told_both_the_place_first():
     assert advice(None, found).endswith("before anything is learned; then relearn")
 
 
-def test_a_shape_that_grows_with_the_whole_is_no_place_of_its_own():
+def test_a_shape_that_grows_with_the_whole_is_not_a_separate_location():
     (joint,) = audited(lambda number, travel: 0.06 * number * (1.0 + 0.1 * np.sin(30.0 * travel))).joints
     assert joint.overall is not None and joint.local is None
 
 
-def test_a_step_is_told_with_its_run():
+def test_a_step_is_reported_with_its_run():
     (joint,) = audited(lambda number, _: 1.5 * (number >= 25)).joints
     assert joint.overall.course.kind == "step" and joint.overall.course.step.run == 25
     assert joint.overall.runs_left.value == math.inf
@@ -112,7 +112,7 @@ def test_a_step_is_told_with_its_run():
     assert "at run 26 (run25) at 0." in line and "before relearning" in line
 
 
-def test_with_one_side_what_goes_away_from_the_limit_leaves_no_runs_to_count():
+def test_one_sided_a_drift_away_from_the_limit_has_no_runs_left():
     (joint,) = audited(lambda number, _: -0.05 * number).joints
     assert not joint.overall.outward and joint.runs_left == math.inf
     assert "drifts away from the limit by -0.0" in verdicts(joint)[0] and "detected later" in verdicts(joint)[0]
@@ -120,7 +120,7 @@ def test_with_one_side_what_goes_away_from_the_limit_leaves_no_runs_to_count():
     assert place.local is None
 
 
-def test_backward_a_signed_signal_comes_nearer_by_falling():
+def test_backward_a_signed_signal_approaches_the_limit_by_falling():
     free, late = (
         season(20, None, 100, direction=-1),
         season(40, lambda number, _: -0.05 * number, 1, direction=-1),
@@ -130,7 +130,7 @@ def test_backward_a_signed_signal_comes_nearer_by_falling():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_with_two_sides_both_directions_come_nearer(sign):
+def test_two_sided_both_directions_approach_a_limit(sign):
     (joint,) = audited(lambda number, _: sign * 0.05 * number, sides="two").joints
     assert joint.overall.outward and sign * joint.overall.course.change > 0.0
     assert 10.0 < joint.runs_left < 200.0
@@ -138,7 +138,7 @@ def test_with_two_sides_both_directions_come_nearer(sign):
     assert place.local is not None and place.local.outward
 
 
-def test_with_two_sides_what_comes_back_to_the_middle_leaves_no_runs_to_count():
+def test_two_sided_a_drift_to_the_middle_has_no_runs_left():
     found = audited(lambda number, _: 2.0 - 0.045 * number, sides="two")
     (joint,) = found.joints
     assert not joint.overall.outward and joint.runs_left == math.inf
@@ -157,10 +157,10 @@ def test_each_run_has_its_critical_factor_and_its_alarm():
         assert run.alarm == (detection.verdict.outcome == "alarm")
     assert found.alarms == (7,) and joint.runs[7].local_at == pytest.approx(0.4, abs=0.03)
     assert verdicts(joint)[0] == "an alarm in 1 of 12 runs, first in run 8 (run7)"
-    assert advice(None, found) == "look at the alarms with cdtool explain: no drift is shown"
+    assert advice(None, found) == "analyse the alarms with cdtool explain: no drift is shown"
 
 
-def test_joints_are_audited_apart():
+def test_joints_are_audited_separately():
     def doubled(pairs, offset):
         made = []
         for number, (operation, signal) in enumerate(pairs):
@@ -178,25 +178,25 @@ def test_joints_are_audited_apart():
     assert second.runs[-1].critical_factor > 1.5 * first.runs[-1].critical_factor
 
 
-def test_by_time_alone_a_place_is_a_time():
+def test_with_alignment_by_time_a_location_is_a_time():
     found = audited(lambda number, travel: 0.1 * number * near(travel, 0.40), alignment="time")
     assert (found.axis, found.unit) == ("time", "s")
     assert "s after the motion began" in verdicts(found.joints[0])[-1]
 
 
-def test_few_runs_show_nothing_and_a_run_that_cannot_be_judged_is_named():
+def test_few_runs_show_nothing_and_an_unassessable_run_is_named():
     late = season(9, lambda number, _: 0.5 * number)
     late[4][1].status[:] = Status.NOT_APPLICABLE
     found = audit_drift(FITTED, late, ACTIVATION)
     assert found.names == tuple(f"run{i}" for i in range(9) if i != 4)
     ((name, reason),) = found.not_assessable
     assert name == "run4" and "not applicable" in reason
-    assert "8 runs: too few to show a drift; at least 10 are needed" in verdicts(found.joints[0])
+    assert "8 runs: too few to show a drift; at least 10 are required" in verdicts(found.joints[0])
     with pytest.raises(SignatureError, match=r"no run to compare with the signature.*not applicable"):
         audit_drift(FITTED, [late[4]], ACTIVATION)
 
 
-def test_too_few_runs_are_advised_unless_it_is_learned_anew_anyway():
+def test_too_few_runs_are_reported_unless_it_must_be_relearned():
     wanting = check_coverage(season(12, together=2.5), Signature(sides="one", safety_factor=3.0), ACTIVATION)
     assert not wanting.enough
     assert "safety factor" in advice(wanting, None)

@@ -51,5 +51,5 @@ def test_a_file_that_is_there_is_overwritten_with_force_only_and_the_source_neve
     (tmp_path / "link.mcap").symlink_to(tmp_path / "log.mcap")
     for name in ("log.mcap", "link.mcap"):
         refused = run(tmp_path / "log.mcap", "-o", tmp_path / name, "--force")
-        assert "is the file to recover from" in str(refused.exception)
+        assert "is the file to recover" in str(refused.exception)
     assert (tmp_path / "log.mcap").read_bytes() == source

@@ -253,7 +253,7 @@ def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, six
 def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(evaluated, tmp_path):
     with pytest.raises(CdtoolError, match="no folder") as fault:
         plot_latencies(evaluated, tmp_path / "no" / "a.png")
-    assert "make it first" in fault.value.hint
+    assert "create the folder first" in fault.value.hint
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(CdtoolError) as fault:
         plot_latencies(evaluated, tmp_path / "folder.png")

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import pytest
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.force.course import force_course
+from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import judge
 from cdtool.evaluation.results import RecordingResult, Results
@@ -37,12 +37,12 @@ def with_forces(results: Results, bench: Bench, simulated, *names: str, profile:
     """The same with the force rows of logs of those names, all made from the first stiff impact."""
     recording = simulated("stiff", 1)
     (hit,) = bench.trace(recording, "stiff", ("momentum",)).contacts
-    course = force_course(recording, hit)
-    verdict = judge(course, replace(PROFILE, name=profile))
+    curve = force_time_curve(recording, hit)
+    verdict = judge(curve, replace(PROFILE, name=profile))
     rows = [
         row
         for name in names
-        for row in force_rows(RecordingResult(name, "stiff", "", 1.0, 1, 1), {1: verdict}, {1: course})
+        for row in force_rows(RecordingResult(name, "stiff", "", 1.0, 1, 1), {1: verdict}, {1: curve})
     ]
     late = [replace(contact("momentum", "stiff", 60.0, name=name), onset_s=hit.start) for name in names]
     profiles = {**results.provenance.get("force_profiles", {}), profile: asdict(replace(PROFILE, name=profile))}

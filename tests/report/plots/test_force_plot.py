@@ -12,7 +12,7 @@ import pytest
 from matplotlib.text import Text
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.force.course import ForceCourse
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
 from cdtool.evaluation.force.verdict import judge
 from cdtool.recording import FloatArray
@@ -37,8 +37,8 @@ def curve(
     name: str, peak: float, *, until: float = 6.5, alarms: Mapping[str, float] = ALARMS, profile: ForceProfile = GAP
 ) -> ForceCurve:
     time, force = half_sine(peak, until=until)
-    course = ForceCourse(time, force, np.zeros(len(time), dtype=bool), float(time[-1]))
-    return ForceCurve(name, time, force, judge(course, profile), alarms)
+    curve = ForceTimeCurve(time, force, np.zeros(len(time), dtype=bool), float(time[-1]))
+    return ForceCurve(name, time, force, judge(curve, profile), alarms)
 
 
 STIFF = ForcePanel("stiff", (curve("stiff/1", 900.0), curve("stiff/2", 3521.0), curve("stiff/3", 300.0)))

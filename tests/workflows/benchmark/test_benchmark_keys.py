@@ -1,4 +1,4 @@
-"""Keys of a benchmark file beyond the plain ones, each by what it does to results."""
+"""Special keys of a benchmark file and their effect on results."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(folder: Path, *parts: str, **settings):
     return benchmark(file, **settings)
 
 
-def test_a_groups_own_window_decides_what_is_missed(gate):
+def test_a_groups_own_window_determines_misses(gate):
     done = run(gate, HEAD, LEARN, ONSET, STIFF, "window_s = 0.045\n")
     by_name = {item.detector: item for item in done.evaluated.summaries}
     assert by_name["momentum"].missed == 3 and by_name["friction_ekf"].detected == 3
@@ -63,12 +63,12 @@ def test_a_label_that_fits_recordings_of_two_groups_is_refused(gate):
         run(gate, HEAD, LEARN, ONSET, 'labels = "both.csv"\n', STIFF, HOLDOUT)
 
 
-def test_limits_on_detectors_that_are_not_run_are_told_and_not_checked(gate):
+def test_limits_on_detectors_that_are_not_run_are_reported_and_not_checked(gate):
     limits = '[limits]\n"feekf.stiff.max_ms" = { max = 1 }\n"*.missed" = { max = 0 }\n'
     assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("violated") == 1
     done = run(gate, HEAD, LEARN, ONSET, STIFF, limits, detectors=["gm"])
     assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "met")]
-    assert any("1 of 2 limits are on detectors that were not run" in item.reason for item in done.results.findings)
+    assert any("1 of 2 limits are set for detectors that were not run" in item.reason for item in done.results.findings)
 
 
 def test_force_profile_points_and_campaigns_become_rows(gate):
@@ -108,7 +108,7 @@ def test_a_budget_that_the_runs_cannot_set_is_refused_with_what_is_missing(gate)
         run(gate, HEAD, LEARN, ONSET, STIFF, false_alarm_budget="1/1000op")
 
 
-def test_an_empty_budget_is_an_error_and_not_none(gate):
+def test_an_empty_budget_is_an_error(gate):
     with pytest.raises(ConfigurationError, match="false_alarm_budget: is ''"):
         run(gate, 'false_alarm_budget = ""\n', HEAD, LEARN, ONSET, STIFF)
 
@@ -144,7 +144,7 @@ def test_limits_become_rows(gate):
 
 def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
     shutil.copy(gate / "free" / "03.csv", gate / "copy.csv")
-    with pytest.raises(ConfigurationError, match=r"copy\.csv holds the same bytes as free/03\.csv"):
+    with pytest.raises(ConfigurationError, match=r"copy\.csv has the same content as free/03\.csv"):
         run(gate, HEAD, LEARN, ONSET, STIFF, '[holdout]\nlogs = ["copy.csv"]\n')
 
 
@@ -154,12 +154,12 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofile = "en_12453"\n', "force.profile: unknown force profile 'en_12453'.*en_12453_reducing_gap"),
         (
             '[impacts.x]\nlogs = ["holdout/*.csv"]\nforce_profile = "yard"\n',
-            "x.force_profile: .*'yard': .force. limits names no",
+            "x.force_profile: .*'yard': .force. limits does not name",
         ),
         ('[force]\nprofile = "yard"\nfile = "yard.toml"\n', "force.file: unknown key"),
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
-        ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*'a' does too"),
-        ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown figure"),
+        ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*also in 'a'"),
+        ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown metric"),
     ],
 )
 def test_a_wrong_key_is_one_line_that_names_it(gate, text, said):
@@ -178,7 +178,7 @@ def read_back(folder: Path, results):
     return read_results(path)
 
 
-def test_each_run_of_a_budget_is_judged_by_what_others_teach(gate, monkeypatch):
+def test_each_run_of_a_budget_is_tested_with_thresholds_of_the_others(gate, monkeypatch):
     from cdtool.workflows.signature import calibration, fitting
 
     taught: list[tuple[set[str], set[str]]] = []
@@ -211,14 +211,14 @@ def test_a_budget_does_not_depend_on_the_order_of_the_files(gate):
     assert factors[0] == factors[1] == factors[2]
 
 
-def test_the_same_bytes_under_two_names_are_not_scored_twice(gate):
+def test_identical_files_under_two_names_are_not_scored_twice(gate):
     shutil.copy(gate / "stiff" / "01.csv", gate / "twice.csv")
-    with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv hold the same bytes"):
+    with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv have identical content"):
         run(gate, HEAD, LEARN, ONSET, STIFF, '[impacts.again]\nlogs = ["twice.csv"]\n')
 
 
 def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
-    """Two labelled contacts in one log: the second one's force is none of the first's."""
+    """Two labelled contacts in one log: the force of the second does not count for the first."""
     done = run(gate, HEAD, LEARN, ONSET, STIFF)
     first = done.results.contacts[0]
     with (gate / "two.csv").open("w", newline="") as stream:
@@ -230,7 +230,7 @@ def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
     assert peaks[0] < 50.0 < 1000.0 < peaks[1]
 
 
-def test_detectors_may_be_named_on_the_command_line_alone(gate):
+def test_detectors_may_be_given_only_on_the_command_line(gate):
     head = 'machine = "machine.toml"\n'
     with pytest.raises(ConfigurationError, match="detectors: is missing"):
         run(gate, head, LEARN, ONSET, STIFF)
@@ -243,7 +243,7 @@ def test_detectors_may_be_named_on_the_command_line_alone(gate):
 
 
 @pytest.mark.parametrize("made", ['operations = "motion"\n[machine]\n', '[machine]\noperations = "motion"\n'])
-def test_operations_in_a_machine_file_are_answered_with_where_they_belong(gate, made):
+def test_operations_in_a_machine_file_get_a_hint_where_they_belong(gate, made):
     text = (gate / "machine.toml").read_text(encoding="utf-8")
     (gate / "cut.toml").write_text(text.replace("[machine]\n", made), encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"operations: is a key of the benchmark file") as fault:

@@ -1,4 +1,4 @@
-"""[onset] counts in seconds; settings in samples are read with a stated meaning, or refused with the way to migrate."""
+"""[onset] is in seconds; settings in samples are converted with a note, or refused with a hint to migrate."""
 
 from __future__ import annotations
 
@@ -20,19 +20,21 @@ def test_the_default_is_three_milliseconds_and_is_stated_in_time():
 
 
 @pytest.mark.parametrize("samples", [1, 3, 9, 100])
-def test_samples_mean_those_of_a_load_cell_of_1_khz_and_say_what_to_write(samples):
+def test_samples_are_read_at_1_khz_with_a_hint_to_migrate(samples):
     table = Table({"samples": samples}, "b.toml", "onset.")
     (words,) = migrated_onset(table)
-    assert words == f"b.toml: onset.samples: read as hold_s = {samples / 1000:g} (samples of 1 kHz): write that instead"
+    assert words == f"b.toml: onset.samples: read as hold_s = {samples / 1000:g} (samples at 1 kHz): use hold_s instead"
     assert read_onset(table).hold == pytest.approx(samples * 1e-3)
     assert migrated_onset(Table({"hold_s": 0.003}, "b.toml", "onset.")) == ()
 
 
-def test_what_cannot_be_read_is_refused_with_the_way_to_migrate():
-    with pytest.raises(ConfigurationError, match=r"onset\.samples: is 200: the onset rule counts in seconds") as found:
+def test_unreadable_settings_are_refused_with_a_hint_to_migrate():
+    with pytest.raises(
+        ConfigurationError, match=r"onset\.samples: is 200: the onset rule now counts in seconds"
+    ) as found:
         read(samples=200)
-    assert found.value.hint == "write hold_s, at most 0.1"
-    with pytest.raises(ConfigurationError, match=r"onset\.samples: is given together with hold_s"):
+    assert found.value.hint == "set hold_s, at most 0.1"
+    with pytest.raises(ConfigurationError, match=r"onset\.samples: cannot be combined with hold_s"):
         read(samples=3, hold_s=0.003)
     with pytest.raises(ConfigurationError, match=r"onset\.hold_s: is 0.5"):
         read(hold_s=0.5)

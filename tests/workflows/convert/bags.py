@@ -12,7 +12,7 @@ START_NS = 1_700_000_000 * 10**9
 
 
 def write_part(path: Path, start: float, names: tuple[str, ...] = ("speed", "cell"), rows: int = 128) -> Path:
-    """A second of a log: speeds at 128 Hz, a load cell at half of that rate."""
+    """A log of one second: speeds at 128 Hz, a load cell at half of that rate."""
     time = start + np.arange(rows) / 128.0
     streams = {
         "speed": Stream("/speed", "std_msgs/msg/Float64", time, {"data": np.sin(time)}),
@@ -23,7 +23,7 @@ def write_part(path: Path, start: float, names: tuple[str, ...] = ("speed", "cel
 
 
 def bag(folder: Path, count: int = 11, listed: int | None = None) -> Path:
-    """Parts of a second each, numbered as rosbag2 does, so that the tenth sorts before the second."""
+    """Parts of one second each, numbered as by rosbag2, so that the tenth sorts before the second."""
     folder.mkdir()
     for number in range(count):
         write_part(folder / f"bag_{number}.mcap", float(number))

@@ -1,4 +1,4 @@
-"""The kinds of files that `convert` writes, and the table that is converted."""
+"""The kinds of files that `convert` writes, and the converted table."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def needs(*suffixes: str) -> None:
 
 
 def table(path: Path, rows: int = 400) -> Path:
-    """A CSV table in ms with values of all sizes, and a missing one."""
+    """A CSV table in ms with values of all magnitudes, and a missing one."""
     random = np.random.default_rng(7)
     torque = random.normal(size=rows) * 10.0 ** random.integers(-200, 200, rows)
     lines = [f"{k * 0.7},{float(torque[k])!r},{float(k) / 3.0!r}" for k in range(rows)]

@@ -28,13 +28,13 @@ def gate(folder: Path) -> tuple[Path, Path]:
 @pytest.mark.parametrize(
     ("there", "back"), [pair for pair in product(KINDS, KINDS) if ".csv" in pair or len({*pair}) == 1]
 )
-def test_a_table_comes_back_to_the_bit_through_any_two_containers(there, back, tmp_path):
+def test_a_table_is_unchanged_bit_for_bit_through_any_two_containers(there, back, tmp_path):
     needs(there, back)
     log, machine = gate(tmp_path)
     first = convert(log, tmp_path / f"first{there}", machine=machine)
     second = convert(first.files[0], tmp_path / f"second{back}", machine=first.machine_files[0])
     original = logged(log, machine)
-    # A message's time in MCAP is a whole number of nanoseconds; its exact time goes on to the next container.
+    # A message's time in MCAP is an integer number of nanoseconds; its exact time is passed on to the next container.
     assert_same(original, logged(first.files[0], first.machine_files[0]), exact_time=there != ".mcap")
     assert_same(original, logged(second.files[0], second.machine_files[0]), exact_time=back != ".mcap")
 
@@ -52,7 +52,7 @@ def test_each_channel_keeps_its_own_clock_through_any_two_containers(there, back
     assert len(result["speed"]) == 300 and len(result["acceleration"]) == 700
 
 
-def test_of_two_clocks_each_gets_a_csv_table_of_its_own_and_nothing_is_resampled(tmp_path):
+def test_each_of_two_clocks_gets_its_own_csv_table_without_resampling(tmp_path):
     log, machine = two_clocks(tmp_path / "run.mcap"), machine_file(tmp_path)
     done = convert(log, tmp_path / "out.csv", machine=machine)
     assert [Path(path).name for path in done.files] == ["out.1.csv", "out.2.csv"]
@@ -89,7 +89,7 @@ def test_without_a_machine_file_all_columns_are_written_with_their_units(suffix,
         assert suffix == ".mcap" or found.unit == column.unit
 
 
-def test_the_machine_file_beside_it_holds_all_but_the_channels_word_for_word(tmp_path):
+def test_the_new_machine_file_is_unchanged_except_for_the_channels(tmp_path):
     log, machine = gate(tmp_path)
     done = convert(log, tmp_path / "out.csv", machine=machine)
     before, after = tomllib.loads(machine.read_text()), tomllib.loads(Path(done.machine_files[0]).read_text())
@@ -113,7 +113,7 @@ def test_a_robots_urdf_is_found_from_another_folder(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", _WRITERS)
-def test_every_file_says_where_it_comes_from(suffix, tmp_path):
+def test_every_file_states_its_origin(suffix, tmp_path):
     needs(suffix)
     log, machine = gate(tmp_path)
     path = Path(convert(log, tmp_path / f"out{suffix}", machine=machine).files[0])
@@ -131,7 +131,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path):
         assert Path(one).read_bytes() == Path(two).read_bytes()
 
 
-def test_nothing_is_overwritten_unless_it_is_asked_for_and_never_the_log(tmp_path):
+def test_nothing_is_overwritten_without_force_and_the_log_never(tmp_path):
     log, machine = gate(tmp_path)
     (tmp_path / "out.csv").write_text("mine")
     with pytest.raises(UsageError, match=r"out\.csv: already exists"):
@@ -162,7 +162,7 @@ def test_an_unknown_suffix_lists_what_can_be_written(tmp_path):
         convert(log, tmp_path / "out.xlsx")
 
 
-def test_a_log_without_a_clock_goes_where_none_is_needed_only(tmp_path):
+def test_a_log_without_a_clock_is_written_only_to_formats_without_one(tmp_path):
     log = tmp_path / "run.csv"
     log.write_text("a,b\n" + "".join(f"{k % 7},{k % 5}\n" for k in range(50)))
     with pytest.raises(UsageError, match=r"no column of the log looks like its clock, and this container needs one"):
@@ -267,7 +267,7 @@ def unverified_log(path):
     return path
 
 
-def test_what_no_checksum_covered_gets_none_by_converting_and_says_so(tmp_path):
+def test_unverified_data_stays_unverified_and_marked_after_converting(tmp_path):
     log = unverified_log(tmp_path / "log.mcap")
     done = cdtool("convert", log, tmp_path / "out.mcap")
     assert done.status == 0 and "20 of 20 messages without a checksum: unverified" in done.err
@@ -277,7 +277,7 @@ def test_what_no_checksum_covered_gets_none_by_converting_and_says_so(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", KINDS)
-def test_names_that_a_container_takes_for_one_are_told_apart(suffix, tmp_path):
+def test_names_that_are_equal_for_a_container_are_made_unique(suffix, tmp_path):
     needs(suffix)
     rows = "\n".join(f"{i / 100:.2f},{i},{-i}" for i in range(20))
     (tmp_path / "log.csv").write_text(f"t [s],a.b,a/b\n{rows}\n", encoding="utf-8")

@@ -58,13 +58,13 @@ def test_the_channels_of_all_parts_are_read_back_as_those_of_the_log(suffix, tmp
     needs(suffix)
     folder, known = bag(tmp_path / "bag"), machine(tmp_path)
     done = convert(folder, tmp_path / f"out{suffix}", machine=known)
-    # On the load side already: the machine takes load coordinates as they are, and derives a position only.
+    # Already on the load side: the machine accepts load coordinates unchanged, and derives only a position.
     whole = read_recording(folder, read_machine_file(known))
     whole = replace(whole, channels={name: whole[name] for name in ("speed", "force")})
     assert_same(whole, logged(done.files[0], done.machine_files[0]), exact_time=suffix != ".mcap")
 
 
-def test_each_parts_name_and_digest_stand_in_the_file(tmp_path):
+def test_each_parts_name_and_digest_are_in_the_file(tmp_path):
     folder = bag(tmp_path / "bag")
     convert(folder, tmp_path / "out.mcap", machine=machine(tmp_path))
     from mcap.reader import make_reader
@@ -81,7 +81,7 @@ def test_each_parts_name_and_digest_stand_in_the_file(tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [(), ("-m",)], ids=["all columns", "channels"])
-def test_parts_that_are_gone_or_cannot_be_read_are_told_and_end_with_3(arguments, tmp_path):
+def test_missing_or_unreadable_parts_are_reported_with_status_3(arguments, tmp_path):
     folder = bag(tmp_path / "bag", count=4, listed=5)
     (folder / "bag_1.mcap").write_bytes(b"")
     (folder / "bag_2.mcap").write_bytes((folder / "bag_2.mcap").read_bytes()[:60])
@@ -107,7 +107,7 @@ def test_parts_that_are_gone_or_cannot_be_read_are_told_and_end_with_3(arguments
     assert info.status == 3 and "loss: part bag_1.mcap is left out" in info.out
 
 
-def test_a_folder_of_which_no_part_can_be_read_is_one_line(tmp_path):
+def test_a_folder_without_a_readable_part_is_one_line(tmp_path):
     folder = bag(tmp_path / "bag", count=2)
     for path in folder.glob("*.mcap"):
         path.write_bytes(b"")
@@ -116,7 +116,7 @@ def test_a_folder_of_which_no_part_can_be_read_is_one_line(tmp_path):
         assert done.status == 2 and "bag_0.mcap: is empty" in done.err and done.err.count("\n") == 1
 
 
-def test_a_last_part_without_a_message_is_no_hindrance(tmp_path):
+def test_a_last_part_without_a_message_is_accepted(tmp_path):
     folder = bag(tmp_path / "bag", count=2)
     write_part(folder / "bag_2.mcap", 2.0, rows=0)
     for known in (None, machine(tmp_path)):
@@ -146,7 +146,7 @@ def test_a_log_without_any_mapped_channel_is_one_line(tmp_path):
     known.write_text(MACHINE.replace('speed = { topic = "/speed", field = "data" }\n', ""))
     log = write_part(tmp_path / "log.mcap", 0.0, ("speed",))
     done = command("convert", log, tmp_path / "out.csv", "-m", known)
-    assert done.status == 2 and "holds none of the mapped channels" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and "contains none of the mapped channels" in done.err and done.err.count("\n") == 1
 
 
 def test_no_part_is_overwritten_and_none_is_added(tmp_path):
@@ -170,7 +170,7 @@ def test_a_converted_log_in_parts_keeps_its_exact_times(tmp_path):
     assert both[: len(expected)].tobytes() == expected.tobytes() and len(both) == 2 * len(expected)
 
 
-def test_info_of_parts_with_a_machine_file_tells_of_the_files_too(tmp_path):
+def test_info_of_parts_with_a_machine_file_lists_the_files(tmp_path):
     told = cdtool.info(bag(tmp_path / "bag", count=3), machine=machine(tmp_path))
     assert told.details["parts"] == "3, bag_0.mcap to bag_2.mcap"
     assert told.details["/speed"].endswith(", 384 messages")

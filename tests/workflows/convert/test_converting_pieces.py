@@ -1,4 +1,4 @@
-"""`cdtool convert` of logs that come in many pieces, or out of order."""
+"""`cdtool convert` of logs in many pieces, or out of order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.workflows.convert.kinds import SEVERAL_CLOCKS, needs, table
 
 
 def shuffled(path: Path) -> Path:
-    """Two topics whose messages are up to 30 late, of which every tenth stands on the time of the one before it."""
+    """Two topics whose messages are up to 30 late; every tenth has the time of the preceding one."""
     from mcap.writer import Writer
 
     from cdtool.messages.schemas import DEFINITIONS
@@ -43,7 +43,7 @@ def shuffled(path: Path) -> Path:
 def test_messages_out_of_order_are_written_by_time_and_none_of_equal_time_is_lost(suffix, tmp_path, monkeypatch):
     needs(suffix)
     log = shuffled(tmp_path / "run.mcap")
-    monkeypatch.setattr(time_order.by_time, "__defaults__", (16,))  # hand on early, so that there are many parts
+    monkeypatch.setattr(time_order.by_time, "__defaults__", (16,))  # small buffer, so that there are many parts
     read = survey(Path(convert(log, tmp_path / f"out{suffix}").files[0])).columns
     original = survey(log).columns
     for topic, count in (("a", 500), ("b", 167)):

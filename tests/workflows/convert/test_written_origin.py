@@ -1,4 +1,4 @@
-"""Where a log begins since 1970 is known of its converted file, too, and of what is made of that."""
+"""The start of a log since 1970 is kept in its converted file, and in files converted from that."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tests.formats.containers import assert_same, logged, machine_file, two_cloc
 from tests.workflows.convert.kinds import KINDS, needs
 
 EPOCH = 1_700_000_000.25
-ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # whose start is a date in whole microseconds
+ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # its start is a date in whole microseconds
 
 
 def dated(path: Path) -> Path:
-    """A table whose clock counts from 1970, in ms, and begins on a quarter of a second."""
+    """A table whose clock counts from 1970, in ms, and begins at a quarter of a second."""
     rows = "\n".join(f"{EPOCH * 1e3 + k * 2.5!r},{float(np.sin(k))!r},{float(np.cos(k))!r}" for k in range(200))
     path.write_text(f"time [ms],torque [N m],speed [rad/s]\n{rows}\n")
     return path
@@ -79,7 +79,7 @@ def test_info_shows_the_same_times_of_a_converted_table(tmp_path):
     ],
     ids=["written", "edited", "no number", "in a comment of another's", "none"],
 )
-def test_only_a_head_that_convert_wrote_tells_the_start(head, origin, tmp_path):
+def test_only_a_header_written_by_convert_states_the_start(head, origin, tmp_path):
     (tmp_path / "log.csv").write_text(head + "t [s],v\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50)))
     assert LogRows(tmp_path / "log.csv").origin == origin
     assert list(survey(tmp_path / "log.csv").columns) == ["t [s]", "v"]

@@ -1,4 +1,4 @@
-"""Logs of one stroke with chosen columns, and what `cdtool init` makes of them."""
+"""Logs of one stroke with chosen columns, and their drafts by `cdtool init`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RPM = 60.0 / (2.0 * np.pi)
 
 @dataclass(frozen=True)
 class Stroke:
-    """Time [s], speed [m/s], travel [m], drive torque [N m] and the load cell's force [N] of a stroke with a push."""
+    """Time [s], speed [m/s], travel [m], drive torque [N m] and load-cell force [N] of a stroke with a push."""
 
     time: FloatArray
     speed: FloatArray
@@ -38,7 +38,7 @@ def stroke(period: float = 1e-3, length: float = 4.0) -> Stroke:
 
 
 def write(path: Path, columns: Mapping[str, FloatArray]) -> Path:
-    """A CSV file with these columns."""
+    """Write a CSV file with these columns."""
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="", encoding="utf-8")
     return path
@@ -46,7 +46,7 @@ def write(path: Path, columns: Mapping[str, FloatArray]) -> Path:
 
 @dataclass(frozen=True)
 class Draft:
-    """A draft read back: its tables, and what the comments say of each key."""
+    """A draft read back: its tables, and the comments on each key."""
 
     done: Drafted
     machine: dict
@@ -54,7 +54,7 @@ class Draft:
     text: str
 
     def said(self, key: str) -> str:
-        """The comment of a key, behind its line or before it, as one line."""
+        """Return the comment of a key, after its line or before it, as one line."""
         lines = self.text.splitlines()
         at = next(i for i, line in enumerate(lines) if re.match(rf"{key} = ", line))
         if "  # " in lines[at]:
@@ -65,16 +65,16 @@ class Draft:
         return " ".join(line.removeprefix("# ") for line in lines[first:at])
 
     def checked(self, key: str) -> bool:
-        """True where the comment asks for a check."""
+        """Whether the comment asks for a check."""
         return "CHECK" in self.said(key)
 
     def unit(self, channel: str) -> str:
-        """The unit that the draft gives to a channel."""
+        """Return the unit of the channel in the draft."""
         return self.channels[channel]["unit"]
 
 
 def drafted(log: Path, folder: Path) -> Draft:
-    """The draft of a log; `cdtool info` reads the log with it, and no line of comment is too wide."""
+    """Return the draft of a log; `cdtool info` reads the log with it, and no comment line is too wide."""
     path = folder / "machine.toml"
     done = init(log, path, force=True)
     assert not done.left_out
@@ -85,5 +85,5 @@ def drafted(log: Path, folder: Path) -> Draft:
 
 
 def drafted_columns(folder: Path, columns: Mapping[str, FloatArray]) -> Draft:
-    """The draft of a table with these columns."""
+    """Return the draft of a table with these columns."""
     return drafted(write(folder / "log.csv", columns), folder)

@@ -1,4 +1,4 @@
-"""`cdtool init`: which column is taken for which channel, by its name and in spite of its course."""
+"""`cdtool init`: the column guessed for each channel, by its name and despite its values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def following_error(run, size):
 
 
 @pytest.mark.parametrize("word", ["Schleppfehler", "following_error", "lag", "Regelabweichung", "speed deviation"])
-def test_a_following_error_is_no_channel(tmp_path, word):
+def test_a_following_error_is_not_a_channel(tmp_path, word):
     run = stroke()
     noise = np.random.default_rng(3).normal(0.0, 0.005, len(run.time))
     draft = drafted_columns(
@@ -37,7 +37,7 @@ def test_a_following_error_is_no_channel(tmp_path, word):
     assert word not in columns_of(draft) and "reference_speed" not in draft.channels
 
 
-def test_what_is_named_measured_never_becomes_a_set_value(tmp_path):
+def test_a_name_for_a_measured_value_is_never_a_set_value(tmp_path):
     run = stroke()
     noise = np.random.default_rng(3).normal(0.0, 0.005, len(run.time))
     draft = drafted_columns(
@@ -46,24 +46,24 @@ def test_what_is_named_measured_never_becomes_a_set_value(tmp_path):
     assert column(draft, "speed") == "actual_speed" and "reference_speed" not in draft.channels
 
 
-def test_a_column_without_a_name_displaces_none_that_has_one(tmp_path):
+def test_an_unnamed_column_does_not_replace_a_named_one(tmp_path):
     run = stroke()
     noise = np.random.default_rng(3).normal(0.0, 0.005, len(run.time))
     draft = drafted_columns(tmp_path, {"t": run.time, "speed": run.speed, "mystery": run.speed + noise})
     assert column(draft, "speed") == "speed"
 
 
-def test_of_two_columns_of_one_name_the_smoother_is_the_set_value_and_both_are_marked(tmp_path):
+def test_the_smoother_of_two_equally_named_columns_is_the_set_value(tmp_path):
     run = stroke()
     noise = np.random.default_rng(3).normal(0.0, 0.005, len(run.time))
     draft = drafted_columns(tmp_path, {"t": run.time, "speed a": run.speed, "speed b": run.speed + noise})
     assert column(draft, "speed") == "speed b" and column(draft, "reference_speed") == "speed a"
-    assert "course alone" in draft.said("speed") and "course alone" in draft.said("reference_speed")
+    assert "values only" in draft.said("speed") and "values only" in draft.said("reference_speed")
 
 
 @pytest.mark.parametrize("cell", ["loadcell_N", "load cell", "Kraftmessdose", "Waegezelle", "F_cell", "Kraft", "F"])
 def test_a_load_cell_never_becomes_the_torque(tmp_path, cell):
-    """Its course is that of a drive here, so that only the name keeps it out."""
+    """Its values are those of a drive here, so that only the name excludes it."""
     run = stroke()
     draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, cell: run.torque * 100.0})
     assert column(draft, "force") == cell and "torque" not in draft.channels
@@ -72,7 +72,7 @@ def test_a_load_cell_never_becomes_the_torque(tmp_path, cell):
 @pytest.mark.parametrize(
     "drive", ["force_drive_N", "driveforce", "drive_force [N]", "Antriebskraft", "Kraft_Antrieb_N"]
 )
-def test_the_drives_force_is_the_torque_beside_a_load_cell(tmp_path, drive):
+def test_the_drives_force_is_the_torque_next_to_a_load_cell(tmp_path, drive):
     run = stroke()
     draft = drafted_columns(
         tmp_path,
@@ -83,7 +83,7 @@ def test_the_drives_force_is_the_torque_beside_a_load_cell(tmp_path, drive):
     assert draft.unit("torque") == "N" and draft.unit("force") == "N"
 
 
-def test_without_names_a_column_that_rests_and_peaks_is_no_torque(tmp_path):
+def test_an_unnamed_column_with_rest_and_peaks_is_not_a_torque(tmp_path):
     run = stroke()
     path = tmp_path / "log.csv"
     np.savetxt(path, np.column_stack((run.time, run.travel, run.speed, run.force)), delimiter=",")
@@ -91,7 +91,7 @@ def test_without_names_a_column_that_rests_and_peaks_is_no_torque(tmp_path):
     assert "torque" not in draft.channels and column(draft, "force") == 3
 
 
-def test_a_unit_at_the_end_of_a_name_is_no_channel(tmp_path):
+def test_a_unit_at_the_end_of_a_name_is_not_a_channel(tmp_path):
     run = stroke()
     pulses = np.where(run.time > 2.0, 5.0, 0.0)
     draft = drafted_columns(tmp_path, {"t": run.time, "x": run.travel, "pulses_N": pulses, "tau_m": run.torque})
@@ -105,7 +105,7 @@ def test_a_header_unit_keeps_a_column_from_what_it_cannot_measure(tmp_path):
 
 
 @needs_data("emps/DATA_EMPS_PULSES.mat")
-def test_the_shaker_of_a_bench_is_no_speed_of_rotation(tmp_path):
+def test_the_shaker_of_a_bench_is_not_a_speed_of_rotation(tmp_path):
     draft = drafted(data("emps/DATA_EMPS_PULSES.mat"), tmp_path)
     assert "speed" not in draft.channels and column(draft, "position") == "qm" and draft.checked("position")
-    assert "course alone" in draft.said("torque")
+    assert "values only" in draft.said("torque")

@@ -1,4 +1,4 @@
-"""`cdtool init` on topics: only types of messages that are known to be in SI units are said to be so."""
+"""`cdtool init` on topics: SI units are assumed only for known types of messages."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.workflows.init.units import is_si
 from tests.workflows.init.drafts import RPM, drafted, stroke
 
-LEAD = 1.5e-3  # m of travel per rad of the motor
+LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
 
 def write_json(path, topics):
-    """Messages in JSON of types that nobody knows; `topics`: topic -> field -> values at 1 kHz."""
+    """Messages in JSON of unknown types; `topics`: topic -> field -> values at 1 kHz."""
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
@@ -61,7 +61,7 @@ def test_units_in_the_names_of_fields_are_read_and_the_ratio_makes_them_certain(
         ("", False),
     ],
 )
-def test_si_units_are_said_of_known_types_only(name, known):
+def test_si_units_are_assumed_only_for_known_types(name, known):
     assert is_si(name) is known
 
 
@@ -81,11 +81,11 @@ def test_a_known_type_needs_neither_unit_nor_mark(tmp_path):
 
 def test_a_known_type_whose_numbers_are_not_in_si_units_is_marked(tmp_path):
     draft = drafted(joint_states(tmp_path, RPM), tmp_path)
-    assert "in SI units it were 1" in draft.said("position") and draft.checked("speed")
+    assert "must be 1 in SI units" in draft.said("position") and draft.checked("speed")
 
 
-def test_a_sensor_of_forces_never_gives_the_torque(tmp_path):
-    """Its torque moves here, and is named so."""
+def test_a_force_sensor_is_never_the_torque(tmp_path):
+    """Its torque moves here, and has that name."""
     run = stroke()
     path = tmp_path / "a.mcap"
     cell = {"wrench.torque.x": run.torque, "wrench.force.x": run.force}
@@ -96,7 +96,7 @@ def test_a_sensor_of_forces_never_gives_the_torque(tmp_path):
     assert draft.channels["speed"]["topic"] == "/rpm" and draft.checked("speed")
 
 
-def test_topics_that_tell_of_no_channel_stand_in_the_file_as_comments(tmp_path):
+def test_unrecognised_topics_are_comments_in_the_file(tmp_path):
     run = stroke()
     path = write_json(tmp_path / "a.mcap", {"box": {"alpha": np.sin(run.time), "beta": np.sin(run.time) ** 2}})
     draft = drafted(path, tmp_path)

@@ -1,4 +1,4 @@
-"""`cdtool init`: which units are told, which are marked, and what the ratio of position to speed says."""
+"""`cdtool init`: stated units, marked guesses, and the ratio of position to speed."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from cdtool.units import find_unit
 from tests.data_folder import data, needs_data
 from tests.workflows.init.drafts import RPM, drafted, drafted_columns, stroke, write
 
-LEAD = 1.5e-3  # m of travel per rad of the motor
+LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
 
 @pytest.mark.parametrize("rate", [2500, 4000, 10000])
-def test_a_clock_in_ms_that_nothing_tells_is_weighed_with_the_units_of_position_and_speed(tmp_path, rate):
+def test_an_unstated_clock_unit_is_guessed_with_those_of_position_and_speed(tmp_path, rate):
     run = stroke(1.0 / rate)
     draft = drafted_columns(
         tmp_path, {"time": run.time * 1e3, "pos": run.travel, "vel": run.speed, "torque": run.torque}
@@ -26,7 +26,7 @@ def test_a_clock_in_ms_that_nothing_tells_is_weighed_with_the_units_of_position_
     assert "ms with mm, mm/s" in draft.said("time") and "s with m, mm/s fit as well" in draft.said("time")
 
 
-def test_a_clock_in_minutes_is_told_by_the_ratio_and_marked(tmp_path):
+def test_a_clock_in_minutes_is_recognised_by_the_ratio_and_marked(tmp_path):
     run = stroke()
     draft = drafted_columns(tmp_path, {"time": run.time / 60.0, "pos": run.travel, "vel": run.speed})
     assert draft.channels["time"]["unit"] == "min" and draft.checked("time")
@@ -135,7 +135,7 @@ def test_header_units_that_the_ratio_contradicts_are_marked(tmp_path):
     assert draft.unit("speed") == "m/s" and "1.25 of the speed, not 1" in draft.said("speed")
 
 
-def test_a_ratio_near_that_of_units_is_not_taken_for_it(tmp_path):
+def test_a_ratio_near_that_of_units_does_not_match_them(tmp_path):
     run = stroke()
     counts = np.round(run.travel * 1.024e4)
     draft = drafted_columns(tmp_path, {"t": run.time, "speed_percent": run.speed * 10.0, "pos_counts": counts})
@@ -148,7 +148,7 @@ def test_a_ratio_near_that_of_units_is_not_taken_for_it(tmp_path):
     [("phi", "n", True), ("pos", "n", False)],
     ids=["an angle by name", "a position that may be a travel"],
 )
-def test_a_ratio_is_certain_only_where_the_names_tell_of_the_same(tmp_path, position, speed, certain):
+def test_a_ratio_is_certain_only_if_the_names_agree(tmp_path, position, speed, certain):
     run = stroke()
     draft = drafted_columns(tmp_path, {"t [s]": run.time, position: run.travel, speed: run.speed * RPM})
     assert (draft.unit("position"), draft.unit("speed")) == ("rad", "rpm")
@@ -160,7 +160,7 @@ def test_units_in_names_that_fit_the_ratio_are_not_marked(tmp_path):
     columns = {"time_s": run.time, "velocity_mps": run.speed, "position_m": run.travel, "force_kg": run.force}
     draft = drafted_columns(tmp_path, columns)
     assert not draft.checked("position") and not draft.checked("speed")
-    assert draft.unit("force") == "kgf" and "only its name" in draft.said("force")
+    assert draft.unit("force") == "kgf" and "only from its name" in draft.said("force")
 
 
 @needs_data("ur3e/L1L2.csv")

@@ -1,4 +1,4 @@
-"""The accelerometer against the derivative of the speed: what is wrong is found, and vibration is no evidence."""
+"""The accelerometer compared with the derivative of the speed: errors are found, and vibration is no evidence."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def scaled(recording: Recording, factor: float) -> Recording:
 
 
 @pytest.mark.parametrize("folder", ["gate", "arm/trial_1", "arm/trial_2"])
-def test_no_sample_run_has_a_warning_and_a_joint_that_is_held_is_no_evidence(folder):
+def test_no_sample_run_has_a_warning_and_a_held_joint_is_no_evidence(folder):
     for path in sorted((LOGS / folder / "free").iterdir()):
         recording = log(folder, f"free/{path.name}")
         assert warnings(recording) == []

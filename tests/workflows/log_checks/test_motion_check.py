@@ -1,4 +1,4 @@
-"""Do speed and position of a log agree? Joints at rest say nothing of units, and a warning names joint and units."""
+"""Consistency of speed and position in a log: joints at rest are no evidence, and a warning names joint and units."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_joints_at_rest_give_no_warning_whatever_noise_offset_and_encoder(seed, 
     speed, position = (np.column_stack([column, column, column]) for column in swing(0.5))
     speed[:, 1:] = offset + rng.normal(0.0, 5e-3, (len(TIME), 2))
     position[:, 1:] = 0.3 + rng.normal(0.0, 2e-5, (len(TIME), 2))
-    # The wrist sags by some encoder steps while it is held.
+    # The wrist sags by a few encoder steps while it is held.
     position[:, 2] += 4e-4 * TIME / TIME[-1]
     if quantum:
         position = np.round(position / quantum) * quantum

@@ -34,7 +34,7 @@ def door(tmp_path_factory) -> Path:
 
 def written(folder: Path, text: str) -> Path:
     file = folder / "benchmark.toml"
-    # A key of the file itself stands before its first table.
+    # A key of the file itself precedes its first table.
     key, table = (text, "") if text.startswith("threshold") else ("", text)
     file.write_text(HEAD + key + LOGS + table, encoding="utf-8")
     return file
@@ -54,7 +54,7 @@ def test_contacts_in_both_directions_are_found_whatever_the_threshold(door, text
     results = cdtool.benchmark(written(door, text)).results
     assert [row.outcome for row in results.contacts] == ["detected"] * 3
     assert all(5.0 < row.latency_ms < 200.0 for row in results.contacts)
-    # Obstacles oppose the motion: below where it goes backward (strokes 1 and 5), above where it goes forward.
+    # Obstacles oppose the motion: below the band in backward strokes (1 and 5), above it in forward ones.
     if "combined" not in text:
         assert [row.side for row in results.contacts] == ["below", "above", "below"]
 
@@ -81,7 +81,7 @@ def test_what_the_signature_learns_is_set_in_its_own_table(door):
     assert rule.signature.position_step == 0.01 and rule.signature.alignment == "position"
 
 
-def test_limits_set_by_hand_stand_instead_of_what_the_runs_teach_and_results_say_so(door):
+def test_limits_set_by_hand_replace_learned_ones_and_results_state_it(door):
     setup = read_benchmark_file(written(door, '[threshold]\nname = "limit"\nlimits = 50\n'))
     assert setup.rule == Limit(limits=(50,)) and setup.limits_by_hand == (50,)
     done = cdtool.benchmark(setup)
@@ -92,7 +92,7 @@ def test_limits_set_by_hand_stand_instead_of_what_the_runs_teach_and_results_say
     assert 50.0 not in {row.limit for row in learned.contacts}
 
 
-def test_results_say_in_which_unit_the_statistic_is(door):
+def test_results_state_the_unit_of_the_statistic(door):
     units = cdtool.benchmark(written(door, 'threshold = "cusum"\n')).results.provenance["units"]
     assert units == {"momentum": "1"}
     units = cdtool.benchmark(written(door, 'threshold = "trend"\n')).results.provenance["units"]
@@ -131,7 +131,7 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ("[activation]\nlatched = true\n", "activation.latched: unknown key"),
         ("[activation]\nhysteresis = 1\n", "activation.hysteresis: is 1.*below 1"),
         ("[activation]\nrearm_s = -1\n", "activation.rearm_s: is -1"),
-        ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs to another table.*\[activation\]"),
+        ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs in another table.*\[activation\]"),
         ('[threshold]\nname = "combined"\nmembers = ["limit"]\n', "two or more"),
     ],
 )
@@ -144,11 +144,11 @@ def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):
     hand = '[threshold]\nname = "limit"\nlimits = 50\n'
     file = written(door, hand)
     file.write_text(file.read_text(encoding="utf-8").replace('["gm"]', '["gm", "pt"]'), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="set by hand beside 2 detectors"):
+    with pytest.raises(ConfigurationError, match="set by hand together with 2 detectors"):
         read_benchmark_file(file)
     file = written(door, hand)
     file.write_text('false_alarm_budget = "1/8op"\n' + file.read_text(encoding="utf-8"), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="set by hand beside a false-alarm budget"):
+    with pytest.raises(ConfigurationError, match="set by hand together with a false-alarm budget"):
         read_benchmark_file(file)
     with pytest.raises(ConfigurationError, match="set by hand"):
         cdtool.benchmark(written(door, hand), false_alarm_budget="1/8op")
@@ -174,9 +174,9 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
     assert found.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
 
 
-def test_a_factor_set_by_hand_is_refused_beside_a_budget_and_told_without_one(door):
+def test_a_factor_set_by_hand_is_refused_with_a_budget_and_shown_without(door):
     machine, logs = door / "machine.toml", [door / "free.csv"]
-    with pytest.raises(UsageError, match="set by hand, and a false-alarm budget 1/8op"):
+    with pytest.raises(UsageError, match="set by hand cannot be combined with a false-alarm budget 1/8op"):
         cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion", false_alarm_budget="1/8op")
     by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion").signature
     assert by_hand.described == "limit, safety factor 9 set by hand"

@@ -1,7 +1,7 @@
-"""The force-time curve of a contact, with which a force limit is compared.
+"""The force-time curve of a contact, to be checked against a force limit.
 
-Conventions: time counts from the contact's onset [s]. The force is positive in the direction in which the contact
-presses, whatever the load cell's sign. Samples are missing where two are further apart than `missing_samples` allows.
+Conventions: time counts from the contact's onset [s]. The force is positive in the direction of the contact, whatever
+the load cell's sign. Samples are missing if two are further apart than `missing_samples` allows.
 """
 
 from __future__ import annotations
@@ -16,25 +16,24 @@ from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 
-# This many equal readings in a row at the largest one: the cell stands at its stop.
+# Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
-# recording's top speed the axis stands still.
+# recording's top speed the axis is at rest.
 _BEFORE = 0.1
-# A cell that ends so much earlier than its log [s] while it still presses has not seen the rest of the contact.
+# A cell that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
 _TAIL = 0.1
 _STANDSTILL = 0.05
 
 
 @dataclass(frozen=True)
-class ForceCourse:
-    """Contact force (n,) [N] at the times (n,) [s after the onset] of the samples that are present.
+class ForceTimeCurve:
+    """Contact force (n,) [N] at the times (n,) [s after the onset] of the existing samples.
 
-    `clipped` (n,): the load cell stood at its stop, the true force was larger. `end`: how long after the onset the
-    record goes on [s]. `clock` (m,): the times of the cell's samples in the whole record [s], if
-    they are not these. `before`: how long before the first
-    sample the one before it was taken [s], in which the force was at rest; NaN where that is not known. `hole`: samples
-    were missing for so long where the contact may have begun, up to `uncertainty` earlier [s].
+    `clipped` (n,): the load cell was at its stop, the true force was larger. `end`: how long the record continues after
+    the onset [s]. `clock` (m,): the times of the cell's samples in the whole record [s], if different. `before`: time
+    from the preceding sample, at which the force was at rest, to the first sample [s]; NaN if unknown. `hole`: for how
+    long samples are missing where the contact may have begun, up to `uncertainty` earlier [s].
     """
 
     time: FloatArray
@@ -48,17 +47,17 @@ class ForceCourse:
 
     @property
     def saturated(self) -> bool:
-        """The load cell stood at its stop somewhere."""
+        """Whether the load cell was at its stop at any time."""
         return bool(self.clipped.any())
 
     @property
     def peak(self) -> float:
-        """Largest force [N]."""
+        """Return the largest force [N]."""
         return float(self.force.max())
 
     @property
     def longest_step(self) -> float:
-        """How far apart samples may be without one missing between them [s]."""
+        """Return the largest distance of two samples without a missing one between them [s]."""
         return longest_step(self._clock)
 
     @property
@@ -66,28 +65,28 @@ class ForceCourse:
         return self.time if self.clock is None else self.clock
 
     def holes(self) -> tuple[FloatArray, FloatArray]:
-        """Where samples are missing: beginnings and ends [s after the onset]."""
+        """Return where samples are missing: beginnings and ends [s after the onset]."""
         marks = np.concatenate(([0.0], self.time, [max(self.end, float(self.time[-1]))]))
         wide = np.flatnonzero(np.diff(marks) > self.longest_step)
         return marks[wide], marks[wide + 1]
 
     def longest_hole(self, until: float = float("inf")) -> float:
-        """For how long samples are missing at most, at the onset and up to `until` [s after the onset]; 0: nowhere."""
+        """Return the longest interval of missing samples, at the onset and up to `until` [s after the onset], or 0."""
         begins, ends = self.holes()
         inside = begins <= until
         return max(self.hole, float(np.max(ends[inside] - begins[inside], initial=0.0)))
 
     @property
-    def lacks_samples(self) -> bool:
+    def has_missing_samples(self) -> bool:
         """Whether samples are missing anywhere, for longer than the cell's clock explains."""
         return bool(self.longest_hole() or self.could_reach(-np.inf, np.inf)[1])
 
     def could_reach(self, begin: float, end: float) -> tuple[float, float]:
-        """The largest force [N] in steps that are no holes, but longer than the rhythm, and that step [s].
+        """Return the largest possible force [N] in steps longer than the period but not holes, and that step [s].
 
-        `begin`, `end` [s after the onset]. Between forces a and b, d apart in time, it cannot be above (a + b) / 2 +
-        s d / 2 where it changes by no more than s a second: by the steepest change in as much time beside the step.
-        Both are 0 where there is no such step.
+        `begin`, `end` [s after the onset]. Between forces a and b, a time d apart, it cannot exceed (a + b) / 2 + s d /
+        2 if it changes by at most s per second: the steepest change in as much time next to the step. Both are 0
+        without such a step.
         """
         time, force, period, longest = self.time, self.force, _period(self._clock), self.longest_step
         if np.isfinite(self.before):
@@ -104,29 +103,29 @@ class ForceCourse:
         return found
 
 
-def force_course(
+def force_time_curve(
     recording: Recording, contact: Contact, mass_before_cell: float = 0.0, until: float = float("inf")
-) -> ForceCourse:
-    """F_contact = F_cell + m a: load cell less its reading at rest, and the inertia before it (thesis figure 4.11).
+) -> ForceTimeCurve:
+    """Return F_contact = F_cell + m a: load cell minus its reading at rest, plus inertia (thesis figure 4.11).
 
-    `recording`: the one that the contact was found in, whole, since the reading at rest is that before the onset; on
-    the load side. `until`: when the next contact begins [s on its clock]; the course ends there. `mass_before_cell`
-    [kg]: what moves with the machine between load cell and contact; a [m/s2] is its acceleration in the direction of
-    the contact force on it, against the motion of the leading joint: F = F_cell - m sign(v) a_measured. The
-    acceleration is interpolated linearly to the cell's clock. A bias of the accelerometer comes out as m times it.
+    `recording`: the whole recording in which the contact was found, on the load side, since the reading at rest is that
+    before the onset. `until`: start of the next contact [s on its clock], at which the curve ends. `mass_before_cell`
+    [kg]: mass that moves with the machine between load cell and contact; a [m/s2] is its acceleration in the direction
+    of the contact force on it, against the motion of the leading joint: F = F_cell - m sign(v) a_measured. The
+    acceleration is interpolated linearly to the cell's clock. A bias of the accelerometer appears multiplied by m.
 
-    A sample is clipped where 5 readings in a row, or 5 times as many as the cell usually repeats, equal the largest: a
+    A sample is clipped if 5 consecutive readings, or 5 times as many as the cell usually repeats, equal the largest; a
     coarse cell under a steady push looks the same. Raises UsageError for a negative mass; RecordingError without a
-    force sample after the onset, or, with a mass, without acceleration in m/s2, without speed, or at standstill.
+    force sample after the onset, or, with a mass, without acceleration in m/s2, without speed, or at rest.
     """
     if mass_before_cell < 0.0 or not np.isfinite(mass_before_cell):
-        raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "0 or more")
+        raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "give 0 or more")
     time, reading = _present(recording["force"])
     whole = time
     if not np.any((time >= contact.start) & (time < until)):
         raise RecordingError(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
-            "take the force limits of contacts that the load cell saw",
+            "check the force limits of contacts on the load cell",
         )
     over = reading - (contact.rest if np.isfinite(contact.rest) else rest_before(time, reading, contact.start))
     part = (time >= contact.start) & (time < until)
@@ -142,7 +141,7 @@ def force_course(
         raise RecordingError(f"{recording.name}: no acceleration after the onset", "set mass_before_cell to 0")
     end = min(_end(recording, contact, whole), until) - contact.start
     earlier = whole[whole < contact.start]
-    return ForceCourse(
+    return ForceTimeCurve(
         time[known] - contact.start,
         force[known],
         clipped[known],
@@ -154,12 +153,12 @@ def force_course(
     )
 
 
-def force_at(course: ForceCourse, time: float) -> float:
-    """Force [N] of the last sample at or before a time [s after the onset]; NaN before the first and in a hole."""
-    at = int(np.searchsorted(course.time, time, side="right")) - 1
-    if at < 0 or time - course.time[at] > course.longest_step:
+def force_at(curve: ForceTimeCurve, time: float) -> float:
+    """Return the force [N] of the last sample at or before a time [s after the onset]; NaN without a sample there."""
+    at = int(np.searchsorted(curve.time, time, side="right")) - 1
+    if at < 0 or time - curve.time[at] > curve.longest_step:
         return float("nan")
-    return float(course.force[at])
+    return float(curve.force[at])
 
 
 def _present(series: Series) -> tuple[FloatArray, FloatArray]:
@@ -168,7 +167,7 @@ def _present(series: Series) -> tuple[FloatArray, FloatArray]:
 
 
 def _end(recording: Recording, contact: Contact, whole: FloatArray) -> float:
-    """Until when there should be samples [s]: the cell's last one, or the log's, where the cell ends in the contact."""
+    """Return until when samples are expected [s]: the cell's last one, or the log's if the cell ends in the contact."""
     last = float(recording["force"].time[-1])
     pressing = contact.end >= float(whole[-1]) - longest_step(whole)
     return recording.end if pressing and recording.end - last > _TAIL else last
@@ -179,7 +178,7 @@ def _period(time: FloatArray) -> float:
 
 
 def _clipped(force: FloatArray) -> BoolArray:
-    """Samples at the largest reading, where the cell is stuck there longer than it usually repeats a reading."""
+    """Return the samples at the largest reading, if it repeats more often than the cell usually repeats a reading."""
     edges = np.flatnonzero(np.diff(force)) + 1
     lengths = np.diff(np.concatenate(([0], edges, [len(force)])))
     first = np.concatenate(([0], edges))
@@ -191,17 +190,17 @@ def _clipped(force: FloatArray) -> BoolArray:
 
 
 def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatArray) -> FloatArray:
-    """Acceleration (m,) [m/s2] in the direction of the contact force on the machine, at the times of `clock`."""
+    """Return the acceleration (m,) [m/s2] in the direction of the contact force on the machine, at times `clock`."""
     for channel in ("acceleration", "speed"):
         if channel not in recording:
             raise RecordingError(
-                f"{recording.name}: mass_before_cell needs the channel '{channel}'",
+                f"{recording.name}: mass_before_cell requires the channel '{channel}'",
                 "map it in [channels], or set mass_before_cell to 0",
             )
     measured = recording["acceleration"]
     if measured.unit != "m/s2":
         raise RecordingError(
-            f"{recording.name}: mass_before_cell needs the acceleration in m/s2, not in {measured.unit}",
+            f"{recording.name}: mass_before_cell requires the acceleration in m/s2, not in {measured.unit}",
             "set mass_before_cell to 0",
         )
     joint = leading_joint(recording["speed"])
@@ -209,7 +208,7 @@ def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatA
 
 
 def _direction(recording: Recording, joint: int, onset: float) -> float:
-    """+1 or -1: where the joint was going when the contact began."""
+    """Return +1 or -1: the direction of the joint at the beginning of the contact."""
     series = recording["speed"]
     speed = series.values[:, joint]
     before = speed[(series.time >= onset - _BEFORE) & (series.time <= onset)]
@@ -217,14 +216,14 @@ def _direction(recording: Recording, joint: int, onset: float) -> float:
     mean = float(np.mean(before)) if len(before) else 0.0
     if abs(mean) <= _STANDSTILL * float(np.nanmax(np.abs(speed), initial=0.0)):
         raise RecordingError(
-            f"{recording.name}: the axis stands still at {onset:.3f} s: where the contact pushes it is not known",
+            f"{recording.name}: the axis is at rest at {onset:.3f} s: the direction of the contact force is unknown",
             "set mass_before_cell to 0",
         )
     return 1.0 if mean > 0.0 else -1.0
 
 
 def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
-    """Linear interpolation between samples that are present; NaN outside and where samples are missing."""
+    """Interpolate linearly between existing samples; NaN outside and where samples are missing."""
     present = np.isfinite(values)
     time, values = time[present], values[present]
     if len(time) < 2:

@@ -1,4 +1,4 @@
-"""A detector that lacks a channel is not assessable and stops no other; where all lack one it is an error."""
+"""A detector with a missing channel is not assessable and does not stop others; if none can run, it is an error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def benchmark(folder: Path, detectors: str, *more: object, limits: str = ""):
     return cdtool("benchmark", folder / "benchmark.toml", *more)
 
 
-def test_the_others_go_on_and_its_contacts_are_not_assessable_with_the_reason(folder):
+def test_other_detectors_run_and_its_contacts_are_not_assessable(folder):
     done = benchmark(folder, '["gm", "pi"]', "-o", folder / "r.json", "-o", folder / "r.md", "-o", folder / "r.html")
     assert done.status == 3
     why = "pure_inertia needs the channel 'acceleration'"
@@ -61,14 +61,14 @@ def test_a_limit_on_it_is_not_met(folder):
     )
 
 
-def test_where_all_lack_one_the_error_says_which_to_take_out(folder):
+def test_if_no_detector_can_run_the_error_says_which_to_remove(folder):
     done = benchmark(folder, '["pi", "igm"]')
     assert done.status == 2 and done.err.count("\n") == 1
     assert "needs the channel 'acceleration'" in done.err
-    assert "take pure_inertia, inertial_momentum out of `detectors`" in done.err
+    assert "remove pure_inertia, inertial_momentum from `detectors`" in done.err
 
 
-def test_where_no_log_could_be_read_the_detectors_are_not_to_blame(folder):
+def test_if_no_log_can_be_read_the_detectors_are_not_blamed(folder):
     for path in (folder / "free").iterdir():
         path.write_text("", encoding="utf-8")
     done = benchmark(folder, '["gm", "pi"]')

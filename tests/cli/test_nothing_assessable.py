@@ -1,4 +1,4 @@
-"""Logs of which no contact could be judged: other speed, or several strokes in one operation. All commands say so."""
+"""Logs without an assessable contact (other speed, several strokes in one operation) are reported by all commands."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Rows = list[list[float]]
 
 
 def rows_of(name: str) -> Rows:
-    """Time [ms], current, speed [rpm], position [rad], acceleration and force of one shipped log."""
+    """Time [ms], current, speed [rpm], position [rad], acceleration and force of one sample log."""
     with (SAMPLES / name).open(encoding="utf-8") as stream:
         return [[float(row[column]) for column in COLUMNS] for row in csv.DictReader(stream)]
 
 
 def benchmark_of(folder: Path, rows: Rows, more: str = "") -> tuple[Path, Path]:
-    """A benchmark file with one log of impacts, without reference channels; the file and the log."""
+    """Return a benchmark file with one impact log, without reference channels, and that log."""
     log = folder / "stiff" / "hit.csv"
     log.parent.mkdir()
     lines = [",".join(COLUMNS), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
@@ -38,8 +38,8 @@ def benchmark_of(folder: Path, rows: Rows, more: str = "") -> tuple[Path, Path]:
     return file, log
 
 
-def test_all_three_commands_end_with_3_where_no_contact_could_be_assessed(tmp_path):
-    """A false alarm beside it excuses nothing."""
+def test_all_three_commands_exit_with_3_if_no_contact_is_assessable(tmp_path):
+    """An additional false alarm does not change the result."""
     rows = [[1.3 * row[0], row[1], row[2] / 1.3, *row[3:]] for row in rows_of("stiff/04.csv")]
     file, log = benchmark_of(tmp_path, rows)
     scored = cdtool("benchmark", file)
@@ -51,7 +51,7 @@ def test_all_three_commands_end_with_3_where_no_contact_could_be_assessed(tmp_pa
 
 
 def two_strokes() -> Rows:
-    """One run that stops and stands for four seconds, and an impact from there on: the position goes on."""
+    """One run followed by four seconds of rest and an impact, with a continuous position."""
     rows, hit = rows_of("free/05.csv"), rows_of("stiff/03.csv")
     speed, place = rows[-1][2], rows[-1][3]
     for i in range(400):
@@ -64,11 +64,11 @@ def two_strokes() -> Rows:
 
 
 @pytest.mark.parametrize("more", ["", 'operations = "motion"\n'])
-def test_a_log_of_two_strokes_that_is_not_cut_is_told_how_to_cut_it(tmp_path, more):
+def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):
-        told = 'not judged: cut it with operations = "motion" in the benchmark file, or --operations motion'
+        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or --operations motion'
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)
