@@ -295,7 +295,7 @@ def update_by(path: str | Path, options: UpdateOptions) -> Updated:
     >>> write_signature("season.json", cdtool.learn_signature(free, machine, "momentum").signature)
     >>> updated = cdtool.update_signature("season.json", ["sample_logs/gate/holdout/03.csv", free[0]], machine)
     >>> len(updated.added), [skipped.reason for skipped in updated.refused]
-    (1, ['this run is in the signature already'])
+    (1, ['this run is already in the signature'])
     """
     forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
