@@ -27,7 +27,13 @@ ROOT = Path(__file__).parents[2]
 TO_REWRITE = (
     "cdtool/clock",
     "cdtool/formats",
+    "cdtool/ingest",
+    "cdtool/messages",
+    "tests/clock",
     "tests/formats",
+    "tests/ingest",
+    "tests/made_up",
+    "tests/messages",
 )
 
 _EXEMPT = re.compile(r"(?:#|<!--) language: (?!-->)\S+")
