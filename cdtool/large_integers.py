@@ -6,8 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.plain_text import counted
-from cdtool.recording import Finding, FloatArray
+from cdtool.findings import Finding
+from cdtool.findings.containers import RoundedIntegers
+from cdtool.recording import FloatArray
 
 # Up to here float64 holds every integer; from there on 64 bits hold none.
 _EXACT, _WIDEST = 2.0**53, 2.0**64
@@ -23,5 +24,4 @@ def rounded_integers(values: FloatArray) -> int:
 
 def rounding_finding(column: str, count: int, severity: Literal["note", "warning"] = "warning") -> list[Finding]:
     """What is said of a column with so many of them; nothing of none."""
-    text = f"{counted(count, 'value')} beyond 2^53: of integers that large the last digits are rounded to float64"
-    return [Finding(text, column, severity)] if count else []
+    return [Finding(RoundedIntegers(count), column, severity)] if count else []

@@ -25,7 +25,7 @@ from cdtool.strict_json import strict_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from cdtool.recording import Finding
+    from cdtool.findings import Finding
     from cdtool.workflows.detection import Detected
     from cdtool.workflows.runs import Progress
 

@@ -31,6 +31,7 @@ def convert(
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
+    from cdtool.findings.containers import Unverified
     from cdtool.workflows.convert.converting import convert as write
 
     with late_progress("converting") as advance:
@@ -43,6 +44,6 @@ def convert(
         for path in done.machine_files:
             typer.echo(f"{plain(path)}: the machine file that reads it")
     for finding in done.findings:
-        if finding.severity != "note" or finding.message.endswith(": unverified"):
+        if finding.severity != "note" or isinstance(finding.fact, Unverified):
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
     leave_with(done.findings)

@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import Finding, FloatArray
+from cdtool.findings import Finding
+from cdtool.findings.containers import PackedValues
+from cdtool.recording import FloatArray
 
 _KEYS = ("scale_factor", "add_offset")
 _MISSING = ("_FillValue", "missing_value")
@@ -70,7 +72,7 @@ class Packing:
         """What is said of a column that is packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
-        return [Finding(f"packed (CF): times {self.scale:g}, plus {self.offset:g}", column, "note")]
+        return [Finding(PackedValues(self.scale, self.offset), column, "note")]
 
 
 def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError, nearest
+from cdtool.findings import Finding
+from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.source import Source
-from cdtool.recording import GROUND_TRUTH, Finding
+from cdtool.recording import GROUND_TRUTH
 
 # What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
 OWN_CLOCK = "time"
-# How a note about ground truth begins that is mapped and not in a log.
-ABSENT = "is not in this log"
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
 
@@ -125,9 +125,13 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
         for item in channels.sources
         if item not in absent
     )
-    what = "topic" if channels.topics else "column"
     notes = [
-        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
+        Finding(
+            AbsentTruth("topic" if channels.topics else "column", item.described, _similar(item, names)),
+            item.channel,
+            "note",
+        )
+        for item in absent
     ]
     return replace(source, findings=(*source.findings, *notes)), replace(channels, time=time, sources=sources)
 
@@ -137,9 +141,8 @@ def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
     return (item.described,) if channels.topics else item.columns
 
 
-def _meant(item: ChannelSource, names: Sequence[str]) -> str:
-    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else ""
+def _similar(item: ChannelSource, names: Sequence[str]) -> str:
+    return next(iter(get_close_matches(item.described, names, n=1, cutoff=0.6)), "")
 
 
 def _alike(column: str, names: Sequence[str]) -> list[str]:

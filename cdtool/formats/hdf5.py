@@ -13,6 +13,9 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
+from cdtool.findings.containers import RowsAsColumns
 from cdtool.formats.cf_attributes import Packing, times_since
 from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import (
@@ -27,8 +30,7 @@ from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.plain_text import first_of
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -123,8 +125,7 @@ class _Tree:
         for i in range(min(item.shape)):
             self.places[f"{name}[{i}]"] = (name, i)
         if item.shape[0] < item.shape[1]:
-            text = f"dataset '{name}' is {item.shape[0]} x {item.shape[1]}: its rows are taken as columns"
-            self.findings.append(Finding(text, severity="note"))
+            self.findings.append(Finding(RowsAsColumns("dataset", name, *item.shape), severity="note"))
 
     def rows(self, key: str) -> int:
         """How many values a column has."""
@@ -161,8 +162,7 @@ class _Tree:
         paths = [path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._made(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
-        text = f"{first_of(paths)} look like the clocks of their groups, but have no unit of time"
-        return [Finding(f"{text}: the attribute unit makes each the clock of its group")]
+        return [Finding(ClocksWithoutUnit(tuple(paths)))]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:
         """The dataset that is a column's clock; a clock is its own."""
@@ -187,7 +187,7 @@ class _Tree:
         try:
             since = times_since(told, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
-            self.findings.append(Finding(f"{fault}: it is no clock", path))
+            self.findings.append(Finding(UnusableClock(str(fault)), path))
             return None
         unit = find_unit(told)
         if since is None and (unit is None or unit.si != "s"):

@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol
 
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
-from cdtool.recording import Finding
+from cdtool.findings import Finding
 
 
 @dataclass(frozen=True)

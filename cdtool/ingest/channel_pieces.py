@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.columns import Column, Piece
+from cdtool.findings import Finding
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.pieces import MappedLog
 from cdtool.formats.time_order import by_time
@@ -16,7 +17,7 @@ from cdtool.ingest.part_gaps import gaps_between
 from cdtool.ingest.part_pieces import FoundParts
 from cdtool.ingest.parts import not_alike, of_part, overlapping
 from cdtool.machine_file import MachineFile
-from cdtool.recording import GROUND_TRUTH, Finding
+from cdtool.recording import GROUND_TRUTH
 
 
 class ChannelPieces:

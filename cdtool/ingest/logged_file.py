@@ -16,6 +16,7 @@ from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
 from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.pieces import MappedLog, Run
 from cdtool.formats.source import Source
@@ -28,7 +29,7 @@ from cdtool.ingest.channel_assembly import (
 )
 from cdtool.ingest.part_gaps import PartSpan
 from cdtool.machine_file import MachineFile
-from cdtool.recording import MEASURED, Finding, FloatArray
+from cdtool.recording import MEASURED, FloatArray
 
 
 class LoggedChannel:

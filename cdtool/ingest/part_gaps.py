@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.clock import GAP_PERIODS
-from cdtool.recording import GROUND_TRUTH, Finding, Recording
+from cdtool.findings import Finding
+from cdtool.findings.parts import PartGap
+from cdtool.recording import GROUND_TRUTH, Recording
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,5 @@ def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
             if gap > GAP_PERIODS * step:
                 gaps[name] = gap
         if gaps:
-            whose = "" if len(gaps) == len(channels) else f" ({', '.join(gaps)})"
-            text = f"begins {min(gaps.values()):.3g} s after the part before it ends{whose}: nothing is logged between"
-            yield Finding(f"{after.path.name}: {text}")
+            gap = PartGap(min(gaps.values()), () if len(gaps) == len(channels) else tuple(gaps))
+            yield Finding(gap, file=after.path.name)

@@ -10,11 +10,11 @@ import numpy as np
 
 from cdtool.columns import Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.pieces import Pieces, Run, header, read_pieces
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.parts import joined_sources, lost_findings
 from cdtool.ingest.reading import choose_format, has_topics, log_parts
-from cdtool.recording import Finding
 
 # Opens a file of a format, for some of its columns or all.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]

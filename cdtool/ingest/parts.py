@@ -13,9 +13,12 @@ import numpy as np
 from cdtool.bounded_loading import read_bytes
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.messages import ArrayLengthsDiffer
+from cdtool.findings.parts import PartCompressed, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
 from cdtool.formats.source import Source
 from cdtool.ingest.part_gaps import PartSpan, gaps_between
-from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
+from cdtool.recording import GROUND_TRUTH, Recording, Series
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
@@ -35,14 +38,9 @@ def lost_parts(folder: Path, parts: Sequence[Path]) -> list[Finding]:
         plain = Path(name).stem if Path(name).suffix in _COMPRESSED else name
         if name in read or plain in read:
             continue
-        what = f"part {name} of {_METADATA}"
-        if not (folder / name).exists():
-            text = f"{what} is not in the folder"
-        elif name != plain:
-            text = f"{what} is compressed as a whole: decompress it, e.g. with zstd -d"
-        else:
-            text = f"{what} is left out: the folder holds parts of another kind too"
-        found.append(Finding(text, severity="loss"))
+        is_there = (folder / name).exists()
+        kind = PartMissing if not is_there else PartCompressed if name != plain else PartOfOtherKind
+        found.append(Finding(kind(name, _METADATA), severity="loss"))
     return found
 
 
@@ -51,7 +49,7 @@ def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
     found = lost_parts(folder, parts)
     for part, fault in unread.items():
         why = fault.message.removeprefix(f"{part}: ")
-        found.append(Finding(f"part {part.name} is left out, it cannot be read: {why}", severity="loss"))
+        found.append(Finding(PartUnreadable(part.name, why), severity="loss"))
     return tuple(found)
 
 
@@ -75,15 +73,14 @@ def joined_sources(
         holding = [part for part in parts if name in part.columns]
         widths = sorted({part.columns[name].values.shape[1:] for part in holding})
         if len(widths) > 1:
-            text = f"arrays of {' and '.join(str(width[0] if width else 1) for width in widths)} elements: left out"
-            findings.append(Finding(text, name, "note"))
+            lengths = ArrayLengthsDiffer(tuple(width[0] if width else 1 for width in widths))
+            findings.append(Finding(lengths, name, "note"))
             continue
         columns[name], overlapping = _joined_column(name, holding, parts[0].origin)
         for path in overlapping:
             late.setdefault(path, []).append(name)
     for path, names in late.items():
-        text = f"{path.name} begins before the part before it ends ({names[0]}): put in the order of the times"
-        findings.append(Finding(text))
+        findings.append(Finding(PartsOverlap(path.name, names[0])))
     details = joined_details(parts)
     return Source(folder, parts[0].format, columns, parts[0].origin, tuple(findings), details, tuple(columns))
 
@@ -132,7 +129,7 @@ def overlapping(part: str, channel: str, start: float, before: float) -> Recordi
 
 def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
     """What is odd about a part, with its name."""
-    return (replace(found, message=f"{path.name}: {found.message}") for found in findings)
+    return (replace(found, file=path.name) for found in findings)
 
 
 def _start(part: Source) -> tuple[float, str]:

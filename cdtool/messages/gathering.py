@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.large_integers import rounded_integers
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import Picked
@@ -20,8 +22,7 @@ from cdtool.messages.rows import Rows
 from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.messages.stream import Stream
 from cdtool.messages.taken import Bound, Destination, Numbers, Part
-from cdtool.plain_text import counted
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 
 class _Field:
@@ -150,9 +151,7 @@ class Gathering:
             if not there.any():
                 raise missing(self.where, text, FieldMissingError("no message names this joint", field.names))
             left_out = len(there) - int(np.count_nonzero(there))
-            findings.append(
-                Finding(f"{counted(left_out, 'message', 'name')} other joints only: left out", name, "note")
-            )
+            findings.append(Finding(OtherJointsOnly(left_out), name, "note"))
         empty = field.widths.pop(0, 0)
         if len(field.widths) > 1:
             found = ", ".join(f"{width} in {count}" for width, count in field.widths.most_common())
@@ -161,7 +160,7 @@ class Gathering:
                 "name one element, e.g. position[0]",
             )
         if empty:
-            findings.append(Finding(f"{counted(empty, 'message', 'hold')} an empty array: NaN", name))
+            findings.append(Finding(EmptyArrays(empty), name))
             if not field.widths:
                 values = np.full((len(values), 1), np.nan)
         if there is not None:

@@ -15,8 +15,9 @@ from cdtool.evaluation.results import CalibrationResult, RecordingResult, Result
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching
+from cdtool.findings import Finding
 from cdtool.pipeline import Detection
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows

@@ -14,14 +14,17 @@ import numpy as np
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
+from cdtool.findings import Fact, Finding, worst_first
+from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
+from cdtool.findings.truth import InProgress
 from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import Finding, Recording, Series, worst_first
+from cdtool.recording import Recording, Series
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
+from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
@@ -121,7 +124,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     rules = ScoringRules()
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
-    findings += [Finding(IN_PROGRESS.format(end=item.end), "force") for item in contacts if item.in_progress]
+    findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
     found = worst_first(findings)
     return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
@@ -162,12 +165,11 @@ def _clock_doubts(
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
     found = list(_named_ones(tables, figures, reread, clock))
     if tables and clock is None:
-        text = "no column looks like a clock: rates, gaps and times are unknown"
-        found.append(Finding(f"{text}; name it, or the sample rate, in [channels] time of a machine file"))
+        found.append(Finding(NoClock()))
     for name, known in clocks.items():
-        doubt = _doubt(known.steps) if name and known.rows > 2 else ""
+        doubt = _doubt(known.steps, named=False) if name and known.rows > 2 else None
         if doubt:
-            found.append(Finding(f"{doubt}", f"{name} time"))
+            found.append(Finding(doubt, f"{name} time"))
     return found
 
 
@@ -183,20 +185,17 @@ def _named_ones(
             steps.add(np.diff(known))
             last = known[-1:]
         forward = figures[column.name]
-        if doubt := _doubt(steps):
-            yield Finding(f"named as a clock, but {doubt}", column.name)
+        if doubt := _doubt(steps, named=True):
+            yield Finding(doubt, column.name)
         elif forward.present == 0:
-            yield Finding("named as a clock, but it holds no stamp", column.name)
+            yield Finding(EmptyClock(), column.name)
         elif clock is None and forward.forward < forward.steps:
-            text = f"named as a clock, but it runs backward at {forward.steps - forward.forward} of its steps"
-            yield Finding(text, column.name)
+            yield Finding(BackwardClock(forward.steps - forward.forward), column.name)
 
 
-def _doubt(steps: Distribution) -> str:
-    """What is odd about steps between stamps, empty where nothing is."""
+def _doubt(steps: Distribution, *, named: bool) -> Fact | None:
+    """What is odd about the steps of a clock, or of a column that is `named` as one."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
-        return f"all of its {steps.count + 1} stamps are the same: the clock stands still"
-    if repeated > COARSE_SHARE:
-        return f"{100.0 * repeated:.3g} % of its stamps repeat: a coarse clock"
-    return ""
+        return StandingClock(steps.count + 1, named)
+    return CoarseStamps(repeated, named) if repeated > COARSE_SHARE else None

@@ -14,12 +14,14 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.findings import Finding
+from cdtool.findings.channels import AbsentTruth
 from cdtool.ingest.reading import read_as_logged, read_recording
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import GROUND_TRUTH, Finding, Recording
+from cdtool.recording import Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
 
@@ -224,13 +226,7 @@ def lost(recording: Recording) -> list[Skipped]:
 
 def absent_truth(recording: Recording) -> list[Finding]:
     """The notes about ground truth that the machine file maps and the log does not hold."""
-    from cdtool.formats.column_names import ABSENT
-
-    return [
-        item
-        for item in recording.findings
-        if item.channel in GROUND_TRUTH and item.channel not in recording and ABSENT in item.message
-    ]
+    return [item for item in recording.findings if isinstance(item.fact, AbsentTruth) and item.channel not in recording]
 
 
 def _glob(path: Path) -> Iterator[Path]:

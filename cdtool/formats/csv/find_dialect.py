@@ -9,6 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from cdtool.channels import TablePins
+from cdtool.findings import Finding
+from cdtool.findings.tables import (
+    DoubtfulPoint,
+    NamedSeparator,
+    NamesFromComment,
+    NumbersAboveRows,
+    OtherEncoding,
+    PinnedLinesSkipped,
+    WordsAboveRows,
+)
 from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
 from cdtool.formats.csv.cell_grid import CellGrid, SampleLines, cut_rows, sort_lines
 from cdtool.formats.csv.cells import MISSING, kind, split_line
@@ -18,12 +28,11 @@ from cdtool.formats.csv.doubtful_points import settled_marks
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.footer import find_footer
 from cdtool.formats.csv.head import Head, refuse_table_above
-from cdtool.formats.csv.lines import Line, refuse_long_line, shown_lines
+from cdtool.formats.csv.lines import Line, refuse_long_line
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
 from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.stamps import Stamped, find_layout
 from cdtool.formats.csv.text import Text
-from cdtool.recording import Finding
 
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
@@ -42,8 +51,8 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
         dialect = _dialect(path, *footer.without(text, stream), pins)
         findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
     marks = dialect.marks if dialect.marks.sure else settled_marks(dialect)
-    if marks.note:
-        findings.append(Finding(marks.note, severity="warning"))
+    if marks.doubt:
+        findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
     text = without_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
     return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
 
@@ -155,25 +164,20 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
 def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
     found = []
     if lines.skipped:
-        found.append(Finding(f"{shown_lines(lines.skipped)} skipped, as [csv] says", severity="note"))
+        found.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
     shown = _SHOWN_ENCODINGS.get(text.encoding)
     if shown:
-        found.append(Finding(f"not valid UTF-8, read as {shown}", severity="note"))
+        found.append(Finding(OtherEncoding(shown), severity="note"))
     if lines.separator:
         line = lines.separator
-        found.append(Finding(f"line {line.number} ({line.text.strip()[:12]}) names the separator", severity="note"))
+        found.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
     if head.numbers:
-        lost = f"{shown_lines(head.numbers)} above the rows skipped though {_holds(head.numbers)} numbers"
-        found.append(Finding(f"{lost}; skip_lines in [csv] says that they are no rows", severity="loss"))
+        found.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
     if words := [line for line in head.preamble if line not in head.numbers]:
-        found.append(Finding(f"{shown_lines(words)} above the rows skipped: no names, no numbers", severity="note"))
+        found.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
     if head.from_comment:
-        found.append(Finding(f"the names are those of the comment in line {head.header_line}", severity="note"))
+        found.append(Finding(NamesFromComment(head.header_line), severity="note"))
     return found
-
-
-def _holds(lines: Sequence[int]) -> str:
-    return "it holds" if len(lines) == 1 else "they hold"
 
 
 def _unique(cells: Sequence[str]) -> list[str]:

@@ -9,11 +9,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
+from cdtool.findings import Finding
+from cdtool.findings.tables import FooterSkipped
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.lines import is_ruler, shown_lines
+from cdtool.formats.csv.lines import is_ruler
 from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
-from cdtool.recording import Finding
 
 _MOST = 12
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
@@ -30,8 +31,7 @@ class Footer:
 
     def finding(self, first_line: int) -> Finding:
         """What is said of a footer that begins in that line of the file."""
-        lines = shown_lines([first_line + line for line in self.lines])
-        return Finding(f"{lines} skipped: a footer ({self.shown[:40]!r}), no sample")
+        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.shown))
 
     def without(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
         """The text, and the sample of its stream, up to the footer."""

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cdtool.findings import Finding
+from cdtool.findings.clocks import WrittenTimes
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.stamps import Layout, seconds_since, unwrapped
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 
 class StampColumns:
@@ -68,12 +70,14 @@ class StampColumns:
         """How each is written, and what its seconds count from."""
         found = []
         for column in self._columns:
-            text, wrap = "", self._layout(column).wraps[1]
-            if column in self._dates:
-                text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
-            elif self._passed[column]:
-                text = f"passes {wrap} {self._passed[column]} times; "
-            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wrap
-            text += f"written as {self._layout(column).pattern}; in s since {since}"
-            found.append(Finding(text, self._dialect.names[column], "note"))
+            layout = self._layout(column)
+            wraps = layout.wraps[1]
+            fact = WrittenTimes(
+                layout.pattern,
+                f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
+                days_column=self._dialect.names[self._dates[column]] if column in self._dates else "",
+                wraps=wraps,
+                wrapped=self._passed[column],
+            )
+            found.append(Finding(fact, self._dialect.names[column], "note"))
         return found

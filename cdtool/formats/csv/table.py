@@ -10,6 +10,8 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.exact_clock import exact_differences
@@ -21,7 +23,7 @@ from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamp_columns import StampColumns
 from cdtool.formats.csv.stamps import NS
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 
 @dataclass
@@ -103,10 +105,9 @@ def end_findings(
         findings += _judge_last_line(dialect, rows, asked, before)
     if odd.cut_line or dialect.text.padding:
         line = odd.cut_line or rows.line(rows.count)
-        findings.insert(0, Finding(f"the last line ({line}) is cut off, dropped", severity="loss"))
+        findings.insert(0, Finding(LastLineCut(line), severity="loss"))
     if dialect.text.padding:
-        text = f"the file ends in {dialect.text.padding} NUL bytes: was the power lost?"
-        findings.append(Finding(text, severity="loss"))
+        findings.append(Finding(NulBytesAtEnd(dialect.text.padding), severity="loss"))
     return findings
 
 
@@ -124,11 +125,12 @@ def _sorted_out(
             else:
                 numeric.append(column)
         elif found.layout is None:
-            text = f"column '{name}': {found.readings}"
             timed = found.layouts[0].timed or _clock_beside(dialect, column) is not None
             if not survey or timed:
-                raise RecordingError(f"{path}: {text}", "pin time_format in [csv] of the machine file")
-            left_out[column] = Finding(f"{text}: left out; pin time_format in [csv]")
+                raise RecordingError(
+                    f"{path}: column '{name}': {found.readings}", "pin time_format in [csv] of the machine file"
+                )
+            left_out[column] = Finding(AmbiguousTimes(name, found.readings))
         else:
             stamps.append(column)
     return numeric, stamps, left_out
@@ -221,11 +223,10 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
     if whole and (certain or not dialect.text.padding):
         if certain:
             return []
-        return [Finding(f"the last line ({line}) has no line end: its last cell '{cell}' is taken to be whole")]
+        return [Finding(LastLineKept(line, cell))]
     rows.count -= 1
     rows.numbers, rows.stamps = rows.numbers[:, :-1], rows.stamps[:, :-1]
     rows.not_rows = np.append(rows.not_rows, line)
     if dialect.text.padding:
         return []
-    text = f"the last line ({line}) has no line end, and '{cell}' may be cut off, dropped"
-    return [Finding(text, severity="loss")]
+    return [Finding(LastLineDropped(line, cell), severity="loss")]

@@ -14,6 +14,7 @@ from typing import ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
@@ -32,7 +33,6 @@ from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
 from cdtool.messages.taken import Bound
 from cdtool.messages.topic_survey import TopicSurvey
-from cdtool.recording import Finding
 
 __all__ = ["Mcap"]
 

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.definitions import Stream
@@ -28,8 +30,7 @@ from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, FieldMissingError, missing, parse_field
 from cdtool.messages.gathering import in_order, tally
 from cdtool.messages.stamp_order import StampOrders, Stamps
-from cdtool.plain_text import counted
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 
 @dataclass
@@ -171,9 +172,7 @@ class _Topic:
         if course.elsewhere:
             if not course.rows:
                 raise missing(self.where, text, FieldMissingError("no message names this joint", course.names))
-            findings.append(
-                Finding(f"{counted(course.elsewhere, 'message', 'name')} other joints only: left out", name, "note")
-            )
+            findings.append(Finding(OtherJointsOnly(course.elsewhere), name, "note"))
         empty = course.widths.pop(0, 0)
         if len(course.widths) > 1:
             found = ", ".join(f"{width} in {count}" for width, count in course.widths.most_common())
@@ -182,6 +181,6 @@ class _Topic:
                 "name one element, e.g. position[0]",
             )
         if empty:
-            findings.append(Finding(f"{counted(empty, 'message', 'hold')} an empty array: NaN", name))
+            findings.append(Finding(EmptyArrays(empty), name))
         shape = (0, course.width or 1) if course.width is not None or empty else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings

@@ -13,11 +13,12 @@ from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
 from cdtool.evaluation.sweep import sweep
+from cdtool.findings import Finding
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Contact, Finding, FloatArray, Recording
+from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows

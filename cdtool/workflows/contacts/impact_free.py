@@ -9,9 +9,10 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.findings import Finding
 from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
-from cdtool.recording import Contact, Finding, Recording
+from cdtool.recording import Contact, Recording
 
 # A load cell that reads in steps coarser than its noise flickers by one of them: that is no contact.
 _STEPS = 3.0

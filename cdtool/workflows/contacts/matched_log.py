@@ -12,13 +12,14 @@ from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse, force_course
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
 from cdtool.evaluation.truth.matching import match
+from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
+from cdtool.workflows.log_checks.log_findings import log_warnings
 from cdtool.workflows.runs import DAMAGED
 
 # A stroke counts as judged where at least this share of its samples is.
@@ -113,7 +114,7 @@ def _not_scored(
     found = []
     for contact in contacts:
         if contact.in_progress:
-            found.append(Skipped(recording.name, f"{IN_PROGRESS.format(end=contact.end)}, it is not scored"))
+            found.append(Skipped(recording.name, f"{InProgress(contact.end).sentence()}, it is not scored"))
         elif not any(contact in own for own in inside):
             text = f"the contact at {contact.start:.3f} s lies in no operation (cut by {cut_by})"
             found.append(Skipped(recording.name, text))

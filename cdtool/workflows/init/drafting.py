@@ -9,10 +9,12 @@ from tempfile import TemporaryDirectory
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.files import write_text
+from cdtool.findings import Finding
+from cdtool.findings.motion import AccelerometerTurned
 from cdtool.ingest.element_names import element_names
 from cdtool.ingest.reading import choose_format, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
-from cdtool.recording import CHANNELS, Finding
+from cdtool.recording import CHANNELS
 from cdtool.workflows.information import info
 from cdtool.workflows.init.channel_guess import guess_channels
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
@@ -24,8 +26,6 @@ from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
-# What log_checks.accelerometer_check says of a sensor that is mounted the other way round.
-_TURNED = "opposite sign"
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _settled(log: Path, draft: Draft) -> Drafted:
                     raise
                 left_out.append(bad)
                 continue
-            if turned or not any(_TURNED in found.message for found in findings if found.channel == "acceleration"):
+            if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
                 return Drafted("", text, mapped, tuple(left_out), findings)
             turned = True
 
