@@ -93,6 +93,7 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
                     "give one column a joint in [channels], in the order of machine.joints",
+                    channel=name,
                 )
 
     def __contains__(self, channel: str) -> bool:
@@ -105,6 +106,7 @@ class Recording:
             raise RecordingError(
                 f"{self.name}: no channel '{channel}'",
                 f"map it in [channels] of the machine file; mapped here: {', '.join(self.channels) or 'none'}",
+                channel=channel,
             ) from None
 
     @property

@@ -78,14 +78,16 @@ def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) 
         raise RecordingError(
             f"{path}: no column {column} (channel '{channel}')",
             f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
+            channel=channel,
         )
     same = _alike(column, names)
     if len(same) > 1:
         raise RecordingError(
             f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
             f"give its number instead: {' or '.join(same)}",
+            channel=channel,
         )
-    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names))
+    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names), channel=channel)
 
 
 def is_absent(column: str | int, names: Sequence[str]) -> bool:
@@ -99,7 +101,9 @@ def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> Channel
     for item in held:
         if item.topic not in known:
             raise RecordingError(
-                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
+                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')",
+                nearest(item.topic, known),
+                channel=item.channel,
             )
     return replace(wanted, sources=held)
 

@@ -17,7 +17,7 @@ from cdtool.findings.containers import BagDamaged, MessagesUnreadable
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
-from cdtool.formats.source import Source
+from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch
 from cdtool.messages.fields import parse_field
 from cdtool.messages.gathering import Gathering
@@ -113,9 +113,9 @@ class _Bag:
 
     def source(self, columns: dict[str, Column], findings: list[Finding]) -> Source:
         """The bag's columns with all that is known of it."""
-        details = {topic: f"{kind}, {count} messages" for topic, (kind, count) in self.topics.items()}
-        name = Rosbag.name
-        return Source(self.path, name, columns, self.origin / 1e9, tuple(findings), details, tuple(columns))
+        topics = {topic: TopicDetails(kind, count) for topic, (kind, count) in self.topics.items()}
+        start, names = self.origin / 1e9, tuple(columns)
+        return Source(self.path, Rosbag.name, columns, start, tuple(findings), names=names, topics=topics)
 
     def pieces(self) -> Generator[Piece, None, tuple[dict[str, Column], list[Finding]]]:
         """Every numeric field; at their end the columns, without rows, and what is odd."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Protocol
@@ -13,11 +13,30 @@ from cdtool.findings import Finding
 
 
 @dataclass(frozen=True)
+class TopicDetails:
+    """What a container says of a topic: the type of its messages, how many it holds, and how they are encoded."""
+
+    schema: str
+    messages: int
+    encoding: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.schema}, {self.encoding + ', ' if self.encoding else ''}{self.messages} messages"
+
+    @classmethod
+    def of_parts(cls, parts: Sequence[TopicDetails]) -> TopicDetails:
+        """Return those of a topic by those of the parts of its log: the messages of all are added up."""
+        schemas = dict.fromkeys(part.schema for part in parts)
+        encodings = dict.fromkeys(part.encoding for part in parts)
+        return cls(" or ".join(schemas), sum(part.messages for part in parts), " or ".join(encodings))
+
+
+@dataclass(frozen=True)
 class Source:
     """A file's columns. `origin` [s] has been taken off every `Column.time`, or off the stamps of a table.
 
     `names` are all columns of the file in its order, read or not; `first_row` is the file's line of the first sample
-    (0: not known).
+    (0: not known). `details` are what the file says of itself, `topics` what it says of each topic.
     """
 
     path: Path
@@ -28,6 +47,7 @@ class Source:
     details: Mapping[str, str] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     first_row: int = 0
+    topics: Mapping[str, TopicDetails] = field(default_factory=dict)
 
 
 class Format(Protocol):

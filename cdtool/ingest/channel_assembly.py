@@ -104,7 +104,9 @@ class _Assembly:
             parts = [self.columns[key].values for key in item.keys]
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         if not len(clock.time):
-            raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
+            raise RecordingError(
+                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
+            )
         scaled, masked = in_si(item, self._kept(item, values, clock.keep))
         self.findings += masked.findings(item, self.channels.joints)
         series = Series(clock.time, scaled, item.unit)
@@ -153,6 +155,7 @@ class _Assembly:
                 f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
                 f"its clock {len(keep)}",
                 "columns of one recording are equally long",
+                channel=item.channel,
             )
         check_width(self.source.path, item, table.shape[1])
         return table if keep.all() else table[keep]
@@ -165,6 +168,7 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
             f"{path}: channel '{item.channel}' ({item.described}) gives {width} values "
             f"a sample for {len(item.factor)} joints",
             "name one element a joint, in the order of machine.joints",
+            channel=item.channel,
         )
 
 

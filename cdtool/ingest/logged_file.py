@@ -119,7 +119,8 @@ class LoggedFile:
         for channel in self.channels.values():
             check_width(path, channel.item, math.prod(source.columns[channel.item.described].values.shape[1:]))
             if not channel.rows:
-                raise RecordingError(f"{path}: channel '{channel.item.channel}' has no sample with a time")
+                name = channel.item.channel
+                raise RecordingError(f"{path}: channel '{name}' has no sample with a time", channel=name)
         offsets = [item.time_offset for item in held.sources]
         self.late += max(offsets, default=0.0) - min(offsets, default=0.0)
 

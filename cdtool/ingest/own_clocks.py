@@ -48,10 +48,12 @@ def _joined(source: Source, item: ChannelSource) -> Column:
             raise RecordingError(
                 f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock of its own",
                 "name the column that is its clock in [channels] time",
+                channel=item.channel,
             )
         if not np.array_equal(part.time, time):
             raise RecordingError(
                 f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
                 "the joints of one channel are logged together",
+                channel=item.channel,
             )
     return Column(item.channel, np.column_stack([part.values for part in parts]), time)

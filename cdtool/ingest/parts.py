@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,14 +15,12 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.findings.parts import PartCompressed, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
-from cdtool.formats.source import Source
+from cdtool.formats.source import Source, TopicDetails
 from cdtool.ingest.part_gaps import PartSpan, gaps_between
 from cdtool.recording import GROUND_TRUTH, Recording, Series
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
-# `/joint_states: sensor_msgs/msg/JointState, cdr, 200 messages`, as the formats with topics describe one.
-_MESSAGES = re.compile(r"(?P<what>.*), (?P<count>[0-9]+) messages")
 
 
 def joined_digest(digests: Sequence[str]) -> str:
@@ -81,8 +78,16 @@ def joined_sources(
             late.setdefault(path, []).append(name)
     for path, names in late.items():
         findings.append(Finding(PartsOverlap(path.name, names[0])))
-    details = joined_details(parts)
-    return Source(folder, parts[0].format, columns, parts[0].origin, tuple(findings), details, tuple(columns))
+    return Source(
+        folder,
+        parts[0].format,
+        columns,
+        parts[0].origin,
+        tuple(findings),
+        joined_details(parts),
+        tuple(columns),
+        topics=joined_topics(parts),
+    )
 
 
 def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
@@ -116,7 +121,9 @@ def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
 
 def not_alike(part: str, channel: str, first: str) -> RecordingError:
     """A part lacks a channel that the first one has."""
-    return RecordingError(f"{part}: channel '{channel}' is not logged as in {first}", "parts of one log are alike")
+    return RecordingError(
+        f"{part}: channel '{channel}' is not logged as in {first}", "parts of one log are alike", channel=channel
+    )
 
 
 def overlapping(part: str, channel: str, start: float, before: float) -> RecordingError:
@@ -156,7 +163,7 @@ def _joined_column(name: str, parts: Sequence[Source], origin: float) -> tuple[C
 
 
 def joined_details(parts: Sequence[Source]) -> dict[str, str]:
-    """What the parts of a log say of themselves, and of each topic once: the messages of all are added up."""
+    """What the parts of a log say of themselves."""
     if len(parts) == 1:
         return dict(parts[0].details)
     said: dict[str, list[str]] = {}
@@ -164,14 +171,16 @@ def joined_details(parts: Sequence[Source]) -> dict[str, str]:
         for key, text in part.details.items():
             said.setdefault(key, []).append(text)
     joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
-    for key, texts in said.items():
-        counted = [match for text in texts if (match := _MESSAGES.fullmatch(text))]
-        kinds = list(dict.fromkeys(match["what"] for match in counted))
-        if len(counted) == len(texts):
-            joined[key] = f"{' or '.join(kinds)}, {sum(int(match['count']) for match in counted)} messages"
-        else:
-            joined[key] = " or ".join(dict.fromkeys(texts))
-    return joined
+    return joined | {key: " or ".join(dict.fromkeys(texts)) for key, texts in said.items()}
+
+
+def joined_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
+    """What the parts of a log say of each topic."""
+    said: dict[str, list[TopicDetails]] = {}
+    for part in parts:
+        for name, topic in part.topics.items():
+            said.setdefault(name, []).append(topic)
+    return {name: TopicDetails.of_parts(topics) for name, topics in said.items()}
 
 
 def _named_parts(metadata: Path) -> list[str]:

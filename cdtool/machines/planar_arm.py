@@ -160,6 +160,7 @@ class PlanarArm(CoupledMachine):
                 raise RecordingError(
                     f"{recording.name}: the links' accelerations need the channel '{needed}'",
                     f"map {needed} in [channels], or give accelerations in rad/s2",
+                    channel=needed,
                 )
         if not all(self.imu_position):
             raise ConfigurationError(

@@ -17,7 +17,7 @@ from cdtool.distribution import Distribution
 from cdtool.findings import Fact, Finding, worst_first
 from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
 from cdtool.findings.truth import InProgress
-from cdtool.formats.source import Source
+from cdtool.formats.source import Source, TopicDetails
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -86,7 +86,8 @@ def _survey(log: Path) -> Info:
     for channel in channels:
         findings += missing_findings(channel.missing, channel.samples, channel.name)
     dialect = source.dialect if isinstance(source, TableSource) else ""
-    return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), dialect)
+    details = _details(source.details, source.topics)
+    return Info(str(log), source.format, details, tuple(channels), worst_first(findings), dialect)
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
@@ -110,7 +111,7 @@ def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.formats.csv import TableSource
     from cdtool.ingest.logged import read_logged
-    from cdtool.ingest.parts import joined_details
+    from cdtool.ingest.parts import joined_details, joined_topics
 
     read = read_logged(log, machine_file)
     files, low_pass = read.files, read.speed_low_pass
@@ -127,7 +128,13 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     dialect = files[0].dialect if isinstance(files[0], TableSource) else ""
     found = worst_first(findings)
-    return Info(str(log), files[0].format, joined_details(files), tuple(channels), found, dialect)
+    details = _details(joined_details(files), joined_topics(files))
+    return Info(str(log), files[0].format, details, tuple(channels), found, dialect)
+
+
+def _details(details: Mapping[str, str], topics: Mapping[str, TopicDetails]) -> dict[str, str]:
+    """What a log says of itself and of its topics, in words."""
+    return {**details, **{name: str(topic) for name, topic in topics.items()}}
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

@@ -8,6 +8,7 @@ import pytest
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
+from cdtool.formats.source import TopicDetails
 from cdtool.messages.fields import FieldMissingError, parse_field
 from tests.data_folder import DATA, data, needs_data
 from tests.formats.mcap_files import JOINTS, START, STREAMS, TIME, N, by_hand, wanted, written
@@ -32,7 +33,7 @@ def test_what_is_written_reads_back_to_the_bit(written, encoding, compression):
     assert np.allclose(source.columns["/imu linear_acceleration.x"].time, TIME + 0.0005, rtol=0, atol=1e-12)
     assert source.origin == START / 1e9
     assert not source.findings
-    assert source.details["/force"] == f"std_msgs/msg/Float64, {encoding}, {N} messages"
+    assert source.topics["/force"] == TopicDetails("std_msgs/msg/Float64", N, encoding)
 
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
@@ -199,7 +200,7 @@ def test_a_field_may_step_through_arrays_of_objects(text):
 @pytest.mark.parametrize("name", sorted(path.name for path in DATA.glob("mcap_samples/*.mcap")) if DATA else ["none"])
 def test_real_files_of_other_writers_survey_without_an_error(name):
     source = Mcap().columns(data("mcap_samples") / name)
-    assert source.details
+    assert source.topics
     if "wrong_rmw" in name:
         assert any("message encoding 'wrong_format'" in str(finding) for finding in source.findings)
         with pytest.raises(RecordingError, match="wrong_format"):
@@ -221,5 +222,5 @@ def test_every_conformance_file_gives_the_messages_of_its_json():
         records = json.loads(path.with_suffix(".json").read_text())["records"]
         expected = sum(record["type"] == "Message" for record in records)
         source = Mcap().columns(path)
-        assert sum(int(detail.split()[-2]) for detail in source.details.values()) == expected, path.name
+        assert sum(topic.messages for topic in source.topics.values()) == expected, path.name
         assert not any("damaged" in str(finding) for finding in source.findings), path.name

@@ -34,7 +34,10 @@ def pieces_of(path: Path) -> list[Piece]:
 def same(one: Source, other: Source) -> bool:
     """All that a source tells, the numbers to the bit."""
     columns = [(one.columns[name], other.columns[name]) for name in one.columns]
-    told = [[s.findings, dict(s.details), s.names, s.origin, s.first_row, list(s.columns)] for s in (one, other)]
+    told = [
+        [s.findings, dict(s.details), dict(s.topics), s.names, s.origin, s.first_row, list(s.columns)]
+        for s in (one, other)
+    ]
     return told[0] == told[1] and all(
         a.values.tobytes() == b.values.tobytes()
         and (a.time is None) == (b.time is None)

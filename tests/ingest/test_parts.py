@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
+from cdtool.formats.source import TopicDetails
 from cdtool.ingest.parts import lost_parts
 from cdtool.ingest.reading import log_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
@@ -72,8 +73,8 @@ def test_a_log_cut_anywhere_is_surveyed_as_the_whole_one(tmp_path_factory, cuts,
     np.testing.assert_array_equal(column.values, expected.values)
     # A part's origin is an epoch in float64, of which the last digit is 0.24 us.
     np.testing.assert_allclose(column.time, expected.time, rtol=0.0, atol=5e-7)
-    assert parts.details["/speed"] == whole.details["/speed"]
-    assert {item.message.partition(": ")[2] for item in parts.findings} <= {"holds no message"}
+    assert parts.topics["/speed"] == whole.topics["/speed"]
+    assert {item.kind for item in parts.findings} <= {"no_message"}
 
 
 def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
@@ -81,7 +82,7 @@ def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
     time = source.columns["/speed data"].time
     assert np.all(np.diff(time) > 0.0) and len(time) == 1100
     assert source.details["parts"] == "11, bag_0.mcap to bag_10.mcap"
-    assert source.details["/speed"].endswith(", 1100 messages")
+    assert source.topics["/speed"].messages == 1100
 
 
 def test_a_topic_that_only_some_parts_hold_is_surveyed_from_these(tmp_path):
@@ -209,7 +210,7 @@ def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
         (tmp_path / f"bag_{part}" / f"bag_{part}.db3").rename(folder / f"bag_{part}.db3")
     metadata(folder, "  relative_file_paths:\n  - bag_0.db3\n  - bag_1.db3\n  - bag_2.db3\n")
     source = survey(folder)
-    assert source.details["/speed"] == "std_msgs/msg/Float64, 100 messages"
+    assert source.topics["/speed"] == TopicDetails("std_msgs/msg/Float64", 100)
     np.testing.assert_array_equal(source.columns["/speed data"].values, np.arange(100.0))
     assert losses(source.findings) == ["part bag_2.db3 of metadata.yaml is not in the folder"]
 

@@ -197,6 +197,7 @@ def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatA
             raise RecordingError(
                 f"{recording.name}: mass_before_cell needs the channel '{channel}'",
                 "map it in [channels], or set mass_before_cell to 0",
+                channel=channel,
             )
     measured = recording["acceleration"]
     if measured.unit != "m/s2":

@@ -170,5 +170,12 @@ def _origin(path: Path, log: Log) -> int:
 
 
 def _source(path: Path, log: Log, columns: dict[str, Column], findings: list[Finding], origin: int) -> Source:
-    details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    return Source(path, Mcap.name, columns, origin / 1e9, tuple(findings), details, tuple(columns))
+    return Source(
+        path,
+        Mcap.name,
+        columns,
+        origin / 1e9,
+        tuple(findings),
+        names=tuple(columns),
+        topics=log.topic_details,
+    )

@@ -93,11 +93,10 @@ class MappedFields:
             if source.described not in columns:
                 columns[source.described], found = topics[source.topic].column(source.field)
                 findings += found
-        details = {
-            topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()
-        }
         origin = self.origin / 1e9 if self._exact_origin is None else self._exact_origin
-        return Source(self.path, "mcap", columns, origin, tuple(findings), details, tuple(columns))
+        return Source(
+            self.path, "mcap", columns, origin, tuple(findings), names=tuple(columns), topics=log.topic_details
+        )
 
 
 @dataclass

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +13,6 @@ from cdtool.findings.motion import AccelerometerTurned
 from cdtool.ingest.element_names import element_names
 from cdtool.ingest.reading import choose_format, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
-from cdtool.recording import CHANNELS
 from cdtool.workflows.information import info
 from cdtool.workflows.init.channel_guess import guess_channels
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
@@ -24,8 +22,6 @@ from cdtool.workflows.init.streams import Channels, streams_of
 from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
-
-_CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
 
 
 @dataclass(frozen=True)
@@ -68,10 +64,9 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             try:
                 findings = info(log, machine=read_machine_file(trial)).findings
             except CdtoolError as fault:
-                bad = _blamed(fault, mapped)
-                if bad is None:
+                if fault.channel not in mapped or len(mapped) == 1:  # the draft cannot do without it
                     raise
-                left_out.append(bad)
+                left_out.append(fault.channel)
                 continue
             if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
                 return Drafted("", text, mapped, tuple(left_out), findings)
@@ -90,7 +85,7 @@ def _drafted(log: Path) -> Draft:
     channels = guess_channels(streams, topics)
     own = any(column.time is not None for column in source.columns.values()) and not topics
     clock = None if own else clock
-    types = {topic: text.split(",")[0] for topic, text in source.details.items()} if topics else {}
+    types = {name: topic.schema for name, topic in source.topics.items()}
     motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
     messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
     ratio = ratio_of(channels, clock, messages_si)
@@ -150,12 +145,3 @@ def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
         return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
     rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
     return Clock(name, clock.unit, why, f"the unit is not told: steps of {clock.step:.4g} are {rates}")
-
-
-def _blamed(fault: CdtoolError, mapped: tuple[str, ...]) -> str | None:
-    """The channel that an error names, if the draft can do without it."""
-    for match in _CHANNEL.finditer(fault.message):
-        name = match[1] or match[2]
-        if name in CHANNELS and name in mapped and len(mapped) > 1:
-            return name
-    return None

@@ -31,6 +31,7 @@ from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.taken import Part, Taker
 
@@ -107,6 +108,11 @@ class Log:
     def count(self) -> int:
         """Messages that were read."""
         return sum(self.counts.values())
+
+    @property
+    def topic_details(self) -> dict[str, TopicDetails]:
+        """What the file says of each topic."""
+        return {topic.name: TopicDetails(topic.schema, topic.count, topic.encoding) for topic in self.topics.values()}
 
     def expected(self, topic: str) -> int:
         """How many messages of a topic the summary foretells; 0 where nothing can be relied on."""
