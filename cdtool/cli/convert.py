@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import leave_with, plain, print_json
+from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
 from cdtool.plain_text import counted
@@ -37,7 +36,7 @@ def convert(
     with late_progress("converting") as advance:
         done = write(source, output, machine=machine, force=force, progress=advance)
     if as_json:
-        print_json(asdict(done))
+        print_json(with_findings(done))
     else:
         clocks = f"{counted(done.clocks, 'clock')}"
         typer.echo(f"{', '.join(map(plain, done.files))}: {done.columns} columns on {clocks}")

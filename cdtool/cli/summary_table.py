@@ -96,7 +96,8 @@ def _show_limits(evaluated: Evaluated) -> None:
 
 def finish(evaluated: Evaluated) -> None:
     """End with the status that follows from the results' conclusion."""
-    leave(evaluated.results.skipped, [Fact[name.upper()] for name in evaluated.results.conclusion.facts])
+    results = evaluated.results
+    leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
 
 
 def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:

@@ -16,6 +16,16 @@ class ColumnLeftOut(Fact):
     column: str
     what: str
 
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.what
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
+
     def sentence(self) -> str:
         """Return the column and what it is."""
         return f"column '{self.column}' is {self.what}: left out"
@@ -27,6 +37,16 @@ class VariableLeftOut(Fact):
 
     variable: str
     what: str
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.what
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.variable
 
     def sentence(self) -> str:
         """Return the variable and what it is."""
@@ -41,6 +61,11 @@ class RowsAsColumns(Fact):
     name: str
     rows: int
     columns: int
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.name
 
     def sentence(self) -> str:
         """Return name and shape."""
@@ -129,6 +154,11 @@ class LibraryMessage(Fact):
     library: str
     text: str
 
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.text
+
     def sentence(self) -> str:
         """Return the line."""
         return f"{self.library} says: {self.text}"
@@ -187,6 +217,11 @@ class DamagedAt(Fact):
     lost: LostBytes
     read_before: int | None = None
 
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
     def sentence(self) -> str:
         """Return place, reason and loss."""
         where = f"damaged at byte {self.byte} ({self.reason})"
@@ -219,6 +254,11 @@ class MessagesLost(Fact):
 
     reason: str
     count: int
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
 
     def sentence(self) -> str:
         """Return reason and count."""
@@ -301,6 +341,11 @@ class IndexDisagrees(Fact):
 
     count: int
     how: Literal["not indexed", "only indexed", "other values"]
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.how
 
     def sentence(self) -> str:
         """Return how many."""

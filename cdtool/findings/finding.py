@@ -23,6 +23,16 @@ class Fact(ABC):
         """The name of the kind in results and JSON: that of its class, `repeated_stamps` of `RepeatedStamps`."""
         return _WORD.sub("_", type(self).__name__).lower()
 
+    @property
+    def variant(self) -> str:
+        """What tells facts of one kind apart that are not to be merged; empty for most kinds."""
+        return ""
+
+    @property
+    def subject(self) -> str:
+        """What the fact is about where that is not a channel: a column that is left out, a part of a log."""
+        return ""
+
     @abstractmethod
     def sentence(self) -> str:
         """Return the fact in words, without the channel and the file that it is about."""
@@ -37,6 +47,11 @@ class Remark(Fact):
     """
 
     text: str
+
+    @property
+    def variant(self) -> str:
+        """The text."""
+        return self.text
 
     def sentence(self) -> str:
         """Return the text."""
@@ -78,14 +93,14 @@ class Finding:
         return f"{self.channel}: {self.message}" if self.channel else self.message
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values: the kind with its numbers, and the sentence."""
+        """As JSON values: the sentence, the channel, the severity, and the kind with its numbers."""
         return {
-            "kind": self.kind,
-            "severity": self.severity,
-            "channel": self.channel,
-            "file": self.file,
-            "numbers": asdict(self.fact),
             "message": self.message,
+            "channel": self.channel,
+            "severity": self.severity,
+            "file": self.file,
+            "kind": self.kind,
+            "numbers": asdict(self.fact),
         }
 
 

@@ -67,6 +67,11 @@ class UndecodableMessages(Fact):
     messages: int
     reason: str
 
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
     def sentence(self) -> str:
         """Return how many and why."""
         return f"{self.count} of {counted(self.messages, 'message')} cannot be decoded: {self.reason}"

@@ -133,6 +133,11 @@ class AccelerometerUncheckable(Fact):
     reason: Literal["joint hardly moves", "speed hardly changes", "correlation"]
     correlation: float = 0.0
 
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
     def sentence(self) -> str:
         """Return the reason."""
         why = {

@@ -14,6 +14,11 @@ class PartMissing(Fact):
     part: str
     metadata: str
 
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.part
+
     def sentence(self) -> str:
         """Return the part."""
         return f"part {self.part} of {self.metadata} is not in the folder"
@@ -25,6 +30,11 @@ class PartCompressed(Fact):
 
     part: str
     metadata: str
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.part
 
     def sentence(self) -> str:
         """Return the part, and how to decompress it."""
@@ -38,6 +48,11 @@ class PartOfOtherKind(Fact):
     part: str
     metadata: str
 
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.part
+
     def sentence(self) -> str:
         """Return the part."""
         return f"part {self.part} of {self.metadata} is left out: the folder holds parts of another kind too"
@@ -50,6 +65,11 @@ class PartUnreadable(Fact):
     part: str
     reason: str
 
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.part
+
     def sentence(self) -> str:
         """Return part and reason."""
         return f"part {self.part} is left out, it cannot be read: {self.reason}"
@@ -61,6 +81,11 @@ class PartsOverlap(Fact):
 
     part: str
     column: str
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.part
 
     def sentence(self) -> str:
         """Return part and column."""

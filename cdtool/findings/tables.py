@@ -138,6 +138,11 @@ class NotNumeric(Fact):
     cell: str
     advice: CellAdvice | None = None
 
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
+
     def sentence(self) -> str:
         """Return column and cell."""
         advice = f"; {self.advice}" if self.advice else ""
@@ -152,6 +157,11 @@ class AmbiguousTimes(Fact):
 
     column: str
     readings: str
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
 
     def sentence(self) -> str:
         """Return both readings, and how to pin one."""

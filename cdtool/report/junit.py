@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
-from cdtool.evaluation.results import ContactResult, LimitResult, Skipped
+from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, RecordingFinding
 from cdtool.evaluation.summary import later_ms
 from cdtool.plain_text import plain
 from cdtool.report.figure_text import number, spoken
@@ -45,7 +45,9 @@ def _suites(evaluated: Evaluated) -> Iterator[ElementTree.Element]:
     if checks:
         yield _suite("force", [_force(item) for item in checks])
     if results.skipped:
-        yield _suite("left out", [_left_out(item) for item in results.skipped])
+        yield _suite("left out", [_case("left out", item.recording, "error", item.reason) for item in results.skipped])
+    if results.losses:
+        yield _suite("damaged", [_damaged(item) for item in results.losses])
     blind = {(item.detector, item.group) for item in nothing_assessed(evaluated.summaries)}
     forbidden = {(item.detector, item.group) for item in force_missed(results, evaluated.summaries)}
     outcomes = recording_outcomes(results)
@@ -73,8 +75,8 @@ def _force(item: ForceCheck) -> ElementTree.Element:
     return _case("force", name, kind, f"{item.profile}: {spoken(item.verdict)}: {item.reason}")
 
 
-def _left_out(item: Skipped) -> ElementTree.Element:
-    return _case("left out", item.recording, "error", item.reason)
+def _damaged(item: RecordingFinding) -> ElementTree.Element:
+    return _case("damaged", item.recording, "error", f"{DAMAGED}: {item.reason}")
 
 
 def _recording(suite: str, item: RecordingOutcome, nothing: bool, strict: bool) -> ElementTree.Element:

@@ -11,7 +11,7 @@ from cdtool.activation import Activation
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.results import ContactResult, Skipped
+from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.motion.applicable import HOLD
@@ -41,7 +41,7 @@ class Detected:
     from this log, so that no alarm shows nothing. `window`: how long after its onset a contact may be detected [s].
     `normals`: what impact-free runs look like, or why that is not known.
     `contact_rows` has, for each of `detections`, the rows that `cdtool benchmark` writes of these contacts.
-    `not_scored` names contacts without an onset, `warnings` are about the log itself, `notes` about the signature file.
+    `not_scored` names contacts without an onset; `findings` are about the log itself and about the signature file.
     `onset` says how the onset is found on the load cell.
     """
 
@@ -55,9 +55,8 @@ class Detected:
     window: float = 1.0
     contact_rows: tuple[tuple[ContactResult, ...], ...] = ()
     not_scored: tuple[Skipped, ...] = ()
-    warnings: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
-    notes: tuple[Skipped, ...] = ()
     onset: str = ""
 
     @property
@@ -82,7 +81,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
-    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[Skipped]()
+    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
@@ -123,9 +122,8 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         rules.window,
         matched.contacts,
         matched.not_scored,
-        matched.warnings,
+        (*matched.findings, *notes),
         normals,
-        tuple(notes),
         rules.onset.described,
     )
 
@@ -156,9 +154,8 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
-        matched.warnings,
+        (*matched.findings, *benchmark.notes),
         benchmark.normals,
-        benchmark.notes,
         benchmark.setup.onset.described,
     )
 

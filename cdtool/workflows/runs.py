@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
@@ -27,8 +27,6 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
-# How the reason begins of a log that is used although part of it is lost.
-DAMAGED = "damaged, used as far as it goes: "
 # Called after each piece of work with what is done and how much there is.
 Progress = Callable[[int, int], None]
 
@@ -39,7 +37,7 @@ class Runs:
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
-    findings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
     ranges: PlausibleRanges
 
 
@@ -148,7 +146,7 @@ def load_runs(
     paths, repeated = _each_once(paths)
     operations: list[Operation] = []
     skipped = [Skipped(shown_path(path, base), "given more than once: counts once") for path in repeated]
-    findings: list[Skipped] = []
+    findings: list[RecordingFinding] = []
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
@@ -184,8 +182,8 @@ def load_runs(
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)
         skipped.extend(touched)
+        findings.extend(lost(recording))
         findings.extend(log_warnings(recording, contacts, rule))
-        skipped.extend(lost(recording))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
 
@@ -219,9 +217,9 @@ def check_joints(joints: Sequence[str], machine: Machine) -> None:
             raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
 
 
-def lost(recording: Recording) -> list[Skipped]:
-    """What could not be read of a recording that is used nevertheless: to be told like what was left out."""
-    return [Skipped(recording.name, f"{DAMAGED}{item}") for item in recording.findings if item.severity == "loss"]
+def lost(recording: Recording) -> list[RecordingFinding]:
+    """What could not be read of a recording that is used nevertheless."""
+    return [RecordingFinding.of(recording.name, item) for item in recording.findings if item.severity == "loss"]
 
 
 def absent_truth(recording: Recording) -> list[Finding]:

@@ -14,8 +14,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdtool.evaluation.alike import alike
+from cdtool.evaluation.alike import Reason, alike
 from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.results import DAMAGED, Results, onset_words
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
@@ -97,27 +98,33 @@ def _tables(evaluated: Evaluated, opens: dict[tuple[str, str], list[int]]) -> di
         "points": points_table(results),
         "recordings": recordings_table(results, opens),
         "not_judged": not_judged_table(results),
-        "skipped": reasons_table("skipped-table", "Left out or lost", alike(results.skipped)),
-        "findings": reasons_table("findings-table", "Odd, but used", alike(results.findings)),
+        "skipped": reasons_table("skipped-table", "Left out or lost", _left_out_or_lost(results)),
+        "findings": reasons_table("findings-table", "Odd, but used", alike(results.warnings)),
         "calibration": calibration_table(results),
     }
     return {name: table if table.rows else None for name, table in made.items()}
+
+
+def _left_out_or_lost(results: Results) -> list[Reason]:
+    losses = (Reason(item.recording, f"{DAMAGED}: {item.reason}") for item in alike(results.losses))
+    return [*alike(results.skipped), *losses]
 
 
 def _lines(evaluated: Evaluated, traces: Sequence[Trace]) -> dict[str, str]:
     """Sentences that the template needs."""
     results = evaluated.results
     provenance = results.provenance
+    lost = [*results.skipped, *results.losses]
     resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
     return {
-        "onset": str(provenance.get("onset") or "rule not stated"),
+        "onset": onset_words(provenance),
         "few": explained(evaluated.summaries),
         "label_file": str(provenance.get("label_file") or ""),
         "resolution": f"{number(max(resolutions))} ms" if resolutions else "",
         "recordings": counted(len(results.recordings), "recording"),
         "detectors": counted(len(results.detectors), "detector"),
         "kept": f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
-        "skipped": counted(len(results.skipped), "entry") if results.skipped else "",
+        "skipped": counted(len(lost), "entry") if lost else "",
     }
 
 

@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cdtool.evaluation.results import ContactResult, RecordingResult, Results, Skipped
+from cdtool.evaluation.alike import Reason
+from cdtool.evaluation.results import ContactResult, RecordingResult, Results
 from cdtool.evaluation.summary import later_ms
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import counted
@@ -102,7 +103,7 @@ def not_judged_table(results: Results) -> Table:
     return Table("not-judged-table", "Share of the samples that could not be judged", columns, rows)
 
 
-def reasons_table(name: str, caption: str, items: Sequence[Skipped]) -> Table:
+def reasons_table(name: str, caption: str, items: Sequence[Reason]) -> Table:
     """Recordings or detectors with a reason each."""
     rows = [
         (Cell(shown(item.recording)), Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING))

@@ -7,10 +7,10 @@ from typing import Any
 from urllib.parse import quote
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.alike import alike
+from cdtool.evaluation.alike import Reason, alike
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import not_met
-from cdtool.evaluation.results import ContactResult, LimitResult, Results, Skipped
+from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, Results, onset_words
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import NOTHING, number, percent
@@ -98,13 +98,14 @@ def _head(evaluated: Evaluated) -> str:
         lines = [escape(reason) for reason in reasons[:_REASONS_NAMED]]
         lines += [f"and {len(reasons) - _REASONS_NAMED} more"] if len(reasons) > _REASONS_NAMED else []
         parts.append(f"**Force, missed contacts, not assessable:** {'; '.join(lines)}.")
-    if results.skipped:
-        parts.append(f"**Left out or lost: {counted(len(results.skipped), 'item')}**, named below.")
+    lost = len(results.skipped) + len(results.losses)
+    if lost:
+        parts.append(f"**Left out or lost: {counted(lost, 'item')}**, named below.")
     return "\n\n".join([*parts, NO_CERTIFICATE])
 
 
 def _how_to_read(results: Results) -> str:
-    onset = escape(results.provenance.get("onset") or "rule not stated")
+    onset = escape(onset_words(results.provenance))
     return (
         f"Latency: from the onset of the contact ({onset}) to the alarm, with debounce. In brackets: 95 % interval. "
         "Mean and std are those of the n detected contacts; median and P95 take a missed contact as later than all. "
@@ -134,7 +135,8 @@ def _details(results: Results) -> list[Section]:
         _folded("What could not be judged", _NOT_JUDGED, _not_judged(results), "exposure"),
         _folded("Force limits not met", _FORCE, _force_rows(results), "forces"),
         _folded("Left out", ("recording", "reason"), _reasons(alike(results.skipped)), "skipped"),
-        _folded("Findings", ("recording", "finding"), _reasons(alike(results.findings)), "findings"),
+        _folded(DAMAGED.capitalize(), ("recording", "loss"), _reasons(alike(results.losses)), "findings"),
+        _folded("Findings", ("recording", "finding"), _reasons(alike(results.warnings)), "findings"),
         _folded("False-alarm budget", _BUDGET, _calibration(results), "calibration"),
         _folded("Provenance", ("what", "value"), _one_line(results.provenance), "provenance"),
         _folded("Gains and thresholds", _GAINS, _gains(results), "provenance"),
@@ -213,7 +215,7 @@ def _force_rows(results: Results) -> _Rows:
     ]
 
 
-def _reasons(items: Sequence[Skipped]) -> _Rows:
+def _reasons(items: Sequence[Reason]) -> _Rows:
     return [(escape(item.recording), escape(item.reason.removeprefix(f"{item.recording}: "))) for item in items]
 
 

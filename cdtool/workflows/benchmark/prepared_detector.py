@@ -10,7 +10,7 @@ from typing import Any
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
@@ -26,8 +26,8 @@ class PreparedBenchmark:
     """A detector with the threshold that `cdtool benchmark` gives it; `described` says in words where that is from.
 
     `learned` has the hashes of the logs that it was learned from, `ranges` what values their channels had, and
-    `normals` what they look like; `skipped` names the runs that were left out in learning, and why. `notes` are about a
-    signature file of an earlier version.
+    `normals` what they look like; `skipped` names the runs that were left out in learning, and why, `losses` what is
+    lost of the others. `notes` are about a signature file of an earlier version.
     """
 
     setup: BenchmarkFile
@@ -37,8 +37,9 @@ class PreparedBenchmark:
     run: Detect
     ranges: PlausibleRanges | None
     normals: NormalMotions
-    notes: tuple[Skipped, ...] = ()
+    notes: tuple[RecordingFinding, ...] = ()
     skipped: tuple[Skipped, ...] = ()
+    losses: tuple[RecordingFinding, ...] = ()
 
     def score(self, log: Path) -> Scored:
         """The log's rows, as in a benchmark: with its group's window where it is in a group. Raises nothing."""
@@ -108,8 +109,17 @@ def prepare_benchmark(
     hashes = {operation.recording.digest: operation.recording.name for operation in used}
     run = detect_with(setup, [instance], fitted.thresholds, fitted.lacking)
     normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
-    left_out = (*runs.skipped, *fitted.skipped)
-    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)
+    return PreparedBenchmark(
+        setup,
+        instance.name,
+        described,
+        hashes,
+        run,
+        runs.ranges,
+        normals,
+        skipped=(*runs.skipped, *fitted.skipped),
+        losses=tuple(item for item in runs.findings if item.is_loss),
+    )
 
 
 def _chosen(setup: BenchmarkFile, detector: str | None) -> str:

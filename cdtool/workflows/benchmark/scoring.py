@@ -11,9 +11,17 @@ from typing import Any
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
+from cdtool.evaluation.results import (
+    ContactResult,
+    FalseAlarmResult,
+    ForceResult,
+    RecordingFinding,
+    RecordingResult,
+    Skipped,
+)
 from cdtool.evaluation.sweep import sweep
 from cdtool.findings import Finding
+from cdtool.findings.scoring import ForceUnassessable
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
@@ -28,7 +36,7 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
+from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
 
 
 @dataclass
@@ -42,7 +50,7 @@ class Scored:
     forces: list[ForceResult] = field(default_factory=list)
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
-    findings: list[Skipped] = field(default_factory=list)
+    findings: list[RecordingFinding] = field(default_factory=list)
     # Names of logs taken as free of impacts, with what would tell and is not in them.
     unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
@@ -127,27 +135,27 @@ def score_log(
         return scored
     scored.reading = perf_counter() - begin
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
-    scored.skipped += lost(recording)
+    scored.findings += lost(recording)
     if group == HOLDOUT:
         unwanted = unwanted_contacts(recording, rules)
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
         if not operations:
-            scored.findings = log_warnings(recording, unwanted, setup.onset)
+            scored.findings += log_warnings(recording, unwanted, setup.onset)
             return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     found = detect(operations, scored)
     detected = DetectedLog(recording, operations, setup.operations, contacts, found)
     matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
-    scored.findings += matched.warnings
+    scored.findings += matched.findings
     scored.matched, courses = matched, matched.courses
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
         scored.verdicts = {number: judge(course, profile) for number, course in courses.items()}
         scored.forces = force_rows(scored.recording, scored.verdicts, courses)
-        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, courses)
+        scored.findings += _force_not_seen(recording, profile.name, scored.verdicts, courses)
         numbered = enumerate(contacts, 1)
         unseen = [f"contact {number}" for number, item in numbered if number not in courses and not item.in_progress]
         if unseen:
@@ -162,14 +170,14 @@ def score_log(
 
 def _force_not_seen(
     recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], courses: Mapping[int, ForceCourse]
-) -> list[Skipped]:
+) -> list[RecordingFinding]:
     """The contacts that a force profile could not judge because load-cell samples are missing: a loss of data."""
-    lost = [
-        f"contact {number} is not assessable by {profile}: {verdict.reason}"
+    unassessable = [
+        ForceUnassessable(number, profile, verdict.reason)
         for number, verdict in verdicts.items()
         if verdict.outcome == "not_assessable" and courses[number].lacks_samples
     ]
-    return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
+    return [RecordingFinding.of(recording.name, Finding(item, severity="loss")) for item in unassessable]
 
 
 def _recording_result(

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.findings import Finding
+from cdtool.findings.scoring import TakenAsImpactFree
 from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
 from cdtool.recording import Contact, Recording
@@ -46,13 +47,13 @@ def without_contacts(
     return free, left_out
 
 
-def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[Skipped]:
+def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[RecordingFinding]:
     """One line on the logs, by name, in which nothing says whether they are free of impacts."""
     if not notes:
         return []
     logs = list(dict.fromkeys(name for name, _ in notes))
     which = logs[0] if len(logs) == 1 else f"{counted(len(logs), 'log')}, the first {logs[0]}"
-    return [Skipped(which, f"{notes[0][1]}: taken as free of impacts")]
+    return [RecordingFinding.of(which, Finding(TakenAsImpactFree(str(notes[0][1]))))]
 
 
 def _described(contact: Contact) -> str:

@@ -10,17 +10,17 @@ import numpy as np
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.course import ForceCourse, force_course
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import match
+from cdtool.findings import Finding
+from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
 from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection
-from cdtool.plain_text import counted
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import DAMAGED
 
 # A stroke counts as judged where at least this share of its samples is.
 _JUDGED = 0.5
@@ -31,8 +31,7 @@ class MatchedLog:
     """What became of a log's contacts and alarms.
 
     `judged` has an item and `contacts` a list of rows for each operation. `courses` is the force by the contact's
-    number; `not_scored` names contacts that have no onset, lie in no operation or began where load-cell samples are
-    missing, `warnings` are about the log itself.
+    number; `not_scored` names contacts that have no onset or lie in no operation, `findings` are about the log itself.
     """
 
     judged: tuple[Judged, ...]
@@ -40,7 +39,7 @@ class MatchedLog:
     false_alarms: tuple[FalseAlarmResult, ...]
     courses: dict[int, ForceCourse]
     not_scored: tuple[Skipped, ...]
-    warnings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,12 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     inside = _by_operation(log.operations, contacts)
     courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
+    own = [
+        *_unseen_onsets(contacts, rules.window),
+        *_uncut_log(recording, found, log.cut_by),
+        *_unseen_forces(contacts, courses),
+        *doubts,
+    ]
     crossings = _pooled(found)
     judged = []
     for operation, own, detections in zip(log.operations, inside, found, strict=True):
@@ -81,8 +86,8 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         tuple(tuple(contact_rows(item, recording, contacts, courses, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
-        (*_not_scored(recording, contacts, inside, log.cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, courses), *doubts),
+        tuple(_not_scored(recording, contacts, inside, log.cut_by)),
+        (*warned, *(RecordingFinding.of(recording.name, item) for item in own)),
     )
 
 
@@ -121,32 +126,24 @@ def _not_scored(
     return found
 
 
-def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: float) -> list[Skipped]:
-    """A line on each contact that began where load-cell samples are missing: a loss, for its latency is not known."""
+def _unseen_onsets(contacts: Sequence[Contact], window: float) -> list[Finding]:
+    """A loss for each contact that began where load-cell samples are missing: its latency is not known."""
     found = []
     for number, contact in enumerate(contacts, 1):
         if contact.hole and not contact.in_progress:
-            later = 1e3 * contact.uncertainty
-            what = f"its latency may be up to {later:.0f} ms longer"
-            what = "its latency is not known" if contact.uncertainty >= window else what
-            text = (
-                f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
-            )
-            found.append(Skipped(recording.name, f"{DAMAGED}{text} {contact.start:.3f} s, may have begun: {what}"))
+            later = contact.uncertainty if contact.uncertainty < window else None
+            found.append(Finding(OnsetUnseen(number, contact.hole, contact.start, later), severity="loss"))
     return found
 
 
-def _unseen_forces(
-    recording: Recording, contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]
-) -> list[Skipped]:
+def _unseen_forces(contacts: Sequence[Contact], courses: Mapping[int, ForceCourse]) -> list[Finding]:
     """A warning for each contact whose onset was seen, but not all of its force."""
     found = []
     for number, course in courses.items():
         contact = contacts[number - 1]
         hole = course.longest_hole(contact.end - contact.start)
         if hole and not contact.hole:
-            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms while contact {number} presses"
-            found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
+            found.append(Finding(PeakUnseen(number, hole)))
     return found
 
 
@@ -161,10 +158,10 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
 
 def _courses(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
-) -> tuple[dict[int, ForceCourse], list[Skipped]]:
+) -> tuple[dict[int, ForceCourse], list[Finding]]:
     """The force over each contact that has an onset, by its number; one without a force is named."""
     found: dict[int, ForceCourse] = {}
-    missing: list[Skipped] = []
+    missing: list[Finding] = []
     if "force" not in recording:
         return found, missing
     ends = [*(contact.start for contact in contacts[1:]), float("inf")]
@@ -174,11 +171,11 @@ def _courses(
         try:
             found[number] = force_course(recording, contact, mass_before_cell, until)
         except CdtoolError as fault:
-            missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
+            missing.append(Finding(NoForce(number, fault.message)))
     return found, missing
 
 
-def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Skipped]:
+def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Finding]:
     """A warning where the first stroke of a log was judged and a later one was not, since the log is not cut.
 
     `found` are the detections of its operations, `cut_by` is how it was cut into them.
@@ -192,14 +189,7 @@ def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_b
         for number, stroke in enumerate(strokes[1:], 2)
         if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
     ]
-    if not blind:
-        return []
-    which = f"stroke {blind[0]} was" if len(blind) == 1 else f"{len(blind)} of them were"
-    text = (
-        f"holds {counted(len(strokes), 'stroke')} in one operation, and {which} not judged: cut it with "
-        'operations = "motion" in the benchmark file, or --operations motion'
-    )
-    return [Skipped(recording.name, text)]
+    return [Finding(LogNotCut(len(strokes), tuple(blind)))] if blind else []
 
 
 def _strokes(recording: Recording) -> list[Operation]:

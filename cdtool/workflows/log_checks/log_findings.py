@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Fact, Finding, worst_first
@@ -42,10 +42,10 @@ def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     return worst_first(dict.fromkeys([*found, *truth_findings(recording, contacts, rule)]))
 
 
-def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Skipped]:
+def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[RecordingFinding]:
     """Return the warnings among the findings of a log, under its name; losses are reported by `runs.lost`."""
     found = log_findings(recording, contacts, rule)
-    return [Skipped(recording.name, str(item)) for item in found if item.severity == "warning"]
+    return [RecordingFinding.of(recording.name, item) for item in found if item.severity == "warning"]
 
 
 def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
