@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule, not_met
-from cdtool.evaluation.results import LimitResult, Results, Skipped
+from cdtool.evaluation.results import LimitResult, RecordingFinding, Results, Skipped
 from cdtool.report.junit import to_junit
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
@@ -142,6 +142,14 @@ def test_nothing_scored_is_one_error_and_never_an_empty_file():
     assert (root.get("tests"), root.get("errors")) == ("1", "1")
     left_out = read(evaluate(Results({}, ("gm",), ("stiff",), (), (), (), skipped=(Skipped("a.csv", "empty"),))))
     assert (left_out.get("tests"), left_out.get("errors")) == ("2", "2")
+
+
+def test_what_is_lost_of_a_recording_is_an_error_and_a_warning_is_none(results):
+    findings = (RecordingFinding("a.csv", "its end is cut off", "loss"), RecordingFinding("b.csv", "a gap"))
+    root = read(evaluate(replace(results, findings=findings)))
+    error = case(root, "damaged", "a.csv").find("error")
+    assert error is not None and error.get("message") == "damaged, used as far as it goes: its end is cut off"
+    assert not [item for item in root.iter("testcase") if item.get("name") == "b.csv"]
 
 
 def test_several_contacts_of_a_recording_are_one_case(results):

@@ -20,6 +20,7 @@ from cdtool.evaluation.results import (
     ExposureResult,
     FalseAlarmResult,
     LimitResult,
+    RecordingFinding,
     RecordingResult,
     Results,
     Skipped,
@@ -157,13 +158,16 @@ def test_onset_rule_skipped_recordings_and_provenance_are_stated(evaluated):
 
 def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
     budget = CalibrationResult("momentum", "1/1000op", 6.5, 3000, 6.0, 1)
-    text = to_markdown(evaluate(replace(results, calibration=(budget,), findings=(Skipped("a.csv", "a gap"),))))
+    findings = (RecordingFinding("a.csv", "a gap"), RecordingFinding("b.csv", "its end is cut off", "loss"))
+    text = to_markdown(evaluate(replace(results, calibration=(budget,), findings=findings)))
+    assert ["b.csv", "its end is cut off"] in rows(text) and "**Left out or lost: 2 items**" in text
     assert folded(text) == [
         "Contacts missed",
         "False alarms",
         "Contacts not assessable",
         "What could not be judged",
         "Left out",
+        "Damaged, used as far as it goes",
         "Findings",
         "False-alarm budget",
         "Provenance",
