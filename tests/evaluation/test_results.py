@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -98,8 +99,8 @@ def test_a_wrong_file_of_version_3_is_one_clear_error(tmp_path, wrong):
     ("onset", "rule", "unit"),
     [
         (
-            "load cell above 20 N for 3 ms, followed back to 8 N",
-            "load cell above 20 N for 3 ms, followed back to 8 N",
+            "load cell above 20 N for 3 ms",
+            "load cell above 20 N for 3 ms",
             None,
         ),
         ("load cell above 20 N for 3 ms; label file labels.csv", "load cell above 20 N for 3 ms", None),
