@@ -48,5 +48,5 @@ def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
             if gap > GAP_PERIODS * step:
                 gaps[name] = gap
         if gaps:
-            gap = PartGap(min(gaps.values()), () if len(gaps) == len(channels) else tuple(gaps))
-            yield Finding(gap, file=after.path.name)
+            paused = () if len(gaps) == len(channels) else tuple(gaps)
+            yield Finding(PartGap(min(gaps.values()), paused), file=after.path.name)

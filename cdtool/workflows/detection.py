@@ -186,7 +186,7 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
     channel = next((name for name in GROUND_TRUTH if name in found.recording), None)
     if channel is None:
         absent = absent_truth(found.recording)
-        return str(absent[0]).partition(":")[0] + " is not in this log" if absent else "no ground truth is mapped"
+        return f"{absent[0].channel} is not in this log" if absent else "no ground truth is mapped"
     series = found.recording[channel]
     present = series.time[np.isfinite(series.values[:, 0])]
     if channel != "event" and (not len(present) or alarm.time > present[-1]):

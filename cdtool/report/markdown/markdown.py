@@ -10,7 +10,7 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.alike import Reason, alike
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.limits import not_met
-from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, Results, onset_words
+from cdtool.evaluation.results import ContactResult, LimitResult, Results, onset_words
 from cdtool.plain_text import counted
 from cdtool.report.few_contacts import explained
 from cdtool.report.figure_text import NOTHING, number, percent
@@ -135,7 +135,7 @@ def _details(results: Results) -> list[Section]:
         _folded("What could not be judged", _NOT_JUDGED, _not_judged(results), "exposure"),
         _folded("Force limits not met", _FORCE, _force_rows(results), "forces"),
         _folded("Left out", ("recording", "reason"), _reasons(alike(results.skipped)), "skipped"),
-        _folded(DAMAGED.capitalize(), ("recording", "loss"), _reasons(alike(results.losses)), "findings"),
+        _folded("Damaged but used", ("recording", "loss"), _reasons(alike(results.losses)), "findings"),
         _folded("Findings", ("recording", "finding"), _reasons(alike(results.warnings)), "findings"),
         _folded("False-alarm budget", _BUDGET, _calibration(results), "calibration"),
         _folded("Provenance", ("what", "value"), _one_line(results.provenance), "provenance"),

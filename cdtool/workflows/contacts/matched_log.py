@@ -59,7 +59,7 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     inside = _by_operation(log.operations, contacts)
     courses, doubts = _courses(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
-    own = [
+    findings = [
         *_unseen_onsets(contacts, rules.window),
         *_uncut_log(recording, found, log.cut_by),
         *_unseen_forces(contacts, courses),
@@ -87,7 +87,7 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         tuple(row for item in judged for row in false_alarm_rows(item)),
         courses,
         tuple(_not_scored(recording, contacts, inside, log.cut_by)),
-        (*warned, *(RecordingFinding.of(recording.name, item) for item in own)),
+        (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
     )
 
 

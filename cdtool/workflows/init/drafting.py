@@ -111,7 +111,7 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
 
 def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
     """What is odd about a clock's unit that its name alone tells: only another one fits the ratio."""
-    if clock is None or not clock.told.endswith("name") or ratio is None or ratio.fitting:
+    if clock is None or not clock.by_name or ratio is None or ratio.fitting:
         return ""
     other = ratio_of(channels, replace(clock, told=""), messages_si=False)
     if other is None or not other.fitting or other.tick:

@@ -25,7 +25,8 @@ _RARE = 2.0  # how much less likely minutes are than a rate beyond the usual one
 class TableClock:
     """A table's clock: the median `step` of its stamps, in its own unit, and the seconds of one that were assumed.
 
-    `told` says what names the unit for sure; empty: `unit` is what the steps are likely to be in.
+    `told` says what names the unit for sure; empty: `unit` is what the steps are likely to be in. `by_name`: it is the
+    column's name alone.
     """
 
     column: str
@@ -34,6 +35,7 @@ class TableClock:
     unit: str
     told: str
     counts: bool = False
+    by_name: bool = False
 
     def units(self) -> tuple[str, ...]:
         """Units that its stamps may be in; none of a mere counter."""
@@ -73,7 +75,7 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
         return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
-        return replace(clock, unit=named, told="the unit in its name"), found
+        return replace(clock, unit=named, told="the unit in its name", by_name=True), found
     return replace(clock, unit=min(clock.units() or (unit,), key=clock.unlikely)), found
 
 
