@@ -15,7 +15,7 @@ _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
 
 
 class Entry(NamedTuple):
-    """What is said of a recording or channel `name`; entries of one `kind` are merged, `subject` is then listed."""
+    """A text about a recording or channel `name`; entries of one `kind` are merged, and their subjects are listed."""
 
     name: str
     text: str
@@ -24,7 +24,7 @@ class Entry(NamedTuple):
 
 
 class Reason(NamedTuple):
-    """A recording with what is said of it."""
+    """A recording with a reason or a finding."""
 
     recording: str
     reason: str

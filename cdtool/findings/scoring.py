@@ -81,7 +81,7 @@ class LogNotCut(Fact):
         number = self.not_assessed
         which = f"stroke {number[0]} was" if len(number) == 1 else f"{len(number)} of them were"
         return (
-            f"holds {counted(self.strokes, 'stroke')} in one operation, and {which} not judged: cut it with "
+            f"holds {counted(self.strokes, 'stroke')} in one operation, and {which} not assessed: cut it with "
             'operations = "motion" in the benchmark file, or --operations motion'
         )
 

@@ -68,7 +68,7 @@ def test_a_log_of_two_strokes_that_is_not_cut_is_told_how_to_cut_it(tmp_path, mo
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):
-        told = 'not judged: cut it with operations = "motion" in the benchmark file, or --operations motion'
+        told = 'not assessed: cut it with operations = "motion" in the benchmark file, or --operations motion'
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)

@@ -22,7 +22,7 @@ def test_findings_of_one_kind_are_merged_whatever_their_numbers_are():
     assert others == [(item.channel, item.message) for item in findings[4:]]  # of two each is shown
 
 
-def test_what_is_said_of_many_channels_is_one_line_with_a_count():
+def test_one_kind_of_finding_about_many_channels_is_one_line_with_a_count():
     findings = [Finding(Jitter(0.01 * i, 0.01), f"ch{i}") for i in range(46)]
     assert grouped_findings([*findings, Finding(StuckChannel(""), "ch1")]) == [
         ("ch0", f"{Jitter(0.0, 0.01).sentence()}; 45 more like it (ch1, ch2, ch3, ...)"),

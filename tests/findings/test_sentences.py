@@ -581,14 +581,14 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.LogNotCut(4, (3,)),
         (
-            "holds 4 strokes in one operation, and stroke 3 was not judged: cut it with operations = "
+            "holds 4 strokes in one operation, and stroke 3 was not assessed: cut it with operations = "
             '"motion" in the benchmark file, or --operations motion'
         ),
     ),
     (
         scoring.LogNotCut(4, (2, 3)),
         (
-            "holds 4 strokes in one operation, and 2 of them were not judged: cut it with operations = "
+            "holds 4 strokes in one operation, and 2 of them were not assessed: cut it with operations = "
             '"motion" in the benchmark file, or --operations motion'
         ),
     ),
