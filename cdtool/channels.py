@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.errors import nearest
+from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
 from cdtool.tables import Table
 from cdtool.units import RAW_UNITS, unit
@@ -131,7 +131,11 @@ def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUn
             continue
         if name not in CHANNELS:
             raise table.fault(name, "unknown channel", nearest(name, ["time", *CHANNELS]))
-        sources.append(_source(table.table(name), name, joints, accepted(name), topics))
+        try:
+            sources.append(_source(table.table(name), name, joints, accepted(name), topics))
+        except ConfigurationError as fault:
+            fault.channel = name
+            raise
     return ChannelMap(time, tuple(sources), joints, topics, low_pass)
 
 

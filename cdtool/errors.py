@@ -13,12 +13,16 @@ if TYPE_CHECKING:
 
 
 class CdtoolError(Exception):
-    """A known error: `message` states what is wrong and where, `hint` what to do next."""
+    """A known error: `message` states what is wrong and where, `hint` what to do next.
 
-    def __init__(self, message: str, hint: str = "") -> None:
+    `channel` is the channel of the log that it is about, for code that can do without one; else empty.
+    """
+
+    def __init__(self, message: str, hint: str = "", *, channel: str = "") -> None:
         super().__init__(message)
         self.message = message
         self.hint = hint
+        self.channel = channel
 
     def __str__(self) -> str:
         return f"{self.message} ({self.hint})" if self.hint else self.message

@@ -6,8 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.plain_text import counted
-from cdtool.recording import Finding, FloatArray
+from cdtool.findings import Finding
+from cdtool.findings.containers import RoundedIntegers
+from cdtool.recording import FloatArray
 
 # float64 represents every integer up to the first value; 64-bit integers are below the second.
 _EXACT, _WIDEST = 2.0**53, 2.0**64
@@ -23,5 +24,4 @@ def rounded_integers(values: FloatArray) -> int:
 
 def rounding_finding(column: str, count: int, severity: Literal["note", "warning"] = "warning") -> list[Finding]:
     """Return the finding on a column with that many rounded values; empty for none."""
-    text = f"{counted(count, 'value')} beyond 2^53: of integers that large the last digits are rounded to float64"
-    return [Finding(text, column, severity)] if count else []
+    return [Finding(RoundedIntegers(count), column, severity)] if count else []

@@ -93,6 +93,20 @@ def first_of(names: Sequence[str], most: int = 3) -> str:
     return f"{', '.join(names[:most])}{more}"
 
 
+def shown_lines(numbers: Sequence[int]) -> str:
+    """Return the numbers of lines of a file in words.
+
+    >>> shown_lines([3]), shown_lines([1, 2, 3]), shown_lines([3, 9, 12, 20])
+    ('line 3', 'lines 1 to 3', '4 lines (3, 9, 12, ...)')
+    """
+    if len(numbers) == 1:
+        return f"line {numbers[0]}"
+    if numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"lines {numbers[0]} to {numbers[-1]}"
+    listed = ", ".join(str(number) for number in numbers[:3])
+    return f"{counted(len(numbers), 'line')} ({listed}{', ...' if len(numbers) > 3 else ''})"
+
+
 def plural(thing: str) -> str:
     """Return the plural of a noun: "hours", "entries", "losses"."""
     if thing.endswith("y") and thing[-2:-1] not in "aeiou":

@@ -15,8 +15,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdtool.plain_text import counted
-from cdtool.recording import MEASURED, REFERENCES, BoolArray, Finding, FloatArray, Recording, Series
+from cdtool.findings import Finding
+from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
+from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
 
 # No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.
 IMPOSSIBLE = 1e9
@@ -95,8 +96,7 @@ class PlausibleRanges:
                 continue
             series = recording[name]
             if (series.unit, series.joint_count) != (known.unit, len(known.centre)):
-                text = f"logged in {series.unit}, learned in {known.unit}: not checked for implausible values"
-                findings.append(Finding(text, name))
+                findings.append(Finding(LearnedInOtherUnit(series.unit, known.unit), name))
                 continue
             of_channel = factors.get(name, ())
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
@@ -104,14 +104,14 @@ class PlausibleRanges:
                 wrong |= _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
             values = np.where(wrong, np.nan, series.values)
             for j in range(series.joint_count):
-                joint = f" of joint {recording.joints[j]}" if series.joint_count > 1 else ""
+                joint = recording.joints[j] if series.joint_count > 1 else ""
                 factor = of_channel[j] if of_channel else 0.0
                 behind, leaps = _leapt(series.time, values[:, j], known, known.centre[j], factor)
                 if wrong[:, j].any():
-                    findings.append(Finding(_far_words(series, j, wrong[:, j], known, joint), name, "loss"))
+                    findings.append(Finding(_far_values(series, j, wrong[:, j], known, joint), name, "loss"))
                 if behind.any():
                     masked = int(np.count_nonzero(behind))
-                    findings.append(Finding(_leap_words(leaps, masked, series.unit, joint), name, "loss"))
+                    findings.append(Finding(LeapingValues(masked, joint, tuple(leaps), series.unit), name, "loss"))
                 values[behind, j] = np.nan
             if wrong.any() or not np.array_equal(values, series.values, equal_nan=True):
                 channels[name] = Series(series.time, values, series.unit)
@@ -228,37 +228,10 @@ def _leapt(
     return wrong, leaps
 
 
-def _far_words(series: Series, j: int, wrong: BoolArray, known: ChannelRange, joint: str) -> str:
+def _far_values(series: Series, j: int, wrong: BoolArray, known: ChannelRange, joint: str) -> ImplausibleValues:
     rows = np.flatnonzero(wrong)
-    verb = "is" if len(rows) == 1 else "are"
-    return (
-        f"{counted(len(rows), 'value')}{joint} {verb} implausible (first "
-        f"{series.values[rows[0], j]:.4g} {series.unit} at {series.time[rows[0]]:.3f} s; usual: "
-        f"{known.centre[j]:.3g} +- {known.reach:.3g} {series.unit}), masked"
-    )
-
-
-def _leap_words(leaps: Sequence[Leap], masked: int, unit: str, joint: str) -> str:
-    first = leaps[0]
-    text = (
-        f"{counted(masked, 'value')}{joint} behind {counted(len(leaps), 'leap')} faster than the machine moves (first "
-        f"from {first.before:.4g} to {first.after:.4g} {unit} at {first.time:.3f} s), masked"
-    )
-    zeros = [leap.new_zero for leap in leaps if np.isfinite(leap.new_zero)]
-    if zeros:
-        text += f"; read from a new zero from {zeros[0]:.3f} s on"
-        text += f", and at {counted(len(zeros) - 1, 'more time')}" if len(zeros) > 1 else ""
-    return text
-
-
-@dataclass(frozen=True)
-class Leap:
-    """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values are valid again, NaN if never."""
-
-    time: float
-    before: float
-    after: float
-    new_zero: float = math.nan
+    first, time = float(series.values[rows[0], j]), float(series.time[rows[0]])
+    return ImplausibleValues(len(rows), joint, first, time, known.centre[j], known.reach, series.unit)
 
 
 def _behind_leaps(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError, nearest
+from cdtool.findings import Finding
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -23,26 +23,6 @@ TRIGGER = ("trigger",)
 # High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something odd about a file or a channel: what, where, how often.
-
-    `severity`: a note, a warning, or a loss: data that the file held, or should hold, could not be read.
-    """
-
-    message: str
-    channel: str = ""
-    severity: Literal["note", "warning", "loss"] = "warning"
-
-    def __str__(self) -> str:
-        return f"{self.channel}: {self.message}" if self.channel else self.message
-
-
-def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return losses, then warnings, then notes, each in the given order."""
-    return tuple(sorted(findings, key=lambda item: ("loss", "warning", "note").index(item.severity)))
 
 
 @dataclass(frozen=True)
@@ -113,6 +93,7 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
                     "give one column per joint in [channels], in the order of machine.joints",
+                    channel=name,
                 )
 
     def __contains__(self, channel: str) -> bool:
@@ -125,6 +106,7 @@ class Recording:
             raise RecordingError(
                 f"{self.name}: no channel '{channel}'",
                 f"map it in [channels] of the machine file; mapped here: {', '.join(self.channels) or 'none'}",
+                channel=channel,
             ) from None
 
     @property

@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ import typer
 
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.alike import alike
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.exit_status import Fact, status_of
 from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten, shorten_names
 from cdtool.plain_text import plain as plain
@@ -25,7 +25,7 @@ from cdtool.strict_json import strict_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from cdtool.recording import Finding
+    from cdtool.findings import Finding
     from cdtool.workflows.detection import Detected
     from cdtool.workflows.runs import Progress
 
@@ -58,27 +58,37 @@ def print_json(value: Any) -> None:
     typer.echo(text)
 
 
-def print_skipped(skipped: Sequence[Skipped], findings: Sequence[Skipped] = (), notes: Sequence[Skipped] = ()) -> None:
-    """Print to stderr what was left out, what was lost, then warnings and notes, each distinct message once."""
-    left_out, damaged = _apart(skipped)
-    for every, word in ((left_out, "left out"), (damaged, "loss"), (findings, "warning"), (notes, "note")):
-        items = alike(list(dict.fromkeys(Skipped(item.recording, _bare(item)) for item in every)))
-        for item in items[:_SHOWN]:
-            typer.echo(one_line(f"{word}: {item.recording}: {item.reason.removeprefix(f'{word}: ')}"), err=True)
-        if len(items) > _SHOWN:
-            typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
+def with_findings(result: Any) -> dict[str, Any]:
+    """Return a command's result as JSON values; its findings with their kinds, numbers and sentences."""
+    return {**asdict(result), "findings": [finding.to_dict() for finding in result.findings]}
 
 
-def leave(skipped: Sequence[Skipped] = (), facts: Iterable[Fact] = ()) -> None:
+def print_skipped(skipped: Sequence[Skipped], findings: Sequence[RecordingFinding] = ()) -> None:
+    """Print to stderr what was left out, what was lost, then warnings and notes, similar ones once."""
+    _print_alike("left out", skipped)
+    for severity in ("loss", "warning", "note"):
+        _print_alike(severity, [item for item in findings if item.severity == severity])
+
+
+def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None:
+    items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
+    for item in items[:_SHOWN]:
+        typer.echo(one_line(f"{word}: {item.recording}: {item.reason}"), err=True)
+    if len(items) > _SHOWN:
+        typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
+
+
+def leave(
+    skipped: Sequence[Skipped] = (), findings: Sequence[RecordingFinding] = (), facts: Iterable[Fact] = ()
+) -> None:
     """Exit with the status of the facts and of left-out or damaged recordings; return if all is good."""
-    left_out, damaged = _apart(skipped)
-    logs = len({item.recording for item in damaged})
-    items = len({item.recording for item in left_out})
-    parts = [f"{counted(items, 'item', 'were')} left out"] if left_out else []
-    parts += [f"{counted(logs, 'log', 'are')} damaged"] if damaged else []
+    logs = len({item.recording for item in findings if item.is_loss})
+    items = len({item.recording for item in skipped})
+    parts = [f"{counted(items, 'item', 'were')} left out"] if items else []
+    parts += [f"{counted(logs, 'log', 'are')} damaged"] if logs else []
     if parts:
         typer.echo(f"done, but {' and '.join(parts)}", err=True)
-    found = [*facts, *([Fact.LEFT_OUT] if left_out else []), *([Fact.LOST] if damaged else [])]
+    found = [*facts, *([Fact.LEFT_OUT] if items else []), *([Fact.LOST] if logs else [])]
     status = status_of(found)
     if status:
         raise typer.Exit(status)
@@ -201,19 +211,9 @@ def progress(what: str) -> Iterator[Progress | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _apart(skipped: Sequence[Skipped]) -> tuple[list[Skipped], list[Skipped]]:
-    """Return the recordings that were left out, and those that were used although they are damaged."""
-    from cdtool.workflows.runs import DAMAGED
-
-    damaged = [item for item in skipped if item.reason.startswith(DAMAGED)]
-    return [item for item in skipped if item not in damaged], damaged
-
-
-def _bare(item: Skipped) -> str:
-    """Return a reason without the kind and recording that the line already names."""
-    from cdtool.workflows.runs import DAMAGED
-
-    return item.reason.removeprefix(DAMAGED).removeprefix(f"{item.recording}: ")
+def _bare(item: Skipped | RecordingFinding) -> str:
+    """Return a reason without the recording, which the line already names."""
+    return item.reason.removeprefix(f"{item.recording}: ")
 
 
 @dataclass(frozen=True)

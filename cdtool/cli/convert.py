@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import leave_with, plain, print_json
+from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
 from cdtool.plain_text import counted
@@ -31,18 +30,19 @@ def convert(
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
+    from cdtool.findings.containers import Unverified
     from cdtool.workflows.convert.converting import convert as write
 
     with late_progress("converting") as advance:
         done = write(source, output, machine=machine, force=force, progress=advance)
     if as_json:
-        print_json(asdict(done))
+        print_json(with_findings(done))
     else:
         clocks = f"{counted(done.clocks, 'clock')}"
         typer.echo(f"{', '.join(map(plain, done.files))}: {done.columns} columns on {clocks}")
         for path in done.machine_files:
             typer.echo(f"{plain(path)}: machine file for it")
     for finding in done.findings:
-        if finding.severity != "note" or finding.message.endswith(": unverified"):
+        if finding.severity != "note" or isinstance(finding.fact, Unverified):
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
     leave_with(done.findings)

@@ -17,8 +17,9 @@ from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.exit_status import Fact
+from cdtool.findings import Finding
 
 if TYPE_CHECKING:
     from cdtool.pipeline import Detection
@@ -57,6 +58,7 @@ def detect(
         _plot_names(plot, logs, force=force),
         partial(summarise_force, machine=machine_file.machine, contact=contact) if contact else None,
         skipped=[*prepared.skipped] if prepared else [],
+        findings=[*prepared.losses] if prepared else [],
     )
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
     with folder, progress("detecting") as advance:
@@ -85,6 +87,7 @@ class _Run:
     plot_names: Mapping[Path, Path]
     estimate_force: Callable[[Detection], ForceSummary] | None
     skipped: list[Skipped]
+    findings: list[RecordingFinding]
     done: list[tuple[Path, Detected]] = field(default_factory=list)
     forces: dict[str, ForceSummary] = field(default_factory=dict)
 
@@ -97,7 +100,8 @@ class _Run:
         if self.estimate_force:
             self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
         self.done.append((log, found))
-        self.skipped += [*lost(found.recording), *found.not_scored]
+        self.skipped += found.not_scored
+        self.findings += [*lost(found.recording), *found.findings]
         if self.plot_names:
             from cdtool.report.plots.detection_plot import plot_detected
 
@@ -105,14 +109,14 @@ class _Run:
 
     def show(self, *, as_json: bool) -> None:
         """Print the results and exit with their status."""
+        from cdtool.findings.scoring import LearnedFromIt
         from cdtool.workflows.runs import absent_truth
 
-        taught = "the signature was learned from this log: the absence of alarms is no evidence"
-        learned = [Skipped(str(log), taught) for log, found in self.done if found.learned]
-        absent = [Skipped(str(log), str(item)) for log, found in self.done for item in absent_truth(found.recording)]
-        warnings = [item for _, found in self.done for item in found.warnings]
-        notes = [note for _, found in self.done for note in found.notes]
-        print_skipped(self.skipped, [*learned, *warnings], [*notes, *absent])
+        learned = [RecordingFinding.of(str(log), Finding(LearnedFromIt())) for log, found in self.done if found.learned]
+        absent = [
+            RecordingFinding.of(str(log), item) for log, found in self.done for item in absent_truth(found.recording)
+        ]
+        print_skipped(self.skipped, [*learned, *self.findings, *absent])
         if as_json:
             print_json(as_rows(self.done, self.forces))
         else:
@@ -120,7 +124,7 @@ class _Run:
             for log, _ in self.done:
                 if log in self.plot_names:
                     typer.echo(f"plot written to {plain(self.plot_names[log])}")
-        leave(self.skipped, print_not_assessable((str(log), found) for log, found in self.done))
+        leave(self.skipped, self.findings, print_not_assessable((str(log), found) for log, found in self.done))
 
 
 def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:

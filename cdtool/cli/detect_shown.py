@@ -193,7 +193,10 @@ def _as_json(
 
 
 def _findings(found: Detected) -> list[str]:
-    read, of_log = map(str, found.recording.findings), (item.reason for item in found.warnings)
+    read, of_log = (
+        map(str, found.recording.findings),
+        (item.reason for item in found.findings if item.severity == "warning"),
+    )
     return list(dict.fromkeys([*read, *of_log]))
 
 

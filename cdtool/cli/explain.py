@@ -41,9 +41,10 @@ def explain(
     settings = options.settings()
     explained = explain_log(log, settings)
     prepared = settings.prepared()
-    left_out = prepared.skipped if prepared else ()
-    skipped = [*left_out, *lost(explained.found.recording), *explained.found.not_scored]
-    print_skipped(skipped, explained.found.warnings, explained.found.notes)
+    found = explained.found
+    skipped = [*(prepared.skipped if prepared else ()), *found.not_scored]
+    findings = [*(prepared.losses if prepared else ()), *lost(found.recording), *found.findings]
+    print_skipped(skipped, findings)
     if as_json:
         print_json(explained_as_json(log, explained))
     else:
@@ -51,7 +52,7 @@ def explain(
     for path in _draw(explained, drawn, log.stem, force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
-    leave(skipped, print_not_assessable([(str(log), explained.found)]))
+    leave(skipped, findings, print_not_assessable([(str(log), found)]))
 
 
 def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) -> list[Path]:

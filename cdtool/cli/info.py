@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table
+from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table, with_findings
 from cdtool.cli.options import JsonOption
 from cdtool.errors import CdtoolError
 from cdtool.exit_status import Fact
@@ -39,7 +38,7 @@ def info(
             print_error(fault)
             facts.append(Fact.LEFT_OUT)
     if as_json:
-        print_json([asdict(item) for item in done])
+        print_json([with_findings(item) for item in done])
     else:
         for item in done:
             _show(item)
@@ -47,7 +46,7 @@ def info(
 
 
 def _show(item: Info) -> None:
-    from cdtool.evaluation.alike import grouped
+    from cdtool.evaluation.alike import grouped_findings
 
     details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
     typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
@@ -70,8 +69,7 @@ def _show(item: Info) -> None:
     table(columns, rows)
     typer.echo()
     for severity in ("loss", "warning", "note"):
-        told = [(finding.channel, finding.message) for finding in item.findings if finding.severity == severity]
-        for name, text in grouped(told):
+        for name, text in grouped_findings([found for found in item.findings if found.severity == severity]):
             typer.echo(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
     if not item.findings:
         typer.echo("no warnings")

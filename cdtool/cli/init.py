@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdtool.cli.console import leave_with, plain, print_json
+from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
 
@@ -29,7 +28,7 @@ def init(
     with late_progress("analysing the log"):
         drafted = draft(log, output, force=force)
     if as_json:
-        print_json(asdict(drafted))
+        print_json(with_findings(drafted))
     else:
         typer.echo(drafted.text)
         first = "Check each line marked CHECK" if drafted.channels else "Add its channels"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -116,7 +117,7 @@ def learn_signature(
             typer.echo(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
     _show(learned, output, as_json)
-    leave(learned.skipped)
+    leave(learned.skipped, learned.findings)
 
 
 def _show(learned: Learned, output: Path, as_json: bool) -> None:
@@ -138,7 +139,8 @@ def _show(learned: Learned, output: Path, as_json: bool) -> None:
                     }
                     for motion, runs in learned.runs
                 ],
-                "skipped": [{"recording": item.recording, "reason": item.reason} for item in learned.skipped],
+                "skipped": [asdict(item) for item in learned.skipped],
+                "findings": [asdict(item) for item in learned.findings],
             }
         )
         return

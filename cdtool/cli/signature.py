@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,7 +50,7 @@ def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False
 
     drawn = figure_name(plot, force=force) if plot else None
     stored = read_signature(file)
-    print_skipped((), notes=notes_on(stored))
+    print_skipped((), notes_on(stored))
     pairs = signatures_in(stored) if drawn else ()
     if as_json:
         print_json(file_as_json(stored))
@@ -113,7 +114,7 @@ def check(
             progress=advance,
         )
     names = _plot_names(plot, checked, force=force)
-    print_skipped(checked.skipped, checked.findings, notes_on(checked.file))
+    print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
     if as_json:
         print_json(checked_as_json(checked))
     else:
@@ -126,7 +127,7 @@ def check(
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
     nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
-    leave(checked.skipped, [Fact.NOTHING_USABLE] if nothing else ())
+    leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
 
 
 @signature.command("update", epilog=statuses_words("signature update"))
@@ -170,14 +171,14 @@ def update(
             jobs=jobs,
             progress=advance,
         )
-    print_skipped(done.refused, done.findings, notes_on(done.file))
+    print_skipped(done.refused, [*done.findings, *notes_on(done.file)])
     if as_json:
-        reasons = [{"recording": item.recording, "reason": item.reason} for item in done.refused]
-        print_json({"file": str(file), "added": list(done.added), "refused": reasons})
+        refused, findings = [asdict(item) for item in done.refused], [asdict(item) for item in done.findings]
+        print_json({"file": str(file), "added": list(done.added), "refused": refused, "findings": findings})
     else:
         counts = f"{len(done.refused)} refused; {len(done.file.runs)} in total"
         typer.echo(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
-    leave(done.refused, () if done.added else [Fact.NOTHING_USABLE])
+    leave(done.refused, done.findings, () if done.added else [Fact.NOTHING_USABLE])
 
 
 def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:

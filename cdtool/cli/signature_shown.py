@@ -176,6 +176,7 @@ def checked_as_json(checked: Checked) -> dict[str, Any]:
             for item in checked.classes
         ],
         "skipped": [asdict(item) for item in checked.skipped],
+        "findings": [asdict(item) for item in checked.findings],
     }
 
 

@@ -10,6 +10,7 @@ import typer
 
 from cdtool.cli.console import leave, number, plain, say, table
 from cdtool.cli.truth_shown import show_truth
+from cdtool.evaluation.results import onset_words
 from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def show_table(evaluated: Evaluated) -> None:
     with_misses = f"{', '.join(most)} and {last}" if most else last
     say(
         "latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable; "
-        f"{with_misses} count missed contacts; ops: operations scored; onset: {provenance.get('onset')}"
+        f"{with_misses} count missed contacts; ops: operations scored; onset: {onset_words(provenance)}"
     )
     few = explained(evaluated.summaries)
     if few:
@@ -96,7 +97,8 @@ def _show_limits(evaluated: Evaluated) -> None:
 
 def finish(evaluated: Evaluated) -> None:
     """Exit with the status of the results' conclusion."""
-    leave(evaluated.results.skipped, [Fact[name.upper()] for name in evaluated.results.conclusion.facts])
+    results = evaluated.results
+    leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
 
 
 def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:

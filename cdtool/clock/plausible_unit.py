@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from cdtool.findings.clocks import TwoReadings
 from cdtool.recording import FloatArray
 
 # A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
@@ -44,11 +45,10 @@ def contradicted_by_epoch(stamp: float, factor: float) -> str:
     return unit_since_1970(stamp) if stamp * factor > _LONGEST else ""
 
 
-def both_readings(stamp: float, factor: float, stated: str, meant: str) -> str:
-    """A first stamp read in the stated unit, and as `meant` since 1970, in words."""
+def both_readings(stamp: float, factor: float, stated: str, meant: str) -> TwoReadings:
+    """Return a first stamp as read in the stated unit (`factor` s), and as `meant` since 1970."""
     day = datetime.fromtimestamp(stamp * SECONDS[meant], tz=UTC).date().isoformat()
-    years = stamp * factor / _YEAR
-    return f"its first stamp {stamp:.15g} is {years:,.0f} years in {stated}, and {day} in {meant} since 1970"
+    return TwoReadings(stamp, stated, stamp * factor / _YEAR, meant, day)
 
 
 def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float]:

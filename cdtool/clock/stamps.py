@@ -16,8 +16,22 @@ import numpy.typing as npt
 from cdtool.clock.coarse import line_through
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
-from cdtool.plain_text import counted
-from cdtool.recording import BoolArray, Finding, FloatArray, Series
+from cdtool.findings import Finding
+from cdtool.findings.channels import MissingValues
+from cdtool.findings.clocks import (
+    BackwardStamps,
+    ClockRestart,
+    CoarseClock,
+    DroppedStamps,
+    Gap,
+    Jitter,
+    RepeatedStamps,
+    SampleGaps,
+    StrayStamps,
+    StuckStamps,
+    UnknownStamps,
+)
+from cdtool.recording import BoolArray, FloatArray, Series
 
 # A pause of more than this many periods between samples is a gap.
 GAP_PERIODS = 2.5
@@ -83,16 +97,15 @@ def clean_time(
     raw = kept if counted is None else np.asarray(counted, dtype=np.float64)[index]
     if backward.any():
         restart.add(raw, backward)
-    findings = dropped.findings(first_row, row_name, restart.why(lambda: _median_step(raw)))
+    findings = dropped.findings(first_row, row_name, restart.found(lambda: _median_step(raw)))
     if sampled and dropped.is_coarse:
         index = index[~backward]
         line, on_line = line_through(rising)
         step = 1e3 * _median_step(rising)
-        text = f"{100.0 * repeated.mean():.0f} % of the time stamps repeat: a coarse clock of steps of {step:.3g} ms"
-        findings.append(Finding(f"{text}, replaced by a causal straight line", "time"))
-        stuck = _Dropped("stand still beyond a coarse clock's step")
+        findings.append(Finding(CoarseClock(float(repeated.mean()), step), "time"))
+        stuck = _Dropped(StuckStamps)
         stuck.add(index[~on_line], 0)
-        findings += stuck.finding(len(stamps), first_row, row_name, "; the clock was stuck")
+        findings += stuck.finding(len(stamps), first_row, row_name)
         index, kept = index[on_line], line[on_line]
     else:
         findings += dropped.repeated.finding(len(stamps), first_row, row_name)
@@ -159,8 +172,8 @@ class CleanPieces:
     def findings(self, first_row: int) -> list[Finding]:
         """What was dropped; `first_row` is the file's line of the first sample (0: not known)."""
         row_name = "line" if first_row else "sample"
-        why = self._restart.why(lambda: self._steps.median if self._steps.count else 0.0)
-        found = self._dropped.findings(first_row, row_name, why)
+        restart = self._restart.found(lambda: self._steps.median if self._steps.count else 0.0)
+        found = self._dropped.findings(first_row, row_name, restart)
         return found + self._dropped.repeated.finding(self._dropped.rows, first_row, row_name)
 
 
@@ -184,8 +197,7 @@ def gap_findings(series: Series, channel: str, masked: int = 0) -> list[Finding]
 def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:
     """Of so many values those that are `absent`; what is `masked` among these has a finding of its own."""
     missing = absent - masked
-    verb = "is" if missing == 1 else "are"
-    return [Finding(f"{missing} of {counted(values, 'value')} {verb} missing (NaN)", channel)] if missing else []
+    return [Finding(MissingValues(missing, values), channel)] if missing else []
 
 
 class Gaps:
@@ -194,7 +206,7 @@ class Gaps:
     def __init__(self, period: float, channel: str) -> None:
         self._period, self._channel = period, channel
         self._last, self._total, self._count = np.empty(0), 0, 0
-        self._shown: list[str] = []
+        self._first: list[Gap] = []
         self._regular, self._mean, self._squares = 0, 0.0, 0.0  # steps that are no gaps, and their spread so far
 
     def add(self, times: FloatArray) -> None:
@@ -204,7 +216,7 @@ class Gaps:
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
-        self._shown += [f"{time[i]:.3f} s ({steps[i] * 1e3:.0f} ms)" for i in gaps[: _SHOWN - len(self._shown)]]
+        self._first += [Gap(float(time[i]), float(steps[i])) for i in gaps[: _SHOWN - len(self._first)]]
         usual = steps[steps <= GAP_PERIODS * self._period]
         if len(usual):
             share = len(usual) / (self._regular + len(usual))
@@ -219,12 +231,10 @@ class Gaps:
         if self._total <= 2:  # fewer stamps have no usual step
             return found
         if self._count:
-            more = f" and {self._count - _SHOWN} more" if self._count > _SHOWN else ""
-            found.append(Finding(f"{counted(self._count, 'gap')} after {', '.join(self._shown)}{more}", self._channel))
+            found.append(Finding(SampleGaps(self._count, tuple(self._first)), self._channel))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
         if jitter > 0.1:
-            text = f"the sample period varies by {100 * jitter:.0f} % (std) about {self._period * 1e3:.3g} ms"
-            found.append(Finding(text, self._channel))
+            found.append(Finding(Jitter(jitter, self._period), self._channel))
         return found
 
 
@@ -237,10 +247,10 @@ def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Fi
 
 
 class _Dropped:
-    """Rows that were dropped for one reason: how many, and which the first were."""
+    """Rows that were dropped for one reason, the `kind` of fact: how many, and which the first were."""
 
-    def __init__(self, what: str) -> None:
-        self.what, self.count = what, 0
+    def __init__(self, kind: type[DroppedStamps]) -> None:
+        self.kind, self.count = kind, 0
         self._first: list[int] = []
 
     def add(self, rows: npt.NDArray[np.intp], before: int) -> None:
@@ -248,16 +258,14 @@ class _Dropped:
         self.count += len(rows)
         self._first += (rows[: _SHOWN - len(self._first)] + before).tolist()
 
-    def finding(self, rows: int, first_row: int, row_name: str, why: str = "") -> list[Finding]:
-        """Of `rows` in all those that were dropped: a loss where there is a reason `why`, or where they are many."""
+    def finding(self, rows: int, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
+        """Of `rows` in all those that were dropped: a loss where there is a cause, or where they are many."""
         if not self.count:
             return []
-        share = self.count / rows
-        shown = ", ".join(str(row + first_row) for row in self._first)
-        where = f"{row_name} {shown}{', ...' if self.count > _SHOWN else ''}"
-        stamps = counted(self.count, "time stamp", self.what)
-        text = f"{stamps} ({where}), dropped ({_percent(share)} % of the rows){why}"
-        return [Finding(text, "time", "loss" if why or share > _STRAY_SHARE else "warning")]
+        known = self.count, rows, tuple(row + first_row for row in self._first), row_name
+        fact = BackwardStamps(*known, restart) if restart else self.kind(*known)
+        is_loss = bool(fact.cause) or self.count / rows > _STRAY_SHARE
+        return [Finding(fact, "time", "loss" if is_loss else "warning")]
 
 
 class _DroppedRows:
@@ -265,9 +273,9 @@ class _DroppedRows:
 
     def __init__(self) -> None:
         self.rows = 0
-        self.repeated = _Dropped("repeat")
-        self._unknown, self._wild = _Dropped("are no number"), _Dropped("lie far off those around them")
-        self._backward = _Dropped("run backward")
+        self.repeated = _Dropped(RepeatedStamps)
+        self._unknown, self._wild = _Dropped(UnknownStamps), _Dropped(StrayStamps)
+        self._backward = _Dropped(BackwardStamps)
         self._highest = -np.inf
 
     def sort_out(self, stamps: FloatArray, is_wild: BoolArray) -> tuple[npt.NDArray[np.intp], BoolArray, BoolArray]:
@@ -295,9 +303,9 @@ class _DroppedRows:
         known = self.rows - self._unknown.count - self._wild.count
         return known > 0 and self.repeated.count / known > COARSE_SHARE
 
-    def findings(self, first_row: int, row_name: str, why_backward: str = "") -> list[Finding]:
-        """What was dropped but repeated stamps, which a coarse clock keeps."""
-        kinds = ((self._unknown, ""), (self._wild, ""), (self._backward, why_backward))
+    def findings(self, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
+        """What was dropped but repeated stamps, which a coarse clock keeps; `restart`: why stamps run backward."""
+        kinds = ((self._unknown, None), (self._wild, None), (self._backward, restart))
         return [found for rows, why in kinds for found in rows.finding(self.rows, first_row, row_name, why)]
 
 
@@ -329,22 +337,15 @@ class _Restart:
         self._run = (runs[-1] if runs and edges[-1] == len(backward) else 0) if len(backward) else self._run
         self._last = known[-1:]
 
-    def why(self, usual_step: Callable[[], float]) -> str:
-        """Empty where there is no more to say; `usual_step` gives the median step forward, 0 where there is none."""
+    def found(self, usual_step: Callable[[], float]) -> ClockRestart | None:
+        """None where there is no more to say; `usual_step` returns the median step forward, 0 where there is none."""
         if self._fall is None:
-            return ""
+            return None
         for bits in _COUNTERS if self._whole else ():
             wide = 2.0**bits
             if self._largest < wide and 0.0 < self._fall[1] - self._fall[0] + wide <= GAP_PERIODS * usual_step():
-                return (
-                    f"; the counter of {bits} bits wraps there: log a wider one, "
-                    f"or add {int(wide)} to the stamps from each wrap on"
-                )
-        if self._longest >= _RESTART_ROWS:
-            return (
-                "; the clock starts again there, or has jumped ahead before: cut the log there, or correct its stamps"
-            )
-        return ""
+                return ClockRestart(wrapped_bits=bits)
+        return ClockRestart() if self._longest >= _RESTART_ROWS else None
 
 
 def _median_step(stamps: FloatArray) -> float:
@@ -352,10 +353,6 @@ def _median_step(stamps: FloatArray) -> float:
     steps = np.diff(stamps)
     forward = steps[steps > 0.0]
     return float(np.median(forward)) if len(forward) else 0.0
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g}" if share < 0.1 else f"{100.0 * share:.0f}"
 
 
 class WildStamps:

@@ -264,6 +264,7 @@ def require_channels(detector: Detector, recording: Recording, *more: str) -> No
             raise RecordingError(
                 f"{recording.name}: {detector.name} needs the channel '{channel}'",
                 f"map it in [channels] of the machine file; mapped here: {', '.join(recording.channels) or 'none'}",
+                channel=channel,
             )
 
 

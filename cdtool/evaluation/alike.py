@@ -1,73 +1,118 @@
-"""Merge identical findings about many logs or channels into one, with a count."""
+"""Merge findings of one kind about many logs or channels into one, with a count."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from typing import NamedTuple
 
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.findings import Finding
 
 # Up to this many are listed each; of more, only the first with this many names of the others.
 _EACH, _NAMED = 3, 3
 _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
-_LISTED = re.compile(r"(#[^,;]*)(?:, \1)+(?: and # more|, \.\.\.)?")
-_AS_PLURAL = {"is": "are", "has": "have"}
 
 
-def grouped(items: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Merge texts that differ only in numbers, with a count.
+class Entry(NamedTuple):
+    """A text about a recording or channel `name`; entries of one `kind` are merged, and their subjects are listed."""
+
+    name: str
+    text: str
+    kind: Hashable
+    subject: str
+
+
+class Reason(NamedTuple):
+    """A recording with a reason or a finding."""
+
+    recording: str
+    reason: str
+
+
+def grouped(items: Sequence[Entry]) -> list[tuple[str, str]]:
+    """Merge entries of one kind, with a count.
 
     Parameters
     ----------
-    items : sequence of (str, str)
-        Names with texts.
+    items : sequence of Entry
+        Names with texts and their kinds.
 
     Returns
     -------
     list of (str, str)
-        In order of occurrence; four or more similar texts become one.
+        Names with texts, in order of occurrence; four or more entries of one kind become one.
 
     Examples
     --------
-    >>> grouped([("a", "3 gaps"), ("b", "1 gap"), ("c", "9 gaps"), ("a", "stuck"), ("d", "2 gaps")])
+    >>> gaps = [Entry(name, f"{count} gaps", "gaps", name) for name, count in zip("abcd", (3, 1, 9, 2))]
+    >>> grouped([*gaps, Entry("a", "stuck", "stuck", "a")])
     [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]
     """
-    groups: dict[str, list[tuple[str, str]]] = {}
-    for name, text in items:
-        groups.setdefault(_words(text), []).append((name, text))
+    groups: dict[Hashable, list[Entry]] = {}
+    for item in items:
+        groups.setdefault(item.kind, []).append(item)
     found: list[tuple[str, str]] = []
-    for (name, text), *others in groups.values():
+    for first, *others in groups.values():
         if len(others) < _EACH:
-            found += [(name, text), *others]
+            found += [(item.name, item.text) for item in (first, *others)]
             continue
-        names = list(dict.fromkeys(other for other, _ in others if other not in ("", name)))
+        names = list(dict.fromkeys(item.subject for item in others if item.subject not in ("", first.subject)))
         listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
-        found.append((name, f"{text}; {len(others)} more like it{f' ({listed})' if listed else ''}"))
+        found.append((first.name, f"{first.text}; {len(others)} more like it{f' ({listed})' if listed else ''}"))
     return found
 
 
-def _words(text: str) -> str:
-    """Return the words of a text without its numbers, the length of its lists, and singular or plural."""
-    bare = _LISTED.sub(r"\1", _NUMBERS.sub("#", text))
-    return " ".join(_AS_PLURAL.get(word, word.rstrip("s")) for word in bare.split(" "))
-
-
-def alike(items: Sequence[Skipped]) -> list[Skipped]:
-    """Merge reasons that differ only in numbers.
+def grouped_findings(items: Sequence[Finding]) -> list[tuple[str, str]]:
+    """Merge the findings of one log that are of one kind.
 
     Parameters
     ----------
-    items : sequence of Skipped
-        Recordings with reasons.
+    items : sequence of Finding
+        The findings of a log.
 
     Returns
     -------
-    list of Skipped
+    list of (str, str)
+        Channels with sentences, as `grouped` merges them.
+
+    Examples
+    --------
+    >>> from cdtool.findings.channels import StuckChannel
+    >>> grouped_findings([Finding(StuckChannel(""), channel) for channel in ("speed", "torque", "force", "position")])
+    [('speed', 'the value never changes while the machine moves: stuck?; 3 more like it (torque, force, position)')]
+    """
+    return grouped(
+        [
+            Entry(item.channel, item.message, (item.kind, item.fact.variant), item.channel or item.fact.subject)
+            for item in items
+        ]
+    )
+
+
+def alike(items: Sequence[Skipped | RecordingFinding]) -> list[Reason]:
+    """Merge findings of one kind about one channel, and reasons that differ only in numbers.
+
+    Parameters
+    ----------
+    items : sequence of Skipped or RecordingFinding
+        Recordings with reasons or findings. Reasons come from errors, which have no kind.
+
+    Returns
+    -------
+    list of Reason
         As `grouped` merges them.
 
     Examples
     --------
-    >>> [str(item.reason) for item in alike([Skipped(name, f"{n} gaps") for n, name in enumerate("abcd", 1)])]
+    >>> [item.reason for item in alike([Skipped(name, f"{n} gaps") for n, name in enumerate("abcd", 1)])]
     ['1 gaps; 3 more like it (b, c, d)']
     """
-    return [Skipped(name, reason) for name, reason in grouped([(item.recording, item.reason) for item in items])]
+    return [Reason(*item) for item in grouped([_entry(item) for item in items])]
+
+
+def _entry(item: Skipped | RecordingFinding) -> Entry:
+    kind: Hashable = _NUMBERS.sub("#", item.reason)
+    if isinstance(item, RecordingFinding) and item.kind not in ("", "remark"):
+        kind = item.kind, item.channel, item.severity
+    return Entry(item.recording, item.reason, kind, item.recording)

@@ -155,6 +155,8 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
         facts.add(Fact.FORCE_VIOLATED)
     if results.skipped:
         facts.add(Fact.LEFT_OUT)
+    if results.losses:
+        facts.add(Fact.LOST)
     scored = any(item.contacts or item.operations for item in summaries)
     if blind or not scored or (checks and verdicts["not_assessable"] == len(checks)):
         facts.add(Fact.NOTHING_ASSESSABLE)

@@ -8,14 +8,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import PureWindowsPath
+from typing import Any, Self
 
-SCHEMA_VERSION = 3
+from cdtool.findings import Finding
+
+SCHEMA_VERSION = 4
+# How reports introduce what is lost of a recording that was used.
+DAMAGED = "damaged, used as far as it goes"
 
 
 def meant(meaning: str, **default: Any) -> Any:
     """A dataclass field with its meaning."""
     return field(metadata={"meaning": meaning}, **default)
+
+
+def onset_words(provenance: Mapping[str, Any]) -> str:
+    """Return the rule of the onset in words, with the name of the label file where there is one.
+
+    Parameters
+    ----------
+    provenance : mapping of str to any
+        The provenance of results.
+
+    Returns
+    -------
+    str
+        For example "load cell above 20 N for 3 ms; label file labels.csv".
+
+    Examples
+    --------
+    >>> onset_words({"onset": "load cell above 20 N for 3 ms", "label_file": "gate/labels.csv"})
+    'load cell above 20 N for 3 ms; label file labels.csv'
+    """
+    rule, labels = provenance.get("onset") or "rule not stated", provenance.get("label_file")
+    return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 
 @dataclass(frozen=True)
@@ -218,10 +245,31 @@ class ConclusionResult:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A recording that was left out, or a warning about one that was used."""
+    """What was left out: a recording, a part of one, or a detector."""
 
     recording: str = meant("path of the log below the benchmark file, or a detector")
-    reason: str = meant("why")
+    reason: str = meant("why it was left out")
+
+
+@dataclass(frozen=True)
+class RecordingFinding:
+    """A finding about a recording, or a detector, that was used."""
+
+    recording: str = meant("path of the log below the benchmark file, or a detector")
+    reason: str = meant("the finding in words")
+    severity: str = meant("loss, warning or note", default="warning")
+    kind: str = meant("kind of the finding; empty in files of earlier versions", default="")
+    channel: str = meant("channel or topic that it is about; empty for the whole log", default="")
+
+    @classmethod
+    def of(cls, recording: str, finding: Finding) -> Self:
+        """Return a finding under the name of its recording."""
+        return cls(recording, str(finding), finding.severity, finding.kind, finding.channel)
+
+    @property
+    def is_loss(self) -> bool:
+        """True where part of the recording is lost."""
+        return self.severity == "loss"
 
 
 @dataclass(frozen=True)
@@ -241,11 +289,21 @@ class Results:
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
     skipped: tuple[Skipped, ...] = meant("what was left out", default=())
-    findings: tuple[Skipped, ...] = meant("warnings about recordings that were used", default=())
+    findings: tuple[RecordingFinding, ...] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
+
+    @property
+    def losses(self) -> tuple[RecordingFinding, ...]:
+        """The findings about recordings of which a part is lost."""
+        return tuple(item for item in self.findings if item.is_loss)
+
+    @property
+    def warnings(self) -> tuple[RecordingFinding, ...]:
+        """The other findings."""
+        return tuple(item for item in self.findings if not item.is_loss)
 
     @property
     def scored_contacts(self) -> tuple[ContactResult, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import types
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, fields, is_dataclass
@@ -25,8 +26,14 @@ from cdtool.value_words import value_in_words
 Row = TypeVar("Row")
 # Rows of a detector, of a group or of both.
 _TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
-# The version before: "kept", "broken", "not assessable".
-_SPACED_WORDS = 2
+# Earlier versions that are read: 2 has "kept", "broken" and "not assessable", no conclusion; in 3 what is lost of a
+# recording is listed as left out, and the rule of the onset names the label file.
+_SPACED_WORDS, _LOSSES_LEFT_OUT = 2, 3
+_READABLE = (_SPACED_WORDS, _LOSSES_LEFT_OUT, SCHEMA_VERSION)
+# How version 3 and 2 write these.
+_DAMAGED = "damaged, used as far as it goes: "
+_LABEL_FILE = "; label file "
+_IN_SAMPLES = re.compile(r"\bfor \d+ samples?\b")
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 _PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
@@ -38,6 +45,7 @@ WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
     (ConclusionResult, "outcome"): ("violated", "not_assessable", "met", "not_asked"),
     "verdict": ("pass", "fail", "not_assessable"),
     "side": ("above", "below"),
+    "severity": ("loss", "warning", "note"),
 }
 
 
@@ -97,15 +105,14 @@ def read_results(path: Path) -> Results:
         raise other
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "no schema_version in it")
-    if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
-        known = f"this cdtool knows {_SPACED_WORDS} and {SCHEMA_VERSION}"
+    if values["schema_version"] not in _READABLE:
+        known = f"this cdtool knows {', '.join(map(str, _READABLE[:-1]))} and {SCHEMA_VERSION}"
         raise RecordingError(
             f"{path}: schema_version is {value_in_words(values['schema_version'])}, {known}",
             "run cdtool benchmark again with this version",
         )
     try:
-        if values["schema_version"] == _SPACED_WORDS:
-            values = migrated(values)
+        values = migrated(values)
         results = build(Results, values, "results")
         _refuse_strangers(results)
     except ValueError as fault:
@@ -114,6 +121,13 @@ def read_results(path: Path) -> Results:
 
 
 def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of an earlier schema_version as those of this one."""
+    if values["schema_version"] == _SPACED_WORDS:
+        values = _with_joined_words(values)
+    return _with_losses_apart(values) if values["schema_version"] == _LOSSES_LEFT_OUT else dict(values)
+
+
+def _with_joined_words(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values of schema_version 2 as those of version 3: other words for verdicts, no conclusion yet."""
 
     def renamed(rows: Any, name: str) -> Any:
@@ -130,7 +144,35 @@ def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
 
     tables = {name: renamed(values[name], "verdict") for name in ("forces", "points") if name in values}
     tables |= {"limits": renamed(values["limits"], "outcome")} if "limits" in values else {}
-    return {**values, **tables, "schema_version": SCHEMA_VERSION}
+    return {**values, **tables, "schema_version": _LOSSES_LEFT_OUT}
+
+
+def _with_losses_apart(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of schema_version 3 as those of version 4: losses are findings, the onset's rule is apart.
+
+    `onset_unit` of the provenance is then "samples" where the onset was counted in these.
+    """
+    made = {**values, "schema_version": SCHEMA_VERSION}
+    skipped, findings = values.get("skipped", []), values.get("findings", [])
+    if isinstance(skipped, list) and isinstance(findings, list):
+        made["skipped"] = [row for row in skipped if not _is_loss(row)]
+        losses = [
+            {**row, "reason": row["reason"].removeprefix(_DAMAGED), "severity": "loss"}
+            for row in skipped
+            if _is_loss(row)
+        ]
+        made["findings"] = [*losses, *findings]
+    provenance = values.get("provenance")
+    onset = provenance.get("onset") if isinstance(provenance, dict) else None
+    if isinstance(provenance, dict) and isinstance(onset, str):
+        made["provenance"] = {**provenance, "onset": onset.partition(_LABEL_FILE)[0]}
+        if _IN_SAMPLES.search(onset):
+            made["provenance"]["onset_unit"] = "samples"
+    return made
+
+
+def _is_loss(row: Any) -> bool:
+    return isinstance(row, dict) and isinstance(row.get("reason"), str) and row["reason"].startswith(_DAMAGED)
 
 
 def build(kind: type[Row], values: Any, where: str) -> Row:

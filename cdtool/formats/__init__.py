@@ -9,6 +9,9 @@ also have
 * `element_names`: how the messages of a topic name the elements of their arrays, as a JointState names its joints;
 * `sniffs_any_text`: True where almost any text passes for a file of it.
 
+What the user should know about a file goes into `Source.findings`: `Finding(Remark("..."), column, severity)`, or with
+a kind and numbers of its own, a frozen dataclass derived from `cdtool.findings.Fact` with its `sentence`.
+
 What a column means (channel, unit, scale) is the same for all of them: see `cdtool/ingest/channel_assembly.py`. Writers
 are functions that follow `groups.Writer`.
 """

@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Literal
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError, nearest
+from cdtool.findings import Finding
+from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.source import Source
-from cdtool.recording import GROUND_TRUTH, Finding
+from cdtool.recording import GROUND_TRUTH
 
 # What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
 OWN_CLOCK = "time"
-# How a note about ground truth begins that is mapped and not in a log.
-ABSENT = "is not in this log"
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
 
@@ -70,14 +71,16 @@ def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) 
         raise RecordingError(
             f"{path}: no column {column} (channel '{channel}')",
             f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
+            channel=channel,
         )
     same = _alike(column, names)
     if len(same) > 1:
         raise RecordingError(
             f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
             f"give its number instead: {' or '.join(same)}",
+            channel=channel,
         )
-    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names))
+    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names), channel=channel)
 
 
 def is_absent(column: str | int, names: Sequence[str]) -> bool:
@@ -91,7 +94,9 @@ def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> Channel
     for item in held:
         if item.topic not in known:
             raise RecordingError(
-                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')", nearest(item.topic, known)
+                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')",
+                nearest(item.topic, known),
+                channel=item.channel,
             )
     return replace(wanted, sources=held)
 
@@ -107,10 +112,8 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     plain = replace(channels, time=TimeSource()) if own else channels
     resolved, absent = _resolved(source.path, plain, names)
     resolved = replace(resolved, time=channels.time) if own else resolved
-    what = "topic" if channels.topics else "column"
-    notes = [
-        Finding(f"{ABSENT}: no {what} '{item.described}'{_meant(item, names)}", item.channel, "note") for item in absent
-    ]
+    what: Literal["column", "topic"] = "topic" if channels.topics else "column"
+    notes = [Finding(AbsentTruth(what, item.described, _similar(item, names)), item.channel, "note") for item in absent]
     return replace(source, findings=(*source.findings, *notes)), resolved
 
 
@@ -137,9 +140,8 @@ def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
     return (item.described,) if channels.topics else item.columns
 
 
-def _meant(item: ChannelSource, names: Sequence[str]) -> str:
-    close = get_close_matches(item.described, names, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else ""
+def _similar(item: ChannelSource, names: Sequence[str]) -> str:
+    return next(iter(get_close_matches(item.described, names, n=1, cutoff=0.6)), "")
 
 
 def _alike(column: str, names: Sequence[str]) -> list[str]:

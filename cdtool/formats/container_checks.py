@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.recording import Finding, FloatArray
+from cdtool.findings import Finding
+from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
+from cdtool.recording import FloatArray
 
 # Above this many bytes, and this many times its own size, a file unpacks to more than any log: it is refused.
 _FREE, _RATIO = 256 * 2**20, 200
@@ -71,10 +73,10 @@ def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> 
     if values.dtype.kind in "iu" and values.size:
         largest = max(abs(int(values.min())), abs(int(values.max())))
         if largest > _LARGEST_EXACT:
-            findings.append(Finding("integers beyond 2^53 are rounded to float64", name))
+            findings.append(Finding(RoundedColumn(), name))
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def left_out(name: str, kind: str) -> Finding:
     """The note on a column that holds no numbers."""
-    return Finding(f"column '{name}' is {kind}: left out", severity="note")
+    return Finding(ColumnLeftOut(name, kind), severity="note")

@@ -15,7 +15,9 @@ import numpy.typing as npt
 
 from cdtool.clock import EPOCH
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
-from cdtool.recording import Finding, FloatArray
+from cdtool.findings import Finding
+from cdtool.findings.clocks import FileUnitImplausible
+from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,7 @@ def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding],
     meant = contradicted_by_epoch(stamp, clock.factor)
     if clock.base or not meant:
         return clock
-    text = f"the file says {stated}, but {both_readings(stamp, clock.factor, stated, meant)}: taken to be {meant}"
-    findings.append(Finding(f"{text}; if that is wrong, name another clock in [channels] time", channel))
+    findings.append(Finding(FileUnitImplausible(both_readings(stamp, clock.factor, stated, meant)), channel))
     return EpochClock(clock.read, SECONDS[meant], missing=clock.missing)
 
 

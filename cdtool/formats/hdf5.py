@@ -15,6 +15,9 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
+from cdtool.findings.containers import PackedValues, RowsAsColumns
 from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import (
     check_chunks,
@@ -28,8 +31,7 @@ from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.plain_text import first_of
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _KEYS = ("scale_factor", "add_offset")
@@ -93,7 +95,7 @@ class Packing:
         """Return the note on a column that is packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
-        return [Finding(f"packed (CF): times {self.scale:g}, plus {self.offset:g}", column, "note")]
+        return [Finding(PackedValues(self.scale, self.offset), column, "note")]
 
 
 def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
@@ -203,8 +205,7 @@ class _Tree:
         for i in range(min(item.shape)):
             self.places[f"{name}[{i}]"] = (name, i)
         if item.shape[0] < item.shape[1]:
-            text = f"dataset '{name}' is {item.shape[0]} x {item.shape[1]}: its rows are taken as columns"
-            self.findings.append(Finding(text, severity="note"))
+            self.findings.append(Finding(RowsAsColumns("dataset", name, *item.shape), severity="note"))
 
     def rows(self, key: str) -> int:
         """How many values a column has."""
@@ -241,8 +242,7 @@ class _Tree:
         paths = [path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._made(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
-        text = f"{first_of(paths)} look like the clocks of their groups, but have no unit of time"
-        return [Finding(f"{text}: the attribute unit makes each the clock of its group")]
+        return [Finding(ClocksWithoutUnit(tuple(paths)))]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:
         """The dataset that is a column's clock; a clock is its own."""
@@ -267,7 +267,7 @@ class _Tree:
         try:
             since = times_since(told, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
-            self.findings.append(Finding(f"{fault}: it is no clock", path))
+            self.findings.append(Finding(UnusableClock(str(fault)), path))
             return None
         unit = find_unit(told)
         if since is None and (unit is None or unit.si != "s"):

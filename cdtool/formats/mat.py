@@ -15,11 +15,12 @@ import numpy.typing as npt
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.containers import RowsAsColumns, VariableLeftOut
 from cdtool.formats.column_names import wanted_keys
 from cdtool.formats.container_checks import check_chunks, check_size, library, one_line_errors
 from cdtool.formats.mat_check import MAGIC, check_whole
 from cdtool.formats.source import Source
-from cdtool.recording import Finding
 
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
 _V73 = b"MATLAB 7."
@@ -49,17 +50,16 @@ class Mat:
         read = [variable for variable, shape in shapes.items() if set(_names(variable, shape)) & set(keys)]
         values = _load(path, {variable: shapes[variable] for variable in (*read, *scalars)})
         columns: dict[str, Column] = {}
-        findings = [Finding(f"variable '{name}' is a {kind}: left out", severity="note") for name, kind in others]
+        findings = [Finding(VariableLeftOut(name, f"a {kind}"), severity="note") for name, kind in others]
         for variable in read:
             array = np.asarray(values[variable])
             if np.iscomplexobj(array):
-                findings.append(Finding(f"variable '{variable}' is complex: left out", severity="note"))
+                findings.append(Finding(VariableLeftOut(variable, "complex"), severity="note"))
                 continue
             table = array.reshape(-1, 1) if 1 in array.shape else array
             if table.shape[0] < table.shape[1]:
                 table = table.T
-                text = f"variable '{variable}' is {array.shape[0]} x {array.shape[1]}: its rows are taken as columns"
-                findings.append(Finding(text, severity="note"))
+                findings.append(Finding(RowsAsColumns("variable", variable, *array.shape), severity="note"))
             for i, key in enumerate(_names(variable, shapes[variable])):
                 if key in keys:
                     columns[key] = Column(key, np.ascontiguousarray(table[:, i], dtype=np.float64))

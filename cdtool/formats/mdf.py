@@ -19,13 +19,15 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.containers import NeverFinalised, ValuesCutOff
 from cdtool.formats.column_names import asked_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
 from cdtool.formats.groups import Group, Parts, Written, need_clocks, stored
 from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGICS = (b"MDF     ", b"UnFinMF ")
@@ -59,7 +61,7 @@ class Mdf(InPieces):
             unfinished = file.read(8) == _MAGICS[1]
         with one_line_errors(path, "an MDF file"), _opened(asammdf, path) as log:
             if unfinished:
-                findings.append(Finding("the recording was never finalised: its end may be missing", severity="loss"))
+                findings.append(Finding(NeverFinalised(), severity="loss"))
             channels = _channels(log, findings)
             keys = [key for key in asked_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
@@ -135,8 +137,8 @@ def _column(log: Any, key: str, group: int, place: int, findings: list[Finding])
         if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
             numbers = np.where(np.asarray(signal.invalidation_bits), np.nan, numbers)
         if len(numbers) < end - start:
-            text = f"{end - start - len(numbers)} values from number {start + len(numbers)} on are missing"
-            findings.append(Finding(text, key, "loss"))
+            lost = ValuesCutOff(end - start - len(numbers), start + len(numbers))
+            findings.append(Finding(lost, key, "loss"))
         return np.pad(numbers, (0, end - start - len(numbers)), constant_values=np.nan)
 
     factor = _time_factor(log, group)

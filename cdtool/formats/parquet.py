@@ -13,12 +13,15 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import StampsAsSeconds
+from cdtool.findings.containers import CutBehindRow
 from cdtool.formats.column_names import OWN_CLOCK, asked_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
 from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.formats.pieces import VALUES_A_PIECE, InPieces, Pieces
 from cdtool.formats.source import Source
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 _PARQUET, _ARROW = b"PAR1", b"ARROW1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
@@ -127,8 +130,7 @@ class _Table:
         absent = np.isnat(stamps)
         if key not in self._starts and not absent.all():
             self._starts[key] = stamps[~absent][0]
-            text = f"time stamps: taken as seconds from {self._starts[key]}"
-            self.findings.append(Finding(text, key, "note"))
+            self.findings.append(Finding(StampsAsSeconds(str(self._starts[key])), key, "note"))
         seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
         seconds[absent] = np.nan
         return seconds, absent
@@ -174,8 +176,7 @@ class _Feather:
                 batch = reader.read_next_batch()
                 rows += batch.num_rows
                 yield batch
-        text = f"the file is cut off or damaged behind row {rows}: what came after is lost"
-        self._findings.append(Finding(text, severity="loss"))
+        self._findings.append(Finding(CutBehindRow(rows), severity="loss"))
 
     def _stream(self, stream: Any) -> Any:
         stream.seek(8)  # behind the magic bytes and their padding an Arrow file is a stream

@@ -12,17 +12,17 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.containers import BagDamaged, MessagesUnreadable
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
-from cdtool.formats.source import Source
+from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch
 from cdtool.messages.gathering import Gathering
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
-from cdtool.plain_text import counted
-from cdtool.recording import Finding
 
 _BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
 _FIRST_PAGE = 2**16  # the largest that SQLite has; its tables are named there
@@ -88,9 +88,9 @@ class _Bag:
 
     def source(self, columns: dict[str, Column], findings: list[Finding]) -> Source:
         """The bag's columns with all that is known of it."""
-        details = {topic: f"{kind}, {count} messages" for topic, (kind, count) in self.topics.items()}
-        name = Rosbag.name
-        return Source(self.path, name, columns, self.origin / 1e9, tuple(findings), details, tuple(columns))
+        topics = {topic: TopicDetails(kind, count) for topic, (kind, count) in self.topics.items()}
+        start, names = self.origin / 1e9, tuple(columns)
+        return Source(self.path, Rosbag.name, columns, start, tuple(findings), names=names, topics=topics)
 
     def pieces(self) -> Generator[Piece, None, tuple[dict[str, Column], list[Finding]]]:
         """Every numeric field; at their end the columns, without rows, and what is odd."""
@@ -159,17 +159,12 @@ class _Bag:
             yield connection, time, bytes(raw)
 
     def _losses(self) -> list[Finding]:
-        why = f": {self._end}" if self._end else ""
         found = [
-            Finding(
-                f"{self.topics[topic][1] - count} of {counted(self.topics[topic][1], 'message')} cannot be read{why}",
-                topic,
-                "loss",
-            )
+            Finding(MessagesUnreadable(self.topics[topic][1] - count, self.topics[topic][1], self._end), topic, "loss")
             for topic, count in self._read.items()
             if count < self.topics[topic][1]
         ]
-        return found or ([Finding(f"the bag is damaged{why}", severity="loss")] if self._end else [])
+        return found or ([Finding(BagDamaged(self._end), severity="loss")] if self._end else [])
 
 
 def _typestore() -> Any:

@@ -18,6 +18,9 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import NoStartTime
+from cdtool.findings.containers import LastSegmentIncomplete, LibraryMessage, ValuesCutOff
 from cdtool.formats.column_names import OWN_CLOCK, asked_keys
 from cdtool.formats.container_checks import check_size, left_out, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
@@ -26,8 +29,7 @@ from cdtool.formats.pieces import InPieces, Pieces
 from cdtool.formats.slices import Sliced, header_of, side_by_side
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.plain_text import first_of
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGIC = b"TDSm"
@@ -67,15 +69,14 @@ class Tdms(InPieces):
             check_size(path, sum(len(channels[key]) for key in keys))
             incomplete = getattr(file.file_status, "incomplete_final_segment", False)
             if incomplete:
-                text = "the last segment is not complete: what it lacks is lost"
-                findings.append(Finding(text, severity="loss"))
+                findings.append(Finding(LastSegmentIncomplete(), severity="loss"))
             tree = _Tree(channels, findings)
             origin = tree.take_origin(keys, file.properties)
             columns = [tree.sliced(key) for key in keys]
             yield from side_by_side(columns)
             findings += [found for key in keys for found in rounding_finding(key, tree.rounded[key])]
             findings += [
-                Finding(f"npTDMS says: {line}", severity="note" if incomplete else "warning") for line in lines
+                Finding(LibraryMessage("npTDMS", line), severity="note" if incomplete else "warning") for line in lines
             ]
             details = {key: str(value)[:80] for key, value in file.properties.items()}
         headers = {column.name: header_of(column) for column in columns}
@@ -123,8 +124,7 @@ class _Tree:
         self._origin = min(known, default=Fraction(0))
         untold = [key for key, start in begins.items() if start is None] + [key for key in clocks if not self._epoch]
         if known and untold:
-            text = f"no start time (wf_start_time) in {first_of(untold)}: taken to begin with the first of them"
-            self._findings.append(Finding(text))
+            self._findings.append(Finding(NoStartTime(tuple(untold))))
         return float(self._origin)
 
     def sliced(self, key: str) -> Sliced:
@@ -158,8 +158,7 @@ class _Tree:
         self.rounded[key] += rounded_integers(values) if raw.dtype.kind in "iu" else 0
         if len(values) == end - start:
             return values
-        text = f"{end - start - len(values)} values from number {start + len(values)} on are missing"
-        self._findings.append(Finding(text, key, "loss"))
+        self._findings.append(Finding(ValuesCutOff(end - start - len(values), start + len(values)), key, "loss"))
         return np.pad(values, (0, end - start - len(values)), constant_values=np.nan)
 
     def _first(self, channel: Any) -> float:

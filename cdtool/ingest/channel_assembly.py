@@ -10,7 +10,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,18 +18,20 @@ from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.findings import Fact, Finding, Severity
+from cdtool.findings.channels import ImpossibleValues, InfiniteValues, MaskedValues, SaturatedValues, StuckChannel
+from cdtool.findings.clocks import ClocksApart
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
-from cdtool.plain_text import counted
 from cdtool.plausible import IMPOSSIBLE
-from cdtool.recording import MEASURED, UNITLESS, BoolArray, Finding, FloatArray, Recording, Series
+from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series
 
 Counts = npt.NDArray[np.int64]
 # Why values are masked.
-_MASKED: tuple[tuple[str, Literal["warning", "loss"]], ...] = (
-    ("infinite", "loss"),
-    ("at the sensor's limit", "warning"),
-    ("outside the possible range", "loss"),
+_MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
+    (InfiniteValues, "loss"),
+    (SaturatedValues, "warning"),
+    (ImpossibleValues, "loss"),
 )
 
 
@@ -84,7 +85,7 @@ class _Assembly:
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
-        self.gaps: set[str] = set()  # what was said of the table's clock is not repeated for each channel
+        self.gaps: set[Fact] = set()  # what was said of the table's clock is not repeated for each channel
         self.table: CleanTime | None = None
         if not channels.topics:
             self.table = self._table_clock()
@@ -109,12 +110,14 @@ class _Assembly:
             parts = [self.columns[key].values for key in item.keys]
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         if not len(clock.time):
-            raise RecordingError(f"{self.source.path}: channel '{item.channel}' has no sample with a time")
+            raise RecordingError(
+                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
+            )
         scaled, masked = in_si(item, self._kept(item, values, clock.keep))
         self.findings += masked_findings(masked, item, self.channels.joints)
         series = Series(clock.time, scaled, item.unit)
         odd = gap_findings(series, item.channel, int(masked.sum()))
-        self.findings += [found for found in odd if found.message not in self.gaps]
+        self.findings += [found for found in odd if found.fact not in self.gaps]
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _table_clock(self) -> CleanTime:
@@ -134,7 +137,7 @@ class _Assembly:
                 f"{self.source.path}: column '{column.name}' holds no time stamp", "see [channels] time"
             )
         told_gaps = gap_findings(Series(clock.time, np.zeros(len(clock.time)), "s"), "time")
-        self.gaps = {found.message for found in told_gaps}
+        self.gaps = {found.fact for found in told_gaps}
         self.findings += told_gaps
         return clock
 
@@ -158,6 +161,7 @@ class _Assembly:
                 f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
                 f"its clock {len(keep)}",
                 "columns of one recording are equally long",
+                channel=item.channel,
             )
         check_width(self.source.path, item, table.shape[1])
         return table if keep.all() else table[keep]
@@ -170,28 +174,23 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
             f"{path}: channel '{item.channel}' ({item.described}) gives {width} values "
             f"a sample for {len(item.factor)} joints",
             "name one element a joint, in the order of machine.joints",
+            channel=item.channel,
         )
 
 
 def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
     """Return the findings about masked values (as in_si counts them), by joint."""
     return [
-        Finding(f"{_counted(count, of_joint(joints, j, len(counts)))} {what}, masked", item.channel, severity)
-        for (what, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+        Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
+        for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
         for j, count in enumerate(counts)
         if count
     ]
 
 
-def _counted(count: int, of: str) -> str:
-    return (
-        counted(count, "value", "are") if not of else f"{counted(count, 'value')}{of} {'is' if count == 1 else 'are'}"
-    )
-
-
-def of_joint(joints: Sequence[str], joint: int, count: int) -> str:
-    """ " of joint elbow" where a channel has several joints, else nothing."""
-    return f" of joint {joints[joint]}" if count > 1 else ""
+def joint_name(joints: Sequence[str], joint: int, count: int) -> str:
+    """Return the name of a joint where a channel has several, else nothing."""
+    return joints[joint] if count > 1 else ""
 
 
 def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
@@ -240,8 +239,7 @@ def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]
         others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
         for joint, stands in enumerate(constant[name]):
             if stands and not all(other[joint] for other in others):
-                which = of_joint(joints, joint, len(constant[name]))
-                found.append(Finding(f"the value{which} never changes while the machine moves: stuck?", name))
+                found.append(Finding(StuckChannel(joint_name(joints, joint, len(constant[name]))), name))
     return found
 
 
@@ -257,8 +255,7 @@ def apart_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Fi
     for start, end, name in spans[1:]:
         distance = start - latest
         if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
-            text = f"begins {distance:.6g} s after {before} ends: their clocks have no time in common"
-            found.append(Finding(f"{text}; choose another clock in the machine file, or a time_offset", name))
+            found.append(Finding(ClocksApart(distance, before), name))
         if end > latest:
             latest, before = end, name
     return found

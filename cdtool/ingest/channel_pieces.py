@@ -13,6 +13,7 @@ from cdtool.channels import ChannelSource
 from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.pieces import MappedLog, Run
@@ -29,7 +30,7 @@ from cdtool.ingest.log_figures import ClockFigures
 from cdtool.ingest.parts import ChannelSpan, PartSpan, check_parts, gaps_between, of_part
 from cdtool.ingest.reading import FoundParts
 from cdtool.machine_file import MachineFile
-from cdtool.recording import MEASURED, Finding, FloatArray
+from cdtool.recording import MEASURED, FloatArray
 
 
 class LoggedChannel:
@@ -111,7 +112,8 @@ class LoggedFile:
         for channel in self.channels.values():
             check_width(path, channel.item, math.prod(source.columns[channel.item.described].values.shape[1:]))
             if not channel.clock.rows:
-                raise RecordingError(f"{path}: channel '{channel.item.channel}' has no sample with a time")
+                name = channel.item.channel
+                raise RecordingError(f"{path}: channel '{name}' has no sample with a time", channel=name)
         offsets = [item.time_offset for item in held.sources]
         self.late += max(offsets, default=0.0) - min(offsets, default=0.0)
 

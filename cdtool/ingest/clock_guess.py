@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, un
 from cdtool.clock.stamps import EDGE_ROWS, CleanPieces, gaps_in, leading_wild
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
+from cdtool.findings import Finding
+from cdtool.findings.clocks import AssumedClock, HeaderUnitImplausible
 from cdtool.formats.source import Source
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
@@ -120,6 +123,7 @@ def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
 
 def _described(column: Column, first_row: int, step: float, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
+    evidence: Literal["header", "epoch", "excel", "steps"]
     start = _start(stamps())
     epoch = unit_since_1970(start)
     wrong: tuple[Finding, ...] = ()
@@ -127,21 +131,20 @@ def _described(column: Column, first_row: int, step: float, stamps: Callable[[],
     if known is not None and stated and contradicted_by_epoch(start, known.factor):
         stated = False
         readings = both_readings(start, known.factor, str(column.unit), epoch)
-        text = f"the header says {column.unit}, but {readings}: taken to be {epoch}; a machine file says it for sure"
-        wrong = (Finding(text, column.name),)
+        wrong = (Finding(HeaderUnitImplausible(readings), column.name),)
     if stated:
-        unit, why = str(column.unit), "its header says so"
+        unit, evidence = str(column.unit), "header"
     elif epoch:
-        unit, why = epoch, f"from its start, {start:.0f} after 1970"
+        unit, evidence = epoch, "epoch"
     elif _EXCEL_FIRST < start < _EXCEL_LAST and step < _EXCEL_STEP:
-        unit, why = "days", f"as Excel counts them, from its start {start:.9g} and its steps of {step:.3g}"
+        unit, evidence = "days", "excel"
     else:
-        unit, why = next(name for most, name in _UNITS if step < most), f"from its steps of {step:.4g}"
+        unit, evidence = next(name for most, name in _UNITS if step < most), "steps"
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is taken off before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
-    text = f"taken to be the clock, in {unit} ({why}); a machine file says it for sure"
-    clock = TableClock(column.name, origin, factor, ClockFigures(), (Finding(text, column.name, "note"), *wrong))
+    assumed = Finding(AssumedClock(unit, evidence, start, step), column.name, "note")
+    clock = TableClock(column.name, origin, factor, ClockFigures(), (assumed, *wrong))
     return _checked(clock, first_row, stamps)
 
 

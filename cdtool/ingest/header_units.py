@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch, contradicted_by_steps
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.channels import UnitContradicted
+from cdtool.findings.clocks import ClockUnitContradicted, StepsImplausible
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
-from cdtool.recording import Finding
 from cdtool.units import RAW_UNITS, Unit, find_unit
 
 # Plain numbers, whatever they are called.
@@ -58,11 +61,12 @@ def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float
         return []
     first = _first_stamp(time, column, origin)
     stated, told = time.unit or "s", find_unit(column.unit) if column.unit else None
-    header = f", as its header says '{_shown(column)}'" if told == Unit("s", time.factor) else ""
+    header = _shown(column) if told == Unit("s", time.factor) else ""
     meant = contradicted_by_epoch(first, time.factor)
     if meant:
+        also = f", as its header says '{header}'" if header else ""
         raise RecordingError(
-            f"{path}: the machine file states {stated} for the clock '{column.name}'{header}, but "
+            f"{path}: the machine file states {stated} for the clock '{column.name}'{also}, but "
             f"{both_readings(first, time.factor, stated, meant)}",
             f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
         )
@@ -70,8 +74,7 @@ def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float
     if not likely:
         return []
     rate = time.factor / (step * SECONDS[likely])
-    text = f"steps of {step:.3g} s in {stated}{header}; in {likely} they are {rate:.4g} Hz"
-    return [Finding(f'{text}: write unit = "{likely}" if that is the rate', "time")]
+    return [Finding(StepsImplausible(step, stated, header, likely, rate), "time")]
 
 
 def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
@@ -86,10 +89,9 @@ def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) ->
             return []
     if told is None or told.si in _PLAIN or (told.si == "s" and math.isclose(told.factor, time.factor)):
         return []
-    stated = f"counts samples at {time.rate:g} Hz" if time.rate else time.unit
-    text = f"the header says '{_shown(column)}', the machine file {stated}"
-    advice = f'write unit = "{column.unit}" if the header is right' if told.si == "s" else "is it another column?"
-    return [Finding(f"{text}{_ratio(told, Unit('s', time.factor))}: {advice}", "time")]
+    ratio = _ratio(told, Unit("s", time.factor))
+    fact = ClockUnitContradicted(_shown(column), str(column.unit), time.unit or "s", time.rate or 0.0, ratio)
+    return [Finding(fact, "time")]
 
 
 def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
@@ -109,27 +111,27 @@ def _fits(told: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
     return told.si == channel_unit and math.isclose(told.factor, factor, rel_tol=_ROUNDED)
 
 
-def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> str:
+def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> UnitContradicted:
     told = find_unit(unit)
     assert told is not None
-    more = f" and {len(columns) - 1} more so" if len(columns) > 1 else ""
-    text = f"the header says '{_shown(columns[0])}'{more}, the machine file {item.stated}{_ratio(told, stated)}"
-    advice = f'write unit = "{unit}"'
+    advice: Literal["unit", "unit and scale", "unit without scale", "other column"] = "unit"
     if item.duty is None and told.si in RAW_UNITS and stated.si != told.si:
-        advice += f" with a scale in {item.unit} per {told.si}"
+        advice = "unit and scale"
     elif told.si == item.unit and stated.si in RAW_UNITS:
-        advice += " without that scale"
+        advice = "unit without scale"
     elif told.si not in (item.unit, stated.si, *RAW_UNITS):
-        return f"{text}: is it another column?"
-    return f"{text}: {advice} if the header is right"
+        advice = "other column"
+    scale = f"{item.unit} per {told.si}" if advice == "unit and scale" else ""
+    header, ratio = _shown(columns[0]), _ratio(told, stated)
+    return UnitContradicted(header, unit, len(columns) - 1, str(item.stated), ratio, advice, scale)
 
 
-def _ratio(told: Unit, stated: Unit) -> str:
-    """By how much values of one kind are wrong where the header is right."""
+def _ratio(told: Unit, stated: Unit) -> float:
+    """By how much values of one kind are wrong where the header is right; 0 for units of two kinds."""
     if told.si != stated.si:
-        return ""
+        return 0.0
     ratio = told.factor / stated.factor
-    return f" (a factor of {max(ratio, 1.0 / ratio):.4g})"
+    return max(ratio, 1.0 / ratio)
 
 
 def _shown(column: Column) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,16 +15,17 @@ from cdtool.bounded_loading import read_bytes
 from cdtool.clock import GAP_PERIODS
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.formats.source import Source
-from cdtool.recording import GROUND_TRUTH, Finding, Recording, Series
+from cdtool.findings import Finding
+from cdtool.findings.messages import ArrayLengthsDiffer
+from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
+from cdtool.formats.source import Source, TopicDetails
+from cdtool.recording import GROUND_TRUTH, Recording, Series
 
 # First and last time [s].
 Span = tuple[float, float]
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
-# `/joint_states: sensor_msgs/msg/JointState, cdr, 200 messages`, as the formats with topics describe one.
-_MESSAGES = re.compile(r"(?P<what>.*), (?P<count>[0-9]+) messages")
 
 
 def joined_digest(digests: Sequence[str]) -> str:
@@ -40,14 +40,9 @@ def lost_parts(folder: Path, parts: Sequence[Path]) -> list[Finding]:
         plain = Path(name).stem if Path(name).suffix in _COMPRESSED else name
         if name in read or plain in read:
             continue
-        what = f"part {name} of {_METADATA}"
-        if not (folder / name).exists():
-            text = f"{what} is not in the folder"
-        elif name != plain:
-            text = f"{what} is compressed as a whole: decompress it, e.g. with zstd -d"
-        else:
-            text = f"{what} is left out: the folder holds parts of another kind too"
-        found.append(Finding(text, severity="loss"))
+        is_there = (folder / name).exists()
+        kind = PartMissing if not is_there else PartCompressed if name != plain else PartOfOtherKind
+        found.append(Finding(kind(name, _METADATA), severity="loss"))
     return found
 
 
@@ -56,7 +51,7 @@ def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
     found = lost_parts(folder, parts)
     for part, fault in unread.items():
         why = fault.message.removeprefix(f"{part}: ")
-        found.append(Finding(f"part {part.name} is left out, it cannot be read: {why}", severity="loss"))
+        found.append(Finding(PartUnreadable(part.name, why), severity="loss"))
     return tuple(found)
 
 
@@ -79,18 +74,17 @@ def joined_sources(
         holding = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
         widths = sorted({source.columns[name].values.shape[1:] for source, _ in holding})
         if len(widths) > 1:
-            text = f"arrays of {' and '.join(str(width[0] if width else 1) for width in widths)} elements: left out"
-            findings.append(Finding(text, name, "note"))
+            lengths = ArrayLengthsDiffer(tuple(width[0] if width else 1 for width in widths))
+            findings.append(Finding(lengths, name, "note"))
             continue
         columns[name] = holding[0][0].columns[name]
         for (_, before), (source, span) in pairwise(holding):
             if before and span and span[0] < before[1]:
                 late.setdefault(source.path, name)
-    for path, name in late.items():
-        text = f"{path.name} begins before the part before it ends ({name}): put in the order of the times"
-        findings.append(Finding(text))
-    details, first = joined_details([(source.path, source.details) for source in sources]), sources[0]
-    return Source(folder, first.format, columns, first.origin, tuple(findings), details, tuple(columns))
+    findings += [Finding(PartsOverlap(path.name, name)) for path, name in late.items()]
+    first, names = sources[0], tuple(columns)
+    details, topics = joined_details(sources), joined_topics(sources)
+    return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
 
 
 class ChannelSpan(NamedTuple):
@@ -135,7 +129,9 @@ def check_parts(parts: Sequence[PartSpan]) -> None:
             span = part.channels.get(name)
             if span is None or unit not in (None, span.unit):
                 raise RecordingError(
-                    f"{part.path}: channel '{name}' is not logged as in {first.path}", "parts of one log are alike"
+                    f"{part.path}: channel '{name}' is not logged as in {first.path}",
+                    "parts of one log are alike",
+                    channel=name,
                 )
             start = span.first + (part.origin - first.origin)
             if start <= end:
@@ -160,9 +156,8 @@ def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
             if gap > GAP_PERIODS * before.channels[name].step:
                 gaps[name] = gap
         if gaps:
-            whose = "" if len(gaps) == len(channels) else f" ({', '.join(gaps)})"
-            text = f"begins {min(gaps.values()):.3g} s after the part before it ends{whose}: nothing is logged between"
-            yield Finding(f"{Path(after.path).name}: {text}")
+            paused = () if len(gaps) == len(channels) else tuple(gaps)
+            yield Finding(PartGap(min(gaps.values()), paused), file=Path(after.path).name)
 
 
 def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
@@ -186,24 +181,28 @@ def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
 
 def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
     """The findings of a part, with its name."""
-    return (replace(found, message=f"{path.name}: {found.message}") for found in findings)
+    return (replace(found, file=path.name) for found in findings)
 
 
-def joined_details(parts: Sequence[tuple[Path, Mapping[str, str]]]) -> dict[str, str]:
-    """Return what the parts of a log state, each topic once: the messages of all are added up."""
+def joined_details(parts: Sequence[Source]) -> dict[str, str]:
+    """Return what the parts of a log state about themselves."""
+    if len(parts) == 1:
+        return dict(parts[0].details)
     said: dict[str, list[str]] = {}
-    for _, details in parts:
-        for key, text in details.items():
+    for part in parts:
+        for key, text in part.details.items():
             said.setdefault(key, []).append(text)
-    joined = {"parts": f"{len(parts)}, {parts[0][0].name} to {parts[-1][0].name}"}
-    for key, texts in said.items():
-        counted = [match for text in texts if (match := _MESSAGES.fullmatch(text))]
-        kinds = list(dict.fromkeys(match["what"] for match in counted))
-        if len(counted) == len(texts):
-            joined[key] = f"{' or '.join(kinds)}, {sum(int(match['count']) for match in counted)} messages"
-        else:
-            joined[key] = " or ".join(dict.fromkeys(texts))
-    return joined
+    joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
+    return joined | {key: " or ".join(dict.fromkeys(texts)) for key, texts in said.items()}
+
+
+def joined_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
+    """Return what the parts of a log state about each topic."""
+    said: dict[str, list[TopicDetails]] = {}
+    for part in parts:
+        for name, topic in part.topics.items():
+            said.setdefault(name, []).append(topic)
+    return {name: TopicDetails.of_parts(topics) for name, topics in said.items()}
 
 
 def _named_parts(metadata: Path) -> list[str]:

@@ -14,18 +14,27 @@ from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column, Piece
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
+from cdtool.findings import Finding
 from cdtool.formats import FORMATS
 from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import Pieces, Run, joined, read_pieces
-from cdtool.formats.source import Format, Source
+from cdtool.formats.source import Format, Source, in_words
 from cdtool.ingest.channel_assembly import as_logged
 from cdtool.ingest.header_units import unit_findings
-from cdtool.ingest.parts import Span, joined_details, joined_recordings, joined_sources, lost_findings, lost_parts
+from cdtool.ingest.parts import (
+    Span,
+    joined_details,
+    joined_recordings,
+    joined_sources,
+    joined_topics,
+    lost_findings,
+    lost_parts,
+)
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Finding, Recording
+from cdtool.recording import Recording
 
 # Opens a file of a format, for some of its columns or all.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
@@ -237,16 +246,16 @@ def has_topics(found: Format) -> bool:
 def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
     """Return files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
     parts: list[Recording] = []
-    details: list[tuple[Path, Mapping[str, str]]] = []
+    headers: list[Source] = []
     factors: dict[str, tuple[float, ...]] = {}
     for path in paths:
         source, channels = mapped_source(path, machine_file)
         factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
         parts.append(as_logged(source, channels, machine_file.machine))
-        details.append((path, source.details))
+        headers.append(replace(source, columns={}))
     whole = parts[0] if len(parts) == 1 and parts[0].name == name else joined_recordings(parts, name)
-    said = joined_details(details) if len(details) > 1 else source.details
-    return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, said, source.dialect)
+    details = in_words(joined_details(headers), joined_topics(headers))
+    return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, details, source.dialect)
 
 
 def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
@@ -346,10 +355,12 @@ def _joined(source: Source, item: ChannelSource) -> Column:
             raise RecordingError(
                 f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock of its own",
                 "name the column that is its clock in [channels] time",
+                channel=item.channel,
             )
         if not np.array_equal(part.time, time):
             raise RecordingError(
                 f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
                 "the joints of one channel are logged together",
+                channel=item.channel,
             )
     return Column(item.channel, np.column_stack([part.values for part in parts]), time)

@@ -13,7 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.clock import differentiate, integrate, previous_value
-from cdtool.recording import UNITLESS, Finding, FloatArray, Recording, Series
+from cdtool.findings import Finding
+from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
+from cdtool.recording import UNITLESS, FloatArray, Recording, Series
 from cdtool.tables import Table
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
@@ -122,17 +124,13 @@ class JointMachine:
         findings = list(recording.findings)
         if "speed" not in channels and "position" in channels:
             channels["speed"] = differentiate(channels["position"], speed_low_pass, self.speed_unit)
-            text = (
-                f"not in the log: derived causally from position (two first-order low-passes at {speed_low_pass:g} Hz)"
-            )
-            findings.append(Finding(text, "speed", "note"))
+            findings.append(Finding(DerivedSpeed(speed_low_pass), "speed", "note"))
         if "position" not in channels and "speed" in channels and self.derives_position:
             channels["position"] = integrate(channels["speed"], self.load_units["position"])
-            findings.append(Finding("not in the log: the speed, integrated from 0", "position", "note"))
+            findings.append(Finding(IntegratedPosition(), "position", "note"))
         if "reference_position" not in channels and "reference_speed" in channels and self.derives_position:
             channels["reference_position"] = self._integrated_reference(channels)
-            text = "not in the log: the reference speed, integrated from the first position"
-            findings.append(Finding(text, "reference_position", "note"))
+            findings.append(Finding(IntegratedReference(), "reference_position", "note"))
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def _integrated_reference(self, channels: Mapping[str, Series]) -> Series:

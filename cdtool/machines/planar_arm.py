@@ -10,8 +10,10 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.dynamics import JointEquation, Pendulum
 from cdtool.errors import ConfigurationError, RecordingError, nearest
+from cdtool.findings import Finding
+from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.recording import FloatArray, Recording, Series
 from cdtool.tables import Table
 
 _LINKS = 2
@@ -158,6 +160,7 @@ class PlanarArm(CoupledMachine):
                 raise RecordingError(
                     f"{recording.name}: the links' accelerations need the channel '{needed}'",
                     f"map {needed} in [channels], or give accelerations in rad/s2",
+                    channel=needed,
                 )
         if not all(self.imu_position):
             raise ConfigurationError(
@@ -165,8 +168,7 @@ class PlanarArm(CoupledMachine):
                 "give the sensors' distances from their joints [m], or accelerations in rad/s2",
             )
         channels = {**referred.channels, "acceleration": self.link_acceleration(referred)}
-        text = "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"
-        findings = (*referred.findings, Finding(text, "acceleration", "note"))
+        findings = (*referred.findings, Finding(LinkAccelerations(), "acceleration", "note"))
         return replace(referred, channels=channels, findings=findings)
 
     def link_acceleration(self, recording: Recording) -> Series:

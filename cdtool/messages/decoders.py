@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.messages import UndecodableMessages
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import Decoder, Gathered, UndecodableError, decoder_for
 from cdtool.messages.columns.gathered import DECODED
@@ -15,8 +17,6 @@ from cdtool.messages.fields import Field, FieldMissingError, missing
 from cdtool.messages.stamp_order import Stamps
 from cdtool.messages.stream import Stream
 from cdtool.messages.taken import Recipe
-from cdtool.plain_text import counted
-from cdtool.recording import Finding
 
 
 class Decoders:
@@ -85,10 +85,8 @@ class Decoders:
 
     def failure(self, topic: str) -> list[Finding]:
         """The finding about messages that could not be decoded."""
-        if not self.failed:
-            return []
-        text = f"{self.failed} of {counted(self.failed + self.decoded, 'message')} cannot be decoded: {self.reason}"
-        return [Finding(text, topic, "loss")]
+        fact = UndecodableMessages(self.failed, self.failed + self.decoded, self.reason)
+        return [Finding(fact, topic, "loss")] if self.failed else []
 
     def told(self, path: str, topic: str) -> list[Finding]:
         """The finding about messages that could not be decoded; raises RecordingError where none could."""

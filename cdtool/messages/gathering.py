@@ -15,12 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.columns import Column
+from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
 from cdtool.messages.stream import Stream
 from cdtool.messages.taken import Bound, Destination, Part
 from cdtool.messages.topic import Topic, Values, in_order
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 # An expected length is no more than a hint: this much is reserved at most [bytes].
 _MOST_RESERVED = 1 << 28

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.plain_text import counted
-from cdtool.recording import Finding
+from cdtool.findings import Finding
+from cdtool.findings.clocks import OutOfOrder
 
 Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
 
@@ -68,8 +68,6 @@ class StampOrder:
         if not self._behind or self._lowest is None:
             return []
         period = (self._highest - self._lowest) / max(1, self._count - 1)
-        text = f"{self._behind} of {counted(self._count, 'message')} out of order, by up to {self._back / 1e6:.4g} ms"
-        if self._back <= _PERIODS * period:
-            return [Finding(f"{text}: sorted by time", topic, "note")]
-        where = f"message {self._first} is stamped {self._back / 1e9:.4g} s before one ahead of it"
-        return [Finding(f"{where}; {text}: sorted by time. Was the clock set or restarted?", topic)]
+        is_set_back = self._back > _PERIODS * period
+        fact = OutOfOrder(self._behind, self._count, self._back / 1e9, is_set_back, self._first)
+        return [Finding(fact, topic, "warning" if is_set_back else "note")]

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import Picked
 from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS
@@ -20,8 +22,7 @@ from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import FieldMissingError, missing, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.messages.stream import Stream
-from cdtool.plain_text import counted
-from cdtool.recording import BoolArray, Finding, FloatArray
+from cdtool.recording import BoolArray, FloatArray
 
 # A field's values in a batch, None: of an array whose width is not known yet, all are empty; and which messages name
 # other joints only, None: none of them does.
@@ -111,8 +112,7 @@ class Topic:
         if each.elsewhere:
             if not each.held:
                 raise missing(self.where, text, FieldMissingError("no message names this joint", each.names))
-            others = counted(each.elsewhere, "message", "name")
-            findings.append(Finding(f"{others} other joints only: left out", name, "note"))
+            findings.append(Finding(OtherJointsOnly(each.elsewhere), name, "note"))
         widths = each.widths - Counter({0: each.widths[0]})
         if len(widths) > 1:
             found = ", ".join(f"{width} in {count}" for width, count in widths.most_common())
@@ -121,7 +121,7 @@ class Topic:
                 "name one element, e.g. position[0]",
             )
         if each.widths[0]:
-            findings.append(Finding(f"{counted(each.widths[0], 'message', 'hold')} an empty array: NaN", name))
+            findings.append(Finding(EmptyArrays(each.widths[0]), name))
         shape = (0, each.width or 1) if each.widths else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings
 

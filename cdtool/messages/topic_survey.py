@@ -11,6 +11,9 @@ import numpy.typing as npt
 from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import HeaderDelay, HeaderUnset
+from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
@@ -19,7 +22,7 @@ from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import in_order, tally
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 _LONGEST_ARRAY = 16
 # Messages times bytes of the longest: an image, too, is an array of numbers until its length is known, and each
@@ -119,8 +122,7 @@ class TopicSurvey:
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"
             if len(widths) > 1:
-                text = f"arrays of {' and '.join(map(str, sorted(widths)))} elements: left out"
-                findings.append(Finding(text, full, "note"))
+                findings.append(Finding(ArrayLengthsDiffer(tuple(sorted(widths))), full, "note"))
             elif widths:
                 findings += rounding_finding(full, self._rounded[name], "note")
                 columns[full] = Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
@@ -130,10 +132,9 @@ class TopicSurvey:
         if not self._is_late:
             return []
         if not self._stamped:
-            return [Finding("the header's stamps are never set: use the log clock", self.topic, "note")]
+            return [Finding(HeaderUnset(), self.topic, "note")]
         low, median, high = (self._late.percentile(percent) for percent in (5, 50, 95))
-        text = f"logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
-        return [Finding(text, self.topic, "note")]
+        return [Finding(HeaderDelay(median, low, high), self.topic, "note")]
 
 
 def _parsed(name: str) -> Field | None:

@@ -1,8 +1,8 @@
 """Results as test cases for CI: every limit, force profile and recording, so that a report shows which one failed.
 
 Conventions: a failure is a limit or force profile that is not met, or a recording's part in one; so there is a failure
-exactly where the exit status is 1. What was left out is an error, and so is a force profile that could not be assessed
-and a detector that could not assess anything of a group; other outcomes that are not assessable are skipped.
+exactly where the exit status is 1. What was left out or lost is an error, and so is a force profile that could not be
+assessed and a detector that could not assess anything of a group; other outcomes that are not assessable are skipped.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import groupby
 from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
-from cdtool.evaluation.results import ContactResult, LimitResult
+from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, RecordingFinding
 from cdtool.evaluation.summary import later_ms
 from cdtool.report.number_text import number, spoken
 from cdtool.report.tables.results import required, value_of
@@ -39,7 +39,7 @@ class Suite:
 
 
 def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
-    """Yield limits, force profiles, what was left out, then the recordings of each detector and group."""
+    """Yield limits, force profiles, what was left out or is damaged, then the recordings of each detector and group."""
     results = evaluated.results
     if results.limits:
         yield Suite("limits", tuple(_limit(item) for item in results.limits))
@@ -48,6 +48,8 @@ def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
         yield Suite("force", tuple(_force(item) for item in checks))
     if results.skipped:
         yield Suite("left out", tuple(Case(item.recording, "error", item.reason) for item in results.skipped))
+    if results.losses:
+        yield Suite("damaged", tuple(_damaged(item) for item in results.losses))
     silent = {(item.detector, item.group) for item in nothing_assessed(evaluated.summaries)}
     forbidden = {(item.detector, item.group) for item in force_missed(results, evaluated.summaries)}
     outcomes = recording_outcomes(results)
@@ -72,6 +74,10 @@ def _force(item: ForceCheck) -> Case:
         return Case(name, lines=(f"{item.profile}: pass",))
     kind = "failure" if item.verdict == "fail" else "error"
     return Case(name, kind, f"{item.profile}: {spoken(item.verdict)}: {item.reason}")
+
+
+def _damaged(item: RecordingFinding) -> Case:
+    return Case(item.recording, "error", f"{DAMAGED}: {item.reason}")
 
 
 def _recording(item: RecordingOutcome, silent: bool, forbidden: bool) -> Case:

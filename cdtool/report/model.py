@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import Results
+from cdtool.evaluation.results import Results, onset_words
 from cdtool.plain_text import counted, shorten
 from cdtool.report.cases import Suite, suites_of
 from cdtool.report.few_contacts import explained
@@ -152,6 +152,7 @@ def report_model(evaluated: Evaluated) -> Model:
         *recordings.reasons_tables(results),
         calibration_table(results),
     )
+    lost = len(results.skipped) + len(results.losses)
     groups = {group: [item for item in summaries if item.group == group] for group in results.groups}
     return Model(
         headline=results.conclusion.headline,
@@ -159,7 +160,7 @@ def report_model(evaluated: Evaluated) -> Model:
         tone=_tone(results),
         scope=tuple(part for part in scope if part),
         reasons=results.conclusion.reasons,
-        left_out=f"{counted(len(results.skipped), 'entry')} of data left out or lost" if results.skipped else "",
+        left_out=f"{counted(lost, 'entry')} of data left out or lost" if lost else "",
         tables={table.name: table for table in tables if table.rows},
         groups=tuple((group, results_table(results, items, group)) for group, items in groups.items()),
         provenance=tuple(provenance_tables(results)),
@@ -211,13 +212,11 @@ def _tone(results: Results) -> str:
 def _results_note(evaluated: Evaluated) -> str:
     """Return how to read the results: from when to when, what is in brackets, what counts where."""
     results = evaluated.results
-    onset = shorten(str(results.provenance.get("onset") or "rule not stated"), _LONGEST)
-    label_file = shorten(str(results.provenance.get("label_file") or ""), _LONGEST)
-    labels = f"; labels: {label_file}" if label_file else ""
+    onset = shorten(onset_words(results.provenance), _LONGEST)
     resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
     resolution = f"; resolution up to {number(max(resolutions))} ms" if resolutions else ""
     note = (
-        f"Latency: from the onset of the contact ({onset}{labels}) to the sample that raised the alarm, debounce "
+        f"Latency: from the onset of the contact ({onset}) to the sample that raised the alarm, debounce "
         f"included{resolution}. In brackets: 95 % interval; “{NOTHING}” means no value. Mean and std are those of the "
         "detected contacts. Median and P95 count a missed contact as later than all others. “At most” is the one-sided "
         "95 % bound. Force at alarm: median of the detected contacts. Peak force: median of all contacts. Read a "

@@ -11,7 +11,7 @@ from cdtool.activation import Activation
 from cdtool.detection import Alarm
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.results import ContactResult, Skipped
+from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.motion.applicable import HOLD
@@ -41,7 +41,7 @@ class Detected:
     log, so the absence of alarms is no evidence. `window`: how long after its onset a contact may be detected [s].
     `normals`: the normal motion of impact-free runs, or why it is unknown.
     `contact_rows` contains, for each of `detections`, the rows of these contacts as written by `cdtool benchmark`.
-    `not_scored` names contacts without an onset, `warnings` concern the log itself, `notes` the signature file.
+    `not_scored` names contacts without an onset; `findings` concern the log itself and the signature file.
     `onset` describes how the onset is found on the load cell.
     """
 
@@ -55,9 +55,8 @@ class Detected:
     window: float = 1.0
     contact_rows: tuple[tuple[ContactResult, ...], ...] = ()
     not_scored: tuple[Skipped, ...] = ()
-    warnings: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
     normals: NormalMotions = field(default_factory=NormalMotions)
-    notes: tuple[Skipped, ...] = ()
     onset: str = ""
 
     @property
@@ -110,7 +109,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
-    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[Skipped]()
+    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
     if signature is not None:
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
@@ -151,9 +150,8 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         rules.window,
         matched.contacts,
         matched.not_scored,
-        matched.warnings,
+        (*matched.findings, *notes),
         normals,
-        tuple(notes),
         rules.onset.described,
     )
 
@@ -184,9 +182,8 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
-        matched.warnings,
+        (*matched.findings, *benchmark.notes),
         benchmark.normals,
-        benchmark.notes,
         benchmark.setup.onset.described,
     )
 
@@ -217,7 +214,7 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
     channel = next((name for name in GROUND_TRUTH if name in found.recording), None)
     if channel is None:
         absent = absent_truth(found.recording)
-        return str(absent[0]).partition(":")[0] + " is not in this log" if absent else "no ground truth is mapped"
+        return f"{absent[0].channel} is not in this log" if absent else "no ground truth is mapped"
     series = found.recording[channel]
     present = series.time[np.isfinite(series.values[:, 0])]
     if channel != "event" and (not len(present) or alarm.time > present[-1]):

@@ -11,12 +11,14 @@ from cdtool.evaluation.explanation.explanation import explain_operation
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.words import words
 from cdtool.evaluation.force.verdict import ForceVerdict
-from cdtool.evaluation.results import CalibrationResult, RecordingResult, Results, Skipped
+from cdtool.evaluation.results import CalibrationResult, RecordingFinding, RecordingResult, Results, Skipped
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching
+from cdtool.findings import Finding, Remark
+from cdtool.findings.scoring import PlotsLeftOut
 from cdtool.pipeline import Detection
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
@@ -47,7 +49,7 @@ class Gathering:
         self.normals = normals
         self.scored: list[Scored] = []
         self.skipped: list[Skipped] = []
-        self.findings: list[Skipped] = [Skipped(str(setup.path), words) for words in setup.migrated]
+        self.findings = [RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated]
         # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
@@ -91,8 +93,8 @@ class Gathering:
             reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
             raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", "check with cdtool info")
         if self._choice.left_out:
-            words = f"{self._choice.left_out} more operations with a miss or a false alarm have no trigger plot"
-            self.findings.append(Skipped(str(self.setup.path), words))
+            left_out = Finding(PlotsLeftOut(self._choice.left_out))
+            self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(
             provenance=provenance,

@@ -14,14 +14,17 @@ import numpy as np
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
-from cdtool.formats.source import Source
+from cdtool.findings import Fact, Finding, worst_first
+from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
+from cdtool.findings.truth import InProgress
+from cdtool.formats.source import Source, in_words
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
 from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import Finding, Recording, Series, worst_first
+from cdtool.recording import Recording, Series
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_findings
+from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
@@ -106,7 +109,8 @@ def _survey(log: Path) -> Info:
     findings += _clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
     for channel in channels:
         findings += missing_findings(channel.missing, channel.samples, channel.name)
-    return Info(str(log), source.format, source.details, tuple(channels), worst_first(findings), source.dialect)
+    details = in_words(source.details, source.topics)
+    return Info(str(log), source.format, details, tuple(channels), worst_first(findings), source.dialect)
 
 
 def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
@@ -141,7 +145,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     rules = ScoringRules()
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
-    findings += [Finding(IN_PROGRESS.format(end=item.end), "force") for item in contacts if item.in_progress]
+    findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     found = worst_first(findings)
     return Info(str(log), logged.format, logged.details, tuple(channels), found, logged.dialect)
 
@@ -181,12 +185,11 @@ def _clock_doubts(
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
     found = list(_named_ones(tables, figures, reread, clock))
     if tables and clock is None:
-        text = "no column looks like a clock: rates, gaps and times are unknown"
-        found.append(Finding(f"{text}; name it, or the sample rate, in [channels] time of a machine file"))
+        found.append(Finding(NoClock()))
     for name, known in clocks.items():
-        doubt = _doubt(known.steps) if name and known.rows > 2 else ""
+        doubt = _doubt(known.steps, named=False) if name and known.rows > 2 else None
         if doubt:
-            found.append(Finding(f"{doubt}", f"{name} time"))
+            found.append(Finding(doubt, f"{name} time"))
     return found
 
 
@@ -202,20 +205,17 @@ def _named_ones(
             steps.add(np.diff(known))
             last = known[-1:]
         forward = figures[column.name]
-        if doubt := _doubt(steps):
-            yield Finding(f"named as a clock, but {doubt}", column.name)
+        if doubt := _doubt(steps, named=True):
+            yield Finding(doubt, column.name)
         elif forward.present == 0:
-            yield Finding("named as a clock, but it holds no stamp", column.name)
+            yield Finding(EmptyClock(), column.name)
         elif clock is None and forward.forward < forward.steps:
-            text = f"named as a clock, but it runs backward at {forward.steps - forward.forward} of its steps"
-            yield Finding(text, column.name)
+            yield Finding(BackwardClock(forward.steps - forward.forward), column.name)
 
 
-def _doubt(steps: Distribution) -> str:
-    """Return the problem with the steps between stamps, or an empty text."""
+def _doubt(steps: Distribution, *, named: bool) -> Fact | None:
+    """Return the problem with the steps of a clock, or of a column that is `named` as one; None for no problem."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
-        return f"all of its {steps.count + 1} stamps are the same: the clock stands still"
-    if repeated > COARSE_SHARE:
-        return f"{100.0 * repeated:.3g} % of its stamps repeat: a coarse clock"
-    return ""
+        return StandingClock(steps.count + 1, named)
+    return CoarseStamps(repeated, named) if repeated > COARSE_SHARE else None

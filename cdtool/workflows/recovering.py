@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 from cdtool.errors import RecordingError, UsageError
 from cdtool.files import replaced
-from cdtool.recording import Finding
+from cdtool.findings import Finding
 
 if TYPE_CHECKING:
     from cdtool.formats.mcap.container.clean_file import CleanFile

@@ -12,21 +12,21 @@ from typing import TypeVar
 
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.findings import Finding
+from cdtool.findings.channels import AbsentTruth
 from cdtool.ingest.reading import read_as_logged, read_recording
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import GROUND_TRUTH, Finding, Recording
+from cdtool.recording import Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
-# Prefix of the reason for a log that is used although part of it is lost.
-DAMAGED = "damaged, used as far as it goes: "
 # Called after each piece of work with the amount done and the total.
 Progress = Callable[[int, int], None]
 
@@ -37,7 +37,7 @@ class Runs:
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
-    findings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
     ranges: PlausibleRanges
 
 
@@ -170,7 +170,7 @@ def load_runs(
     paths, repeated = _each_once(paths)
     operations: list[Operation] = []
     skipped = [Skipped(shown_path(path, base), "given more than once, used once") for path in repeated]
-    findings: list[Skipped] = []
+    findings: list[RecordingFinding] = []
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
@@ -206,8 +206,8 @@ def load_runs(
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)
         skipped.extend(touched)
+        findings.extend(lost(recording))
         findings.extend(log_warnings(recording, contacts, rule))
-        skipped.extend(lost(recording))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
 
@@ -241,20 +241,14 @@ def check_joints(joints: Sequence[str], machine: Machine) -> None:
             raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
 
 
-def lost(recording: Recording) -> list[Skipped]:
-    """Return the losses in a recording that is used nevertheless, reported like left-out logs."""
-    return [Skipped(recording.name, f"{DAMAGED}{item}") for item in recording.findings if item.severity == "loss"]
+def lost(recording: Recording) -> list[RecordingFinding]:
+    """Return the losses in a recording that is used nevertheless."""
+    return [RecordingFinding.of(recording.name, item) for item in recording.findings if item.severity == "loss"]
 
 
 def absent_truth(recording: Recording) -> list[Finding]:
     """Return the notes about ground truth that the machine file maps but the log does not contain."""
-    from cdtool.formats.column_names import ABSENT
-
-    return [
-        item
-        for item in recording.findings
-        if item.channel in GROUND_TRUTH and item.channel not in recording and ABSENT in item.message
-    ]
+    return [item for item in recording.findings if isinstance(item.fact, AbsentTruth) and item.channel not in recording]
 
 
 def _glob(path: Path) -> Iterator[Path]:

@@ -13,9 +13,11 @@ import numpy as np
 from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import ALL
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
+from cdtool.findings import Finding
+from cdtool.findings.scoring import RecordingsWithoutRow
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
@@ -125,16 +127,14 @@ def score(
 
 def _unlisted(
     given: TriggerFile, said: Mapping[str, Mapping[str, Triggered]], known: Collection[str], listed_only: bool
-) -> list[Skipped]:
+) -> list[RecordingFinding]:
     """Return how many recordings have no row for a detector, and how they are counted."""
-    became = "left out" if listed_only else "counted as monitored without an alarm"
     found = []
     for detector, by_name in said.items():
         missing = sorted(set(known) - set(by_name))
         if missing:
-            share = f"{len(missing)} of {counted(len(known), 'recording')}"
-            words = f"{detector}: {share} without a row: {became}; first {missing[0]}"
-            found.append(Skipped(str(given.path), words))
+            fact = RecordingsWithoutRow(detector, len(missing), len(known), listed_only, missing[0])
+            found.append(RecordingFinding.of(str(given.path), Finding(fact)))
     return found
 
 

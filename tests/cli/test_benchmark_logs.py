@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.errors import ConfigurationError
+from cdtool.evaluation.results import onset_words
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from tests.command import cdtool
 
@@ -41,8 +42,8 @@ def test_a_label_that_fits_no_scored_recording_is_refused_with_its_line(read, ro
 
 
 def test_the_onset_rule_of_a_report_names_the_label_file(read):
-    labelled = read(LEARN, STIFF, ONSET, labels="02.csv,5.0,5.2\n").scoring["onset"]
-    assert labelled == f"{read(LEARN, STIFF).scoring['onset']}; label file labels.csv"
+    labelled = read(LEARN, STIFF, ONSET, labels="02.csv,5.0,5.2\n").scoring
+    assert onset_words(labelled) == f"{onset_words(read(LEARN, STIFF).scoring)}; label file labels.csv"
 
 
 def test_a_label_outside_the_recording_is_left_out_with_its_line(read):

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.detectors import DETECTORS
+from cdtool.evaluation.results import SCHEMA_VERSION
 from cdtool.exit_status import STATUSES_OF
 from tests.command import cdtool, one_line
 
@@ -173,7 +174,7 @@ def test_the_benchmark_writes_results_and_a_report_folder(gate_folder, tmp_path)
     assert done.status == 0, done.err
     assert "friction_ekf" in done.out and "n.a.: not assessable" in done.out
     values = json.loads(results.read_text())
-    assert values["schema_version"] == 3
+    assert values["schema_version"] == SCHEMA_VERSION
     assert len(values["contacts"]) == 20 and len(values["exposure"]) == 15
     stiff = {c["detector"]: c["latency_ms"] for c in values["contacts"] if c["recording"] == "stiff/01.csv"}
     assert stiff["pure_inertia"] < stiff["friction_ekf"] < stiff["momentum"] < stiff["pure_torque"]

@@ -9,6 +9,18 @@ from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, differentiate, epoch_start, gap_findings, integrate, previous_value
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.channels import MissingValues
+from cdtool.findings.clocks import (
+    BackwardStamps,
+    ClockRestart,
+    DroppedStamps,
+    Gap,
+    RepeatedStamps,
+    SampleGaps,
+    StrayStamps,
+    UnknownStamps,
+)
 from cdtool.recording import Series
 
 
@@ -40,10 +52,11 @@ def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
     clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2, row_name="line")
     np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
     np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
-    told = " ".join(str(item) for item in clean.findings)
-    assert "1 time stamp is no number (line 8)" in told
-    assert "1 time stamp runs backward (line 6)" in told
-    assert "1 time stamp repeats (line 5)" in told
+    assert [item.fact for item in clean.findings] == [
+        UnknownStamps(1, 12, (8,), "line"),
+        BackwardStamps(1, 12, (6,), "line"),
+        RepeatedStamps(1, 12, (5,), "line"),
+    ]
 
 
 @settings(max_examples=100, deadline=None)
@@ -56,40 +69,50 @@ def test_whatever_the_stamps_the_clean_ones_strictly_increase(stamps):
         return
     assert np.all(np.diff(clean.time) > 0.0)
     assert clean.keep.sum() == len(clean.time)
-    assert clean.keep.all() == (not any("dropped" in item.message for item in clean.findings))
+    assert clean.keep.all() == (not any(isinstance(item.fact, DroppedStamps) for item in clean.findings))
+
+
+RESTART, WRAP_16, WRAP_32 = ClockRestart(), ClockRestart(wrapped_bits=16), ClockRestart(wrapped_bits=32)
 
 
 @pytest.mark.parametrize(
-    ("stamps", "words", "severity"),
+    ("stamps", "fact", "severity"),
     [
+        ([0, 1, 2, 3, 4, 5, 6, 0, 1, 2], BackwardStamps(3, 10, (7, 8, 9), "sample", RESTART), "loss"),
+        ([*range(200), 150, *range(200, 400)], BackwardStamps(1, 401, (200,), "sample"), "warning"),
+        ([*range(200), 199, *range(200, 400)], RepeatedStamps(1, 401, (200,), "sample"), "warning"),
+        ([*range(30), 29, *range(30, 40)], RepeatedStamps(1, 41, (30,), "sample"), "loss"),
+        ([*range(30), np.nan, np.nan, *range(30, 40)], UnknownStamps(2, 42, (30, 31), "sample"), "loss"),
+        ([*range(65500, 65536), *range(20)], BackwardStamps(20, 56, (36, 37, 38), "sample", WRAP_16), "loss"),
         (
-            [0, 1, 2, 3, 4, 5, 6, 0, 1, 2],
-            "3 time stamps run backward (sample 7, 8, 9), dropped (30 %",
+            [*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)],
+            BackwardStamps(9, 39, (30, 31, 32), "sample", WRAP_32),
             "loss",
         ),
-        ([0, 1, 2, 3, 4, 5, 6, 0, 1, 2], "the clock starts again there", "loss"),
-        ([*range(200), 150, *range(200, 400)], "1 time stamp runs backward (sample 200), dropped (0.25 %", "warning"),
-        ([*range(200), 199, *range(200, 400)], "1 time stamp repeats (sample 200), dropped (0.25 %", "warning"),
-        ([*range(30), 29, *range(30, 40)], "1 time stamp repeats (sample 30), dropped (2.4 %", "loss"),
-        ([*range(30), np.nan, np.nan, *range(30, 40)], "2 time stamps are no number (sample 30, 31)", "loss"),
-        ([*range(65500, 65536), *range(20)], "counter of 16 bits wraps there", "loss"),
-        ([*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)], "add 4294967296 to the stamps", "loss"),
-        ([*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)], "counter of 32 bits wraps there", "loss"),
-        ([*range(65490, 65500), *range(20)], "the clock starts again there", "loss"),
-        ([*range(50), 60000, *range(50, 60)], "1 time stamp lies far off those around them (sample 50)", "loss"),
-        ([*range(99), *range(60000, 60051), *range(99, 600)], "or has jumped ahead before", "loss"),
+        (
+            [*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)],
+            BackwardStamps(20, 50, (30, 31, 32), "sample", WRAP_32),
+            "loss",
+        ),
+        ([*range(65490, 65500), *range(20)], BackwardStamps(20, 30, (10, 11, 12), "sample", RESTART), "loss"),
+        ([*range(50), 60000, *range(50, 60)], StrayStamps(1, 61, (50,), "sample"), "loss"),
+        (
+            [*range(99), *range(60000, 60051), *range(99, 600)],
+            BackwardStamps(501, 651, (150, 151, 152), "sample", RESTART),
+            "loss",
+        ),
     ],
-    ids=["restart", "cut", "stray", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "wild", "ahead"],
+    ids=["restart", "stray", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "wild", "ahead"],
 )
-def test_dropped_stamps_are_told_with_their_share_and_are_a_loss_unless_they_are_strays(stamps, words, severity):
-    findings = clean_time(np.array(stamps, dtype=float)).findings
-    told = [item for item in findings if words in item.message]
-    assert [item.severity for item in told] == [severity], findings
+def test_dropped_stamps_are_told_with_their_share_and_are_a_loss_unless_they_are_strays(stamps, fact, severity):
+    (finding,) = clean_time(np.array(stamps, dtype=float)).findings
+    assert (finding.fact, finding.severity) == (fact, severity)
 
 
 def test_a_counters_wrap_shows_in_the_stamps_as_the_file_has_them():
     counted = np.concatenate((np.arange(65500.0, 65536.0), np.arange(20.0)))
-    assert "counter of 16 bits" in str(clean_time((counted - counted[0]) * 1e-6, counted=counted).findings[0])
+    (finding,) = clean_time((counted - counted[0]) * 1e-6, counted=counted).findings
+    assert isinstance(finding.fact, BackwardStamps) and finding.fact.restart == WRAP_16
 
 
 @pytest.mark.parametrize("stamps", [[0.0] * 40, [5.0, 5.0], [7.0, 7.0, 3.0, 2.0]])
@@ -142,9 +165,9 @@ def test_gaps_jitter_and_missing_values_are_told():
     time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
     values = np.zeros(200)
     values[5] = np.nan
-    told = " ".join(str(item) for item in gap_findings(series(time, values), "speed"))
-    assert "1 gap after 0.099 s (101 ms)" in told
-    assert "1 of 200 values is missing" in told
+    gap, missing = gap_findings(series(time, values), "speed")
+    assert gap.fact == SampleGaps(1, (Gap(pytest.approx(0.099), pytest.approx(0.101)),))
+    assert missing == Finding(MissingValues(1, 200), "speed")
 
 
 def test_how_long_a_value_is_held_depends_on_the_rate_so_far_and_not_on_a_later_one():

@@ -9,6 +9,13 @@ import pytest
 
 from cdtool.clock.plausible_unit import contradicted_by_epoch, contradicted_by_steps
 from cdtool.errors import RecordingError
+from cdtool.findings.clocks import (
+    ClockUnitContradicted,
+    FileUnitImplausible,
+    HeaderUnitImplausible,
+    StepsImplausible,
+    TwoReadings,
+)
 from cdtool.ingest.reading import read_recording
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
@@ -28,6 +35,8 @@ position = {{ column = "x", unit = "m" }}
 """
 EPOCHS = {"s": 1.6e9, "ms": 1.6e12, "us": 1.6e15}
 ONE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+# What is said of a clock whose unit cannot be right.
+WRONG_UNIT = (ClockUnitContradicted, FileUnitImplausible, HeaderUnitImplausible, StepsImplausible)
 
 
 def log(folder: Path, header: str, stamps: np.ndarray, name: str = "log.csv") -> Path:
@@ -58,15 +67,15 @@ def test_stamps_since_1970_that_cannot_be_in_the_stated_unit_are_refused_with_bo
 def test_where_the_machine_file_has_the_unit_that_fits_the_wrong_header_is_no_warning(tmp_path):
     recording = read(tmp_path, "Time [sec]", "ms", 1.6e12 + np.arange(40.0))
     assert recording.duration == pytest.approx(0.039)
-    assert not [str(item) for item in recording.findings if "header" in str(item)]
+    assert not [item for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
 
 
 def test_info_without_a_machine_file_reads_it_as_it_must_be_and_warns(tmp_path):
     shown = info(log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0)))
     assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(1000.0, rel=1e-3)] * len(shown.channels)
-    (warning,) = [str(item) for item in shown.findings if item.severity == "warning" and "header" in str(item)]
-    assert "the header says sec, but its first stamp 1600000000000 is 50,702 years in sec" in warning
-    assert "2020-09-13 in ms since 1970: taken to be ms" in warning
+    (warning,) = [item for item in shown.findings if item.severity == "warning"]
+    readings = TwoReadings(1.6e12, "sec", pytest.approx(50702.0, abs=0.5), "ms", "2020-09-13")
+    assert warning.fact == HeaderUnitImplausible(readings) and warning.channel == "Time [sec]"
 
 
 def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
@@ -79,10 +88,10 @@ def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
 @pytest.mark.parametrize(("step", "unit", "likely"), [(1e3, "s", "us"), (1e6, "s", "ns"), (1.0, "ns", "ms")])
 def test_steps_that_no_log_has_are_a_warning_with_both_readings(tmp_path, step, unit, likely):
     recording = read(tmp_path, f"t [{unit}]", unit, step * np.arange(40))
-    (text,) = [str(item) for item in recording.findings if "steps of" in str(item)]
+    (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, StepsImplausible)]
     rate = 1.0 / (step * ONE[likely])
-    assert f"steps of {step * ONE[unit]:.3g} s in {unit}" in text and f"in {likely} they are {rate:.4g} Hz" in text
-    assert f'write unit = "{likely}"' in text
+    assert (fact.stated, fact.header, fact.likely) == (unit, f"t [{unit}]", likely)
+    assert (fact.step, fact.rate) == (pytest.approx(step * ONE[unit]), pytest.approx(rate))
 
 
 @pytest.mark.parametrize(
@@ -110,15 +119,14 @@ def test_no_sample_log_is_warned_of():
     for name in ("gate/stiff/01.csv", "arm/trial_1/free/01.csv"):
         path = next(Path("sample_logs").glob(name.replace("01.csv", "*")))
         shown = info(path)
-        assert not [item for item in shown.findings if "since 1970" in str(item) or "steps of" in item.message[:9]]
+        assert not [item for item in shown.findings if isinstance(item.fact, WRONG_UNIT)]
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs_data(name)) for name in ("ur10e", "ur3e", "emps")])
 def test_no_real_recording_is_warned_of(name):
     for path in [path for path in sorted(data(name).rglob("*")) if path.suffix in (".csv", ".mat")][:2]:
         shown = info(path)
-        wrong = [str(item) for item in shown.findings if "the header says" in str(item) or "steps of" in str(item)]
-        assert not [text for text in wrong if "since 1970" in text or "if that is the rate" in text], path
+        assert not [item for item in shown.findings if isinstance(item.fact, WRONG_UNIT)], path
 
 
 def test_a_containers_clock_that_its_attribute_contradicts_is_read_as_it_must_be_with_a_warning(tmp_path):
@@ -133,5 +141,5 @@ def test_a_containers_clock_that_its_attribute_contradicts_is_read_as_it_must_be
     machine.write_text(MACHINE.format(column="time", unit="s").replace('"x"', '"drive/pos"'))
     recording = read_recording(path, read_machine_file(machine))
     assert recording.duration == pytest.approx(0.049)
-    (text,) = [str(item) for item in recording.findings if "since 1970" in str(item)]
-    assert "the file says s, but its first stamp 1600000000000 is 50,702 years in s, and 2020-09-13 in ms" in text
+    (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
+    assert fact == FileUnitImplausible(TwoReadings(1.6e12, "s", pytest.approx(50702.0, abs=0.5), "ms", "2020-09-13"))

@@ -14,6 +14,7 @@ from cdtool.evaluation.results import (
     ForceStepResult,
     LimitResult,
     PointResult,
+    RecordingFinding,
     RecordingResult,
     Results,
     Skipped,
@@ -54,5 +55,5 @@ FULL = replace(
     sweep=(SweepResult("momentum", "stiff", 5.5, 0, 9, 0.5, 3, 1, 1, 30.0, None),),
     calibration=(CalibrationResult("momentum", "1/1000op", 6.0, 3000, 5.0, 1),),
     limits=(LimitResult("momentum.*.missed", "momentum", "stiff", "missed", 1.0, None, 0.0, "violated", "1 is more"),),
-    findings=(Skipped("a.csv", "a gap"),),
+    findings=(RecordingFinding("a.csv", "time: 1 gap", "loss", "sample_gaps", "time"),),
 )

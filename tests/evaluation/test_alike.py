@@ -1,28 +1,62 @@
-"""Similar findings are one line with a count."""
+"""Findings of one kind are one line with a count."""
 
 from __future__ import annotations
 
-from cdtool.evaluation.alike import grouped
+from cdtool.evaluation.alike import Reason, alike, grouped_findings
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.findings import Finding, Remark
+from cdtool.findings.channels import InfiniteValues, StuckChannel
+from cdtool.findings.clocks import Gap, Jitter, SampleGaps
+from cdtool.findings.containers import ColumnLeftOut
 
 
-def test_singular_plural_and_lists_of_any_length_match():
-    items = [
-        ("a", "1 gap after 0.1 s (4 ms)"),
-        ("b", "2 gaps after 0.1 s (4 ms), 0.2 s (5 ms)"),
-        ("c", "5 gaps after 0.1 s (4 ms), 0.2 s (5 ms), 0.3 s (6 ms) and 2 more"),
-        ("d", "1 gap after 0.4 s (4 ms)"),
-        ("e", "1 value is infinite, masked"),
-        ("f", "2 values are infinite, masked"),
+def gaps(count: int) -> SampleGaps:
+    return SampleGaps(count, tuple(Gap(0.1 * i, 0.004) for i in range(1, min(count, 3) + 1)))
+
+
+def test_findings_of_one_kind_are_merged_whatever_their_numbers_are():
+    findings = [Finding(gaps(count), name) for name, count in zip("abcd", (1, 2, 5, 1), strict=True)]
+    findings += [Finding(InfiniteValues(count, ""), name) for name, count in zip("ef", (1, 2), strict=True)]
+    (name, text), *others = grouped_findings(findings)
+    assert name == "a" and text == f"{gaps(1).sentence()}; 3 more like it (b, c, d)"
+    assert others == [(item.channel, item.message) for item in findings[4:]]  # two are both shown
+
+
+def test_one_kind_of_finding_about_many_channels_is_one_line_with_a_count():
+    findings = [Finding(Jitter(0.01 * i, 0.01), f"ch{i}") for i in range(46)]
+    assert grouped_findings([*findings, Finding(StuckChannel(""), "ch1")]) == [
+        ("ch0", f"{Jitter(0.0, 0.01).sentence()}; 45 more like it (ch1, ch2, ch3, ...)"),
+        ("ch1", StuckChannel("").sentence()),
     ]
-    (name, text), *others = grouped(items)
-    assert name == "a" and text.endswith("; 3 more like it (b, c, d)")
-    assert len(others) == 2  # two are both shown
+    assert grouped_findings(findings[:3]) == [(item.channel, item.message) for item in findings[:3]]
 
 
-def test_similar_messages_are_one_line_with_a_count():
-    items = [(f"ch{i}", f"the sample period varies by {i} % (std) about 10 ms") for i in range(46)]
-    assert grouped([*items, ("ch1", "stuck?")]) == [
-        ("ch0", "the sample period varies by 0 % (std) about 10 ms; 45 more like it (ch1, ch2, ch3, ...)"),
-        ("ch1", "stuck?"),
+def test_columns_left_out_for_one_reason_are_listed_by_their_own_names():
+    texts = [Finding(ColumnLeftOut(name, "of texts"), severity="note") for name in "abcde"]
+    empty = Finding(ColumnLeftOut("f", "empty"), severity="note")
+    assert grouped_findings([*texts, empty]) == [
+        ("", "column 'a' is of texts: left out; 4 more like it (b, c, d, ...)"),
+        ("", empty.message),
     ]
-    assert grouped(items[:3]) == items[:3]
+
+
+def test_remarks_are_merged_only_where_they_say_the_same():
+    findings = [Finding(Remark(text), "a") for text in ("one", "two", "three", "four")]
+    assert grouped_findings(findings) == [("a", item.message) for item in findings]
+
+
+def test_findings_of_recordings_are_merged_by_kind_and_channel():
+    of = [RecordingFinding.of(f"{i}.csv", Finding(gaps(1 + i % 5), "time")) for i in range(6)]
+    force = RecordingFinding.of("6.csv", Finding(gaps(1), "force"))
+    assert alike([*of, force]) == [
+        Reason("0.csv", f"time: {gaps(1).sentence()}; 5 more like it (1.csv, 2.csv, 3.csv, ...)"),
+        Reason("6.csv", force.reason),
+    ]
+
+
+def test_reasons_of_errors_are_merged_where_only_their_numbers_differ():
+    lines = [Skipped(f"{i}.csv", f"line {i}, column 'a': '?' is not a number") for i in range(5)]
+    other = Skipped("5.csv", "line 5 is cut off")
+    merged, single = alike([*lines, other])
+    assert merged.reason == f"{lines[0].reason}; 4 more like it (1.csv, 2.csv, 3.csv, ...)"
+    assert single == Reason(other.recording, other.reason)

@@ -12,11 +12,13 @@ import pytest
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule
 from cdtool.evaluation.results import (
+    SCHEMA_VERSION,
     ConclusionResult,
     ContactResult,
     ExposureResult,
     LimitResult,
     PointResult,
+    RecordingFinding,
     Skipped,
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
@@ -215,6 +217,13 @@ def test_what_was_left_out_is_3_and_a_violation_comes_first():
     assert both.exit_status == 1 and both.facts == ("force_violated", "left_out")
 
 
+def test_a_recording_of_which_a_part_is_lost_is_3_and_was_not_left_out():
+    findings = (RecordingFinding("a.csv", "its end is cut off", "loss"), RecordingFinding("b.csv", "a gap"))
+    conclusion = evaluate(replace(results([40.0] * 2), findings=findings)).results.conclusion
+    assert conclusion.exit_status == 3 and conclusion.facts == ("lost",)
+    assert evaluate(replace(results([40.0] * 2), findings=findings[1:])).results.conclusion.exit_status == 0
+
+
 def test_files_of_version_2_are_read_with_their_words_changed(tmp_path):
     made = evaluate(results([40.0] * 2, ["not_assessable", "pass"], "A", [averaged("not_assessable")]), [MET]).results
     limits = (LimitResult("a", "momentum", "stiff", "missed", 1.0, None, 0.0, "violated", "1 is more"), *made.limits)
@@ -226,13 +235,13 @@ def test_files_of_version_2_are_read_with_their_words_changed(tmp_path):
     path = tmp_path / "old.json"
     path.write_text(json.dumps(old), encoding="utf-8")
     read = read_results(path)
-    assert replace(read, provenance=made.provenance) == made and read.schema_version == 3
+    assert replace(read, provenance=made.provenance) == made and read.schema_version == SCHEMA_VERSION
     assert migrated(old)["limits"][0]["outcome"] == "violated"
     assert cdtool("report", path).status == 1
     old["schema_version"] = 1
     path.write_text(json.dumps(old), encoding="utf-8")
     done = cdtool("report", path)
-    assert done.status == 2 and "this cdtool knows 2 and 3" in done.err and done.err.count("\n") == 1
+    assert done.status == 2 and f"this cdtool knows 2, 3 and {SCHEMA_VERSION}" in done.err and done.err.count("\n") == 1
 
 
 def test_contacts_keep_their_spelling_in_the_data():

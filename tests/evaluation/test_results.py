@@ -6,13 +6,16 @@ import json
 import math
 import re
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import (
     SCHEMA_VERSION,
+    RecordingFinding,
     Skipped,
+    onset_words,
 )
 from cdtool.evaluation.results_file import read_results, to_json
 from cdtool.evaluation.summary import summarise
@@ -65,6 +68,58 @@ def test_an_invalid_results_file_is_one_clear_error(tmp_path, content):
     path.write_text(content, encoding="utf-8")
     with pytest.raises(RecordingError, match=r"results\.json"):
         read_results(path)
+
+
+def version_3(**values: object) -> dict[str, Any]:
+    """Results as a file of version 3 has them: what is lost is listed as left out, findings have a reason alone."""
+    old = json.loads(to_json(RESULTS))
+    return {**old, "schema_version": 3, **values}
+
+
+def test_losses_that_version_3_lists_as_left_out_are_findings(tmp_path):
+    path = tmp_path / "results.json"
+    cut = {"recording": "a.csv", "reason": "damaged, used as far as it goes: the last line (9) is cut off, dropped"}
+    empty, gap = {"recording": "c.csv", "reason": "empty"}, {"recording": "b.csv", "reason": "time: 1 gap"}
+    path.write_text(json.dumps(version_3(skipped=[cut, empty], findings=[gap])), encoding="utf-8")
+    read = read_results(path)
+    assert read.schema_version == SCHEMA_VERSION and read.skipped == (Skipped("c.csv", "empty"),)
+    assert read.losses == (RecordingFinding("a.csv", "the last line (9) is cut off, dropped", "loss"),)
+    assert read.warnings == (RecordingFinding("b.csv", "time: 1 gap", "warning"),)
+
+
+@pytest.mark.parametrize("wrong", [{"skipped": 7}, {"skipped": [7]}, {"findings": [{"reason": []}]}])
+def test_a_wrong_file_of_version_3_is_one_clear_error(tmp_path, wrong):
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(version_3(**wrong)), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"results\.json: not a results file: results\.(skipped|findings)"):
+        read_results(path)
+
+
+@pytest.mark.parametrize(
+    ("onset", "rule", "unit"),
+    [
+        (
+            "load cell above 20 N for 3 ms",
+            "load cell above 20 N for 3 ms",
+            None,
+        ),
+        ("load cell above 20 N for 3 ms; label file labels.csv", "load cell above 20 N for 3 ms", None),
+        ("load cell above 20 N for 3 samples", "load cell above 20 N for 3 samples", "samples"),
+        ("load cell above 20 N for 1 sample", "load cell above 20 N for 1 sample", "samples"),
+    ],
+)
+def test_the_rule_of_the_onset_is_apart_from_the_label_file_and_names_its_unit(tmp_path, onset, rule, unit):
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(version_3(provenance={"onset": onset})), encoding="utf-8")
+    provenance = read_results(path).provenance
+    assert provenance["onset"] == rule and provenance.get("onset_unit") == unit
+
+
+def test_the_words_of_the_onset_name_the_label_file():
+    rule = "load cell above 20 N for 3 ms"
+    assert onset_words({}) == "rule not stated" and onset_words({"onset": rule, "label_file": None}) == rule
+    assert onset_words({"onset": rule, "label_file": "a/b/labels.csv"}) == f"{rule}; label file labels.csv"
+    assert onset_words({"onset": rule, "label_file": "C:\\b\\labels.csv"}) == f"{rule}; label file labels.csv"
 
 
 def test_another_version_is_named_with_a_hint(tmp_path):

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cdtool.findings import Fact
+from cdtool.findings.tables import BlankLines, BlankRows
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import joined
 from cdtool.ingest.reading import read_recording
@@ -14,27 +16,27 @@ from cdtool.ingest.reading import read_recording
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 
 
-def told(source, severity: str) -> list[str]:
-    return [str(finding) for finding in source.findings if finding.severity == severity]
+def told(source, severity: str) -> list[Fact]:
+    return [finding.fact for finding in source.findings if finding.severity == severity]
 
 
 def test_a_blank_line_in_one_column_keeps_its_place_on_the_clock(log, machine):
     recording = read_recording(log("x\n1.5\n2.5\n\n3.5\n4.5\n"), machine(RATE))
     assert recording["speed"].time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
     assert np.isnan(recording["speed"].values[:, 0]).tolist() == [False, False, True, False, False]
-    assert "line 4 blank: taken as missing samples" in told(recording, "warning")
+    assert BlankRows((4,)) in told(recording, "warning")
     assert told(recording, "loss") == []
 
 
 def test_where_every_other_line_is_blank_it_is_the_spacing_of_the_rows(log):
     source = Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9))))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert told(source, "note") == ["8 lines (3, 5, 7, ...) skipped: blank"]
+    assert told(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
 
 
 def test_in_several_columns_a_blank_line_is_no_row(log):
     source = Csv().columns(log("t;x\n0;1.5\n\n1;2.5\n"))
-    assert source.columns["x"].values.tolist() == [1.5, 2.5] and told(source, "note") == ["line 3 skipped: blank"]
+    assert source.columns["x"].values.tolist() == [1.5, 2.5] and told(source, "note") == [BlankLines((3,))]
 
 
 def test_a_time_in_one_column_has_no_stamp_in_a_blank_line(log):

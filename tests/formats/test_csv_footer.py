@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.tables import FooterSkipped, HeaderLines, NulBytesAtEnd
 from cdtool.formats.csv import Csv
 from cdtool.ingest.reading import read_recording
 
@@ -32,8 +34,8 @@ def written(lines: list[str], end: str = "\n", last: bool = True, encoding: str 
     return (end.join(["t,a", *lines]) + (end if last else "")).encode(encoding)
 
 
-def told(source) -> list[str]:
-    return [str(found) for found in source.findings if "footer" in str(found)]
+def told(source) -> list[FooterSkipped]:
+    return [found.fact for found in source.findings if isinstance(found.fact, FooterSkipped)]
 
 
 def check(source, count: int) -> None:
@@ -47,9 +49,9 @@ def check(source, count: int) -> None:
 def test_words_with_figures_below_the_rows_are_no_samples(log, footer, last, encoding):
     source = Csv().columns(log(written(rows(9) + footer, last=last, encoding=encoding)))
     check(source, 9)
-    (text,) = told(source)
+    (fact,) = told(source)
     first = next(line for line in footer if line.strip("-"))
-    assert text.endswith(f"skipped: a footer ({first!r}), no sample")
+    assert fact.text == first
     assert not [found for found in source.findings if found.severity == "loss"]
 
 
@@ -57,22 +59,22 @@ def test_words_with_figures_below_the_rows_are_no_samples(log, footer, last, enc
 @pytest.mark.parametrize(
     ("count", "footer", "lines"),
     [
-        (3, ["Sum,7"], "line 5"),
-        (3, ["", "Sum,7", "Mean,2"], "lines 6 to 7"),
-        (50_000, ["Sum,7", "", "Mean,2"], "2 lines (50002, 50004)"),
+        (3, ["Sum,7"], (5,)),
+        (3, ["", "Sum,7", "Mean,2"], (6, 7)),
+        (50_000, ["Sum,7", "", "Mean,2"], (50002, 50004)),
     ],
     ids=["short", "two lines", "longer than the sample"],
 )
 def test_a_footer_is_told_with_its_lines(log, end, count, footer, lines):
     source = Csv().columns(log(written(rows(count) + footer, end)))
     check(source, count)
-    assert told(source) == [f"{lines} skipped: a footer ('Sum,7'), no sample"]
+    assert told(source) == [FooterSkipped(lines, "Sum,7")]
 
 
 def test_a_footer_in_a_wide_encoding_behind_the_sample_is_found(log):
     source = Csv().columns(log(written([*rows(50_000), "Sum,7"], encoding="utf-16")))
     check(source, 50_000)
-    assert told(source) == ["line 50002 skipped: a footer ('Sum,7'), no sample"]
+    assert told(source) == [FooterSkipped((50002,), "Sum,7")]
 
 
 @pytest.mark.parametrize("clock", ['column = "t", unit = "ms"', 'column = "t", unit = "s"'])
@@ -86,20 +88,20 @@ def test_a_footer_is_left_out_with_a_machine_file_too(log, machine, clock):
     found = read_recording(log(lines + "Sum,190,210\n"), machine(channels))
     for channel in plain.channels:
         np.testing.assert_array_equal(found[channel].values, plain[channel].values)
-    assert "line 22 skipped: a footer ('Sum,190,210'), no sample" in map(str, found.findings)
+    assert told(found) == [FooterSkipped((22,), "Sum,190,210")]
 
 
 def test_a_footer_below_dates_does_not_hide_that_they_are_dates(log):
     lines = [f"2025-01-01 00:00:{i:02d},{i}" for i in range(30)]
     source = Csv().columns(log(written([*lines, "Sum,435"])))
     np.testing.assert_array_equal(source.columns["t"].values, np.arange(30.0))
-    assert told(source) == ["line 32 skipped: a footer ('Sum,435'), no sample"]
+    assert told(source) == [FooterSkipped((32,), "Sum,435")]
 
 
 def test_a_footer_without_a_header_and_with_a_separator_behind_each_row(log):
     source = Csv().columns(log("".join(f"{i};{i},5;\n" for i in range(12)) + "Summe;72,0;\n"))
     np.testing.assert_array_equal(source.columns["1"].values, np.arange(12) + 0.5)
-    assert told(source) == ["line 13 skipped: a footer ('Summe;72,0;'), no sample"]
+    assert told(source) == [FooterSkipped((13,), "Summe;72,0;")]
 
 
 @pytest.mark.parametrize(
@@ -128,13 +130,13 @@ def test_words_that_are_no_footer_are_still_an_error_with_a_machine_file(log, ma
 def test_a_row_that_a_loss_of_power_ends_is_no_footer(log):
     source = Csv().columns(log(written([*rows(9), "Sum,7"]) + bytes(300)))
     assert told(source) == []
-    assert any("NUL" in str(found) for found in source.findings)
+    assert any(found.fact == NulBytesAtEnd(300) for found in source.findings)
 
 
 def test_the_header_at_the_end_is_the_header_again(log):
     source = Csv().columns(log(written([*rows(9), "t,a"])))
     check(source, 9)
-    assert [str(found) for found in source.findings] == ["line 11 skipped: the header again"]
+    assert source.findings == (Finding(HeaderLines((11,)), severity="note"),)
 
 
 def test_a_column_of_words_in_front_has_no_footer(log):

@@ -7,6 +7,7 @@ import pytest
 
 import cdtool
 from cdtool.errors import RecordingError
+from cdtool.findings.tables import NotNumeric, WordsAboveRows
 from cdtool.ingest.reading import choose_format, read_recording, survey
 
 HEAD = """LabVIEW Measurement\t
@@ -54,14 +55,14 @@ def test_a_measurement_file_is_read_by_its_suffix_with_names_units_and_times(log
     assert source.columns["X_Value"].values.tolist() == [i / 1000 for i in range(40)]
     assert source.columns["Force"].values.tolist() == [1.5 * i for i in range(40)]
     assert np.array_equal(source.columns["Torque"].values, [-0.5 * i for i in range(40)])
-    assert "above the rows skipped" in str(source.findings[0])
+    assert isinstance(source.findings[0].fact, WordsAboveRows)
 
 
 def test_a_comment_behind_a_row_is_named_and_left_out(log):
     rows = [f"{row}\t{'gate closed' if i == 3 else ''}\n" for i, row in enumerate(ROWS.splitlines())]
     source = survey(log(MEASUREMENT.replace(ROWS, "".join(rows))))
     assert list(source.columns) == ["X_Value", "Force", "Torque"]
-    assert "column 'Comment' is not numeric (line 27 holds 'gate closed'): left out" in map(str, source.findings)
+    assert NotNumeric("Comment", 27, "gate closed") in [found.fact for found in source.findings]
 
 
 def test_a_second_heading_is_refused_with_its_line_rather_than_read_on(log):

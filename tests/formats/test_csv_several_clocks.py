@@ -8,6 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import joined
 from cdtool.ingest.reading import read_recording
@@ -43,8 +45,8 @@ def table(header: str, first, second, mark: str = ",") -> str:
 CELL, DRIVE = np.arange(50) / 2000.0, np.arange(40) / 1000.0
 
 
-def said(source) -> list[str]:
-    return [str(found) for found in source.findings if "another clock" in found.message]
+def said(source) -> list[Finding]:
+    return [found for found in source.findings if isinstance(found.fact, OtherClock)]
 
 
 @pytest.mark.parametrize("header", HEADERS)
@@ -55,7 +57,7 @@ def test_each_channel_gets_the_clock_before_it(log, machine, header):
     for channel in ("torque", "speed"):
         assert recording[channel].time.tolist() == DRIVE.tolist()
     assert not [found for found in recording.findings if found.severity != "note"]
-    assert "each channel is on the clock beside it: " in " ".join(map(str, recording.findings))
+    assert [type(found.fact) for found in recording.findings if found.channel == "time"] == [OwnClocks]
 
 
 def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, machine):
@@ -94,7 +96,8 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     assert len(read_recording(path, machine(only))[kept]) == 4000
     for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
         (told,) = said(source)
-        assert told.startswith("time2: another clock than 'time1' (") and "next to torque, speed" in told
+        assert told.channel == "time2" and isinstance(told.fact, OtherClock)
+        assert (told.fact.first, told.fact.columns) == ("time1", ("torque", "speed"))
 
 
 @pytest.mark.parametrize(
@@ -147,9 +150,8 @@ def test_values_without_a_time_are_a_loss(log, machine):
     rows = "".join(f"{i / 2000},{i},{'' if i == 7 else i / 1000},{10 * i},{100 * i}\n" for i in range(50))
     recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
-    lost = [str(found) for found in recording.findings if found.severity == "loss"]
-    text = "1 value in rows in which its clock is empty: left out"
-    assert lost == [f"torque: {text}", f"speed: {text}"]
+    lost = [found for found in recording.findings if found.severity == "loss"]
+    assert lost == [Finding(ValuesWithoutTime(1), channel, "loss") for channel in ("torque", "speed")]
 
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

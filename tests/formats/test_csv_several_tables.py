@@ -7,6 +7,7 @@ import pytest
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
+from cdtool.findings.tables import NumbersAboveRows
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
@@ -94,10 +95,8 @@ def test_rows_below_with_another_separator_are_no_footer_of_words(tmp_path):
 
 def test_a_single_line_of_numbers_above_the_names_is_a_loss_and_no_note(tmp_path):
     source = Csv().columns(log(tmp_path, "12,500\nt,a,b\n" + rows(20, 3)))
-    lost = [finding.message for finding in source.findings if finding.severity == "loss"]
-    assert lost == [
-        "line 1 above the rows skipped though it holds numbers; skip_lines in [csv] says that they are no rows"
-    ]
+    lost = [finding.fact for finding in source.findings if finding.severity == "loss"]
+    assert lost == [NumbersAboveRows((1,))]
 
 
 def test_lines_that_csv_says_to_skip_are_no_loss(tmp_path):
@@ -109,9 +108,8 @@ def test_lines_that_csv_says_to_skip_are_no_loss(tmp_path):
 def test_above_a_pinned_header_rows_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(header=402))
-    assert [item.message[:27] for item in dialect.findings if item.severity == "loss"] == [
-        "lines 2 to 401 above the ro"
-    ]
+    lost = [item.fact for item in dialect.findings if item.severity == "loss"]
+    assert lost == [NumbersAboveRows(tuple(range(2, 402)))]
 
 
 @pytest.mark.parametrize("tail", ["# end", "# x", "# end of the log, 12", "#"])

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import cdtool
+from cdtool.findings.clocks import AssumedClock
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.hdf5 import Packing, times_since
 from cdtool.ingest.reading import read_recording, survey
@@ -182,7 +183,7 @@ def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     info = cdtool.info(path)
     rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
     assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [found for found in info.findings if "taken to be the clock" in found.message]
+    assert not [found for found in info.findings if isinstance(found.fact, AssumedClock)]
 
 
 def test_clocks_of_groups_without_a_unit_are_warned_of(saved):

@@ -5,6 +5,7 @@ import pytest
 from scipy.io import savemat
 
 from cdtool.errors import RecordingError
+from cdtool.findings.containers import RowsAsColumns
 from cdtool.formats.mat import Mat
 from cdtool.ingest.reading import read_recording, survey
 from tests.data_folder import data, needs_data
@@ -35,7 +36,7 @@ def test_a_matrix_is_a_column_for_each_of_its_own(saved):
 def test_a_lying_matrix_is_turned_with_a_note(saved):
     source = Mat().columns(saved({"q": np.arange(12.0).reshape(3, 4)}))
     assert source.columns["q[0]"].values.tolist() == [0, 1, 2, 3]
-    assert "rows are taken as columns" in str(source.findings[0])
+    assert isinstance(source.findings[0].fact, RowsAsColumns)
 
 
 def test_scalars_are_details_and_integers_become_float64(saved):

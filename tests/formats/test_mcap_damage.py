@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
+from cdtool.findings.containers import DamagedAt, Unverified
+from cdtool.findings.messages import UndecodableMessages
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
 from tests.command import cdtool
@@ -18,8 +20,10 @@ def test_one_broken_message_is_left_out_and_counted(by_hand):
     path = by_hand([(0, 0, {"x": 1}), (1, 1, b"{"), (2, 2, b""), (3, 3, b"\xff\xfe"), (4, 4, b"[1]"), (5, 5, {"x": 2})])
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "x")))):
         assert source.columns["/a x"].values.tolist() == [1, 2]
-        assert "/a: 4 of 6 messages cannot be decoded: JSONDecodeError" in str(source.findings[0])
-        assert source.findings[0].severity == "loss"
+        finding = source.findings[0]
+        assert (finding.channel, finding.severity) == ("/a", "loss")
+        assert (finding.fact.count, finding.fact.messages) == (4, 6)
+        assert finding.fact.reason.startswith("JSONDecodeError")
 
 
 @pytest.mark.parametrize(
@@ -42,7 +46,8 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
     source = Mcap().columns(path)
     assert not source.columns
-    assert "1 of 1 message cannot be decoded" in str(source.findings[0])
+    fact = source.findings[0].fact
+    assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (1, 1)
     assert source.findings[0].severity == "loss" and cdtool("info", path).status == 3
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
@@ -64,8 +69,8 @@ def test_a_cut_file_gives_what_lies_whole_before_the_cut(written, compression):
             continue
         values = source.columns["/force data"].values
         assert np.array_equal(values, np.arange(len(values)))
-        assert f"only what lies before it was read ({len(values)} messages)" in str(source.findings[0])
-        assert "damaged at byte" in str(source.findings[0])
+        fact = source.findings[0].fact
+        assert isinstance(fact, DamagedAt) and fact.read_before == len(values)
 
 
 def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
@@ -75,8 +80,8 @@ def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
     path.write_bytes(whole[:cut])
     source = Mcap().columns(path)
     assert source.columns["/a x"].values.tolist() == list(range(30))
-    assert "was read (30 messages)" in str(source.findings[0])
-    assert "without a checksum" in str(source.findings[1])
+    damage, unverified = (finding.fact for finding in source.findings)
+    assert damage.read_before == 30 and isinstance(unverified, Unverified)
 
 
 def test_no_flipped_byte_ever_gives_a_wrong_value(written):

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings.clocks import WrittenTimes
 from cdtool.formats import slices
 from cdtool.formats.csv import text
 from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
@@ -33,7 +34,10 @@ def pieces_of(path: Path) -> list[Piece]:
 def same(one: Source, other: Source) -> bool:
     """All that a source tells, the numbers to the bit."""
     columns = [(one.columns[name], other.columns[name]) for name in one.columns]
-    told = [[s.findings, dict(s.details), s.names, s.origin, s.first_row, list(s.columns)] for s in (one, other)]
+    told = [
+        [s.findings, dict(s.details), dict(s.topics), s.names, s.origin, s.first_row, list(s.columns)]
+        for s in (one, other)
+    ]
     return told[0] == told[1] and all(
         a.values.tobytes() == b.values.tobytes()
         and (a.time is None) == (b.time is None)
@@ -82,7 +86,7 @@ def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
     path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
     source = joined(read_pieces(choose_format(path), path), sort=False)
     assert np.array_equal(source.columns["clock"].values, seconds)
-    assert any("passes midnight 3 times" in finding.message for finding in source.findings)
+    assert any(isinstance(item.fact, WrittenTimes) and item.fact.wrapped == 3 for item in source.findings)
 
 
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])

@@ -7,6 +7,8 @@ import pytest
 
 from cdtool.channels import ChannelSource
 from cdtool.columns import Column
+from cdtool.findings.channels import UnitContradicted
+from cdtool.findings.clocks import ClockUnitContradicted
 from cdtool.ingest.header_units import channel_unit_findings
 from cdtool.ingest.reading import read_recording
 
@@ -21,7 +23,8 @@ ROTARY = LOAD.format(kind="rotary_axis", inertia="load_inertia = 1.0")
 
 
 def told(recording, channel):
-    return [item for item in recording.findings if item.channel == channel and "the header says" in item.message]
+    kinds = UnitContradicted, ClockUnitContradicted
+    return [item for item in recording.findings if item.channel == channel and isinstance(item.fact, kinds)]
 
 
 def found(log, machine, machine_table, channel, header, stated):
@@ -97,7 +100,7 @@ def test_a_unit_of_1_is_none_unless_the_machine_file_takes_the_value_for_a_share
     torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
     assert channel_unit_findings(torque, [plain]) == []
     duty = ChannelSource("torque", ("x",), factor=(0.01,), unit="1", stated="%")
-    assert "a factor of 100" in channel_unit_findings(duty, [plain])[0].message
+    assert channel_unit_findings(duty, [plain])[0].fact.ratio == pytest.approx(100.0)
 
 
 def test_a_channel_of_joints_of_both_kinds_is_in_the_si_unit_of_each():
@@ -105,14 +108,16 @@ def test_a_channel_of_joints_of_both_kinds_is_in_the_si_unit_of_each():
     columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]
     assert channel_unit_findings(both, columns) == []
     columns[0] = Column("a", np.empty(0), unit="deg")
-    assert "the header says 'a [deg]', the machine file SI" in channel_unit_findings(both, columns)[0].message
+    fact = channel_unit_findings(both, columns)[0].fact
+    assert (fact.header, fact.stated) == ("a [deg]", "SI")
 
 
 def test_a_row_of_units_is_held_against_the_machine_file_too(log, machine):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "pos", unit = "m" }\n'
     rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
     recording = read_recording(log(f"t;pos\ns;mm\n{rows}"), machine(channels, LINEAR))
-    assert "the header says 'pos [mm]', the machine file m" in told(recording, "position")[0].message
+    fact = told(recording, "position")[0].fact
+    assert (fact.header, fact.stated) == ("pos [mm]", "m")
 
 
 def test_joints_that_are_wrong_alike_are_one_warning_and_others_are_none(log, machine):
@@ -126,8 +131,8 @@ speed = { columns = ["c", "d"], unit = "rad/s" }
     recording = read_recording(
         log(f"t [s];a [deg];b [deg];c [rad/s];d [rpm]\n{rows}"), machine(channels, ROTARY + 'joints = ["a", "b"]\n')
     )
-    assert ["'a [deg]' and 1 more so" in item.message for item in told(recording, "position")] == [True]
-    assert ["'d [rpm]'" in item.message for item in told(recording, "speed")] == [True]
+    assert [(item.fact.header, item.fact.more) for item in told(recording, "position")] == [("a [deg]", 1)]
+    assert [(item.fact.header, item.fact.more) for item in told(recording, "speed")] == [("d [rpm]", 0)]
 
 
 @pytest.mark.parametrize(
@@ -158,4 +163,5 @@ def test_each_column_on_a_clock_of_its_own_has_its_unit_compared(tmp_path, machi
             file[f"drive/{name}"].attrs["unit"] = unit
     channels = '[channels]\ntime = { column = "time", unit = "s" }\nposition = { column = "drive/pos", unit = "m" }\n'
     recording = read_recording(path, machine(channels, LINEAR))
-    assert "the header says 'drive/pos [mm]', the machine file m" in told(recording, "position")[0].message
+    fact = told(recording, "position")[0].fact
+    assert (fact.header, fact.stated) == ("drive/pos [mm]", "m")

@@ -7,6 +7,8 @@ import pytest
 
 from cdtool.clock import clean_time
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import BackwardStamps, ClockRestart, ClocksApart
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import read_recording
 from tests.ingest.test_channel_assembly import gate_columns, table, told
@@ -16,15 +18,15 @@ def test_what_is_dropped_behind_a_clocks_restart_is_a_loss(log, machine):
     columns = gate_columns()
     columns["t"][40:] = 10.0 * np.arange(10)
     found = [item for item in read_recording(log(table(columns)), machine()).findings if item.severity == "loss"]
-    assert [item.channel for item in found] == ["time"]
-    assert "10 time stamps run backward (line 42, 43, 44, ...), dropped (20 % of the rows)" in found[0].message
-    assert "the clock starts again there" in found[0].message
+    restart = BackwardStamps(10, 50, (42, 43, 44), "line", ClockRestart())
+    assert found == [Finding(restart, "time", "loss")]
 
 
 def test_a_counters_wrap_is_told_in_what_the_file_counts(log, machine):
     columns = gate_columns()
     columns["t"] = np.mod(65536.0 - 300.0 + 10.0 * np.arange(50), 65536.0)
-    assert "the counter of 16 bits wraps there" in told(read_recording(log(table(columns)), machine()))
+    facts = [fact for _, fact in told(read_recording(log(table(columns)), machine()))]
+    assert [fact.restart for fact in facts if isinstance(fact, BackwardStamps)] == [ClockRestart(wrapped_bits=16)]
 
 
 def test_a_clock_that_stands_still_is_a_clear_error(log, machine):
@@ -53,16 +55,19 @@ torque = { topic = "/gripper", field = "effort[0]" }
 """
 
 
-@pytest.mark.parametrize(("starts", "distance"), [((0.0, 100.0), "99.61"), ((7e8, 0.0), "7e+08"), ((0.0, 0.3), "")])
+@pytest.mark.parametrize(("starts", "distance"), [((0.0, 100.0), 99.61), ((7e8, 0.0), 7e8), ((0.0, 0.3), 0.0)])
 def test_channels_whose_clocks_have_no_time_in_common_are_told_with_their_distance(tmp_path, machine, starts, distance):
     path = tmp_path / "run.mcap"
     two_topics(path, starts)
-    findings = [item for item in read_recording(path, machine(OWN_CLOCKS)).findings if "in common" in item.message]
+    findings = [
+        item for item in read_recording(path, machine(OWN_CLOCKS)).findings if isinstance(item.fact, ClocksApart)
+    ]
     later, before = ("torque", "speed") if starts[0] < starts[1] else ("speed", "torque")
     assert [item.channel for item in findings] == [later] * bool(distance)
-    assert all(f"begins {distance} s after {before} ends" in item.message for item in findings)
+    assert all(item.fact == ClocksApart(pytest.approx(distance, rel=1e-6), before) for item in findings)
 
 
 def test_a_clock_that_runs_backward_throughout_is_counted_in_plain_figures():
     (found,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
-    assert "4999 time stamps run backward" in found.message and "dropped (100 % of the rows)" in found.message
+    assert isinstance(found.fact, BackwardStamps) and (found.fact.count, found.fact.rows) == (4999, 5000)
+    assert "dropped (100 % of the rows)" in found.message

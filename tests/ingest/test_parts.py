@@ -11,7 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Fact, Finding
+from cdtool.findings.messages import ArrayLengthsDiffer
+from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap
 from cdtool.formats.mcap.write import Stream, write_mcap
+from cdtool.formats.source import TopicDetails
 from cdtool.ingest.parts import lost_parts
 from cdtool.ingest.reading import log_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
@@ -50,8 +54,8 @@ def machine(folder: Path):
     return read_machine_file(folder / "machine.toml")
 
 
-def losses(findings) -> list[str]:
-    return [str(finding) for finding in findings if finding.severity == "loss"]
+def losses(findings) -> list[Fact]:
+    return [finding.fact for finding in findings if finding.severity == "loss"]
 
 
 @settings(max_examples=15, deadline=None)
@@ -72,8 +76,8 @@ def test_a_log_cut_anywhere_is_surveyed_as_the_whole_one(tmp_path_factory, cuts,
     np.testing.assert_array_equal(column.values, expected.values)
     # A part's origin is an epoch in float64, of which the last digit is 0.24 us.
     np.testing.assert_allclose(column.time, expected.time, rtol=0.0, atol=5e-7)
-    assert parts.details["/speed"] == whole.details["/speed"]
-    assert {item.message.partition(": ")[2] for item in parts.findings} <= {"holds no message"}
+    assert parts.topics["/speed"] == whole.topics["/speed"]
+    assert {item.kind for item in parts.findings} <= {"no_message"}
 
 
 def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
@@ -81,7 +85,7 @@ def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
     time = source.columns["/speed data"].time
     assert np.all(np.diff(time) > 0.0) and len(time) == 1100
     assert source.details["parts"] == "11, bag_0.mcap to bag_10.mcap"
-    assert source.details["/speed"].endswith(", 1100 messages")
+    assert source.topics["/speed"].messages == 1100
 
 
 def test_a_topic_that_only_some_parts_hold_is_surveyed_from_these(tmp_path):
@@ -103,9 +107,7 @@ def test_a_part_that_begins_before_the_last_one_ends_is_put_in_order_and_told(tm
     column = source.columns["/speed data"]
     assert np.all(np.diff(column.time) > 0.0)
     np.testing.assert_allclose(column.values, column.time, rtol=0.0, atol=5e-7)
-    assert [str(item) for item in source.findings] == [
-        "bag_1.mcap begins before the part before it ends (/speed data): put in the order of the times"
-    ]
+    assert source.findings == (Finding(PartsOverlap("bag_1.mcap", "/speed data")),)
 
 
 def test_an_array_whose_length_changes_from_part_to_part_is_left_out_and_told(tmp_path):
@@ -118,15 +120,15 @@ def test_an_array_whose_length_changes_from_part_to_part_is_left_out_and_told(tm
         write_mcap(folder / f"bag_{number}.mcap", [stream], start_ns=START * 10**9)
     source = survey(folder)
     assert "/joints position[:]" not in source.columns
-    assert "/joints position[:]: arrays of 2 and 3 elements: left out" in map(str, source.findings)
+    assert Finding(ArrayLengthsDiffer((2, 3)), "/joints position[:]", "note") in source.findings
 
 
 def test_what_is_odd_about_a_part_is_told_with_its_name(tmp_path):
     folder = bag(tmp_path / "bag")
     whole = (folder / "bag_2.mcap").read_bytes()
     (folder / "bag_2.mcap").write_bytes(whole[:-40])
-    told = losses(survey(folder).findings)
-    assert told and all("bag_2.mcap: " in text for text in told)
+    told = [item for item in survey(folder).findings if item.severity == "loss"]
+    assert told and all(item.file == "bag_2.mcap" and "bag_2.mcap: " in str(item) for item in told)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +144,7 @@ def test_what_is_odd_about_a_part_is_told_with_its_name(tmp_path):
 def test_a_part_that_metadata_names_and_that_is_not_there_is_a_loss(tmp_path, listed):
     folder = bag(tmp_path / "bag")
     metadata(folder, listed)
-    lost = ["part bag_3.mcap of metadata.yaml is not in the folder"]
+    lost = [PartMissing("bag_3.mcap", "metadata.yaml")]
     assert losses(survey(folder).findings) == lost
     assert losses(read_recording(folder, machine(tmp_path)).findings) == lost
 
@@ -150,7 +152,7 @@ def test_a_part_that_metadata_names_and_that_is_not_there_is_a_loss(tmp_path, li
 def test_the_last_of_two_parts_that_is_gone_is_a_loss_too(tmp_path):
     folder = bag(tmp_path / "bag", count=1)
     metadata(folder, "  relative_file_paths:\n    - bag_0.mcap\n    - bag_1.mcap\n")
-    assert losses(survey(folder).findings) == ["part bag_1.mcap of metadata.yaml is not in the folder"]
+    assert losses(survey(folder).findings) == [PartMissing("bag_1.mcap", "metadata.yaml")]
 
 
 def test_a_part_that_is_compressed_as_a_file_is_told_unless_it_is_there_decompressed_too(tmp_path):
@@ -158,18 +160,14 @@ def test_a_part_that_is_compressed_as_a_file_is_told_unless_it_is_there_decompre
     metadata(folder, "".join(["  relative_file_paths:\n", *(f"  - bag_{i}.mcap.zstd\n" for i in range(3))]))
     assert losses(survey(folder).findings) == []
     (folder / "bag_1.mcap").rename(folder / "bag_1.mcap.zstd")
-    assert losses(survey(folder).findings) == [
-        "part bag_1.mcap.zstd of metadata.yaml is compressed as a whole: decompress it, e.g. with zstd -d"
-    ]
+    assert losses(survey(folder).findings) == [PartCompressed("bag_1.mcap.zstd", "metadata.yaml")]
 
 
 def test_a_part_of_another_kind_than_those_that_are_read_is_a_loss(tmp_path):
     folder = bag(tmp_path / "bag", count=1)
     (folder / "bag_1.db3").write_bytes(b"SQLite format 3\0")
     metadata(folder, "  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.db3\n")
-    assert losses(survey(folder).findings) == [
-        "part bag_1.db3 of metadata.yaml is left out: the folder holds parts of another kind too"
-    ]
+    assert losses(survey(folder).findings) == [PartOfOtherKind("bag_1.db3", "metadata.yaml")]
 
 
 def test_a_folder_none_of_whose_parts_is_there_is_refused_with_the_first_of_them(tmp_path):
@@ -209,9 +207,9 @@ def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
         (tmp_path / f"bag_{part}" / f"bag_{part}.db3").rename(folder / f"bag_{part}.db3")
     metadata(folder, "  relative_file_paths:\n  - bag_0.db3\n  - bag_1.db3\n  - bag_2.db3\n")
     source = survey(folder)
-    assert source.details["/speed"] == "std_msgs/msg/Float64, 100 messages"
+    assert source.topics["/speed"] == TopicDetails("std_msgs/msg/Float64", 100)
     np.testing.assert_array_equal(source.columns["/speed data"].values, np.arange(100.0))
-    assert losses(source.findings) == ["part bag_2.db3 of metadata.yaml is not in the folder"]
+    assert losses(source.findings) == [PartMissing("bag_2.db3", "metadata.yaml")]
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.01, 5.0])
@@ -222,9 +220,9 @@ def test_a_pause_between_two_parts_is_told(tmp_path, pause):
         time = number + np.arange(100) / 100 + pause * (number == 2)
         write_part(folder / f"bag_{number}.mcap", time, time)
     findings = read_recording(folder, machine(tmp_path)).findings
-    told = [str(finding) for finding in findings if "nothing is logged between" in str(finding)]
+    told = [finding for finding in findings if isinstance(finding.fact, PartGap)]
     if pause < 5.0:
         assert not told
     else:
         (only,) = told
-        assert "bag_2.mcap: begins 5.01 s after the part before it ends: nothing" in only
+        assert only == Finding(PartGap(pytest.approx(5.01)), file="bag_2.mcap")

@@ -13,6 +13,7 @@ from cdtool.evaluation.results import (
     ForceStepResult,
     LimitResult,
     PointResult,
+    RecordingFinding,
     RecordingResult,
     Results,
     Skipped,
@@ -54,7 +55,7 @@ def named(results: Results, name: str) -> Evaluated:
         calibration=(CalibrationResult(name, name, 1.0, 1, 1.0, 1),),
         limits=(limit,) * 9,
         skipped=(Skipped(name, name),),
-        findings=(Skipped(name, name),),
+        findings=tuple(RecordingFinding(name, name, severity, name, name) for severity in ("loss", "warning")),
         provenance={
             "onset": name,
             "machine": name,

@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.limits import LimitRule, not_met
-from cdtool.evaluation.results import LimitResult, Results, Skipped
+from cdtool.evaluation.results import LimitResult, RecordingFinding, Results, Skipped
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from tests.report.bench import contact, contacts_of
@@ -145,6 +145,14 @@ def test_nothing_scored_is_one_error_and_never_an_empty_file():
     assert (left_out.get("tests"), left_out.get("errors")) == ("2", "2")
 
 
+def test_what_is_lost_of_a_recording_is_an_error_and_a_warning_is_none(results):
+    findings = (RecordingFinding("a.csv", "its end is cut off", "loss"), RecordingFinding("b.csv", "a gap"))
+    root = read(evaluate(replace(results, findings=findings)))
+    error = case(root, "damaged", "a.csv").find("error")
+    assert error is not None and error.get("message") == "damaged, used as far as it goes: its end is cut off"
+    assert not [item for item in root.iter("testcase") if item.get("name") == "b.csv"]
+
+
 def test_several_contacts_of_a_recording_are_one_case(results):
     second = replace(contact("momentum", "stiff", None, "not_assessable", "stiff/01.csv"), contact=2, reason="a gap")
     contacts = (*contacts_of("momentum", "stiff", [30.0]), second)
@@ -161,7 +169,7 @@ def test_hostile_names_are_text_in_a_file_that_parses(results, kind):
     name = HOSTILE[kind]
     root = read(named(results, name))
     suites = {suite.get("name") for suite in root}
-    assert {"limits", "force", "left out"} < suites and len(suites) == 4
+    assert {"limits", "force", "left out", "damaged"} < suites and len(suites) == 5
     assert not any(
         re.search("[\x00-\x1f\u202e\u2067]", value) for item in root.iter() for value in item.attrib.values()
     )

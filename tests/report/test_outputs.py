@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.results import ForceResult, ForceStepResult
+from cdtool.evaluation.results import SCHEMA_VERSION, ForceResult, ForceStepResult
 from cdtool.evaluation.traces.file import encode_traces, read_traces
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
@@ -55,7 +55,7 @@ def test_each_suffix_gets_its_content(done, tmp_path):
     names = ("a.json", "a.md", "a.csv", "a.xml", "a.html", "a.png", "a.SVG", "a.pdf")
     targets = [tmp_path / name for name in names]
     assert write_outputs(done, targets) == targets
-    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == 3
+    assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == SCHEMA_VERSION
     assert encode_traces(read_traces(tmp_path / "a.traces.json.gz")) == encode_traces(done.traces)
     assert targets[1].read_text(encoding="utf-8") == to_markdown(Report(done.evaluated))
     assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.evaluated.results)

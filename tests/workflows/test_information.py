@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.findings import Finding
+from cdtool.findings.channels import MissingValues
+from cdtool.findings.clocks import AssumedClock, BackwardStamps, Gap, SampleGaps
+from cdtool.findings.motion import AccelerometerFit, JointsSwapped
 from cdtool.recording import Recording, Series
 from cdtool.workflows.log_checks.log_findings import accelerometer_findings
 from tests.data_folder import data, needs_data
@@ -28,7 +32,8 @@ def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_shown(tmp_path,
     info = cdtool.info(write(tmp_path / "a.csv", header, [time * factor, np.sin(time)]))
     assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 2)
     assert info.channels[1].duration_s == pytest.approx(1.999)
-    assert any(f"taken to be the clock, in {unit}" in item.message for item in info.findings)
+    (clock,) = [item for item in info.findings if isinstance(item.fact, AssumedClock)]
+    assert clock.fact.unit == unit and clock.channel == header.partition(",")[0]
 
 
 def test_gaps_backward_time_and_missing_values_are_reported_together(tmp_path):
@@ -38,9 +43,10 @@ def test_gaps_backward_time_and_missing_values_are_reported_together(tmp_path):
     values = np.sin(time)
     values[[7, 8]] = np.nan
     info = cdtool.info(write(tmp_path / "a.csv", "t,v", [time, values]))
-    told = " ".join(map(str, info.findings))
-    for words in ("1 time stamp runs backward (line 502)", "gap after 0.999 s (401 ms)", "v: 2 of 2000 values"):
-        assert words in told
+    told = [(item.channel, item.fact) for item in info.findings]
+    gaps = SampleGaps(1, (Gap(pytest.approx(0.999), pytest.approx(0.401)),))
+    assert ("time", BackwardStamps(1, 2000, (502,), "line")) in told
+    assert ("t", gaps) in told and ("v", MissingValues(2, 2000)) in told
 
 
 def test_without_a_clock_no_rate_is_shown(tmp_path):
@@ -88,11 +94,11 @@ position = { columns = ["ORDER", "q3"], unit = "rad" }
         machine = tmp_path / "machine.toml"
         machine.write_text(text.replace("ORDER", order.replace(",", '", "')))
         findings = cdtool.info(log, machine=machine).findings
-        told[order] = [str(item) for item in findings if "another order" in item.message]
+        told[order] = [item for item in findings if isinstance(item.fact, JointsSwapped)]
     assert told["q1,q2"] == []
     assert told["q2,q1"] == [
-        "position: that of a follows the speed of b: columns in another order?",
-        "position: that of b follows the speed of a: columns in another order?",
+        Finding(JointsSwapped("a", "b"), "position"),
+        Finding(JointsSwapped("b", "a"), "position"),
     ]
 
 
@@ -106,7 +112,7 @@ def test_the_right_columns_of_a_real_robot_are_not_suspected(tmp_path):
     for order in ("1, 2, 3, 4, 5, 6", "2, 1, 3, 4, 5, 6"):
         machine.write_text(names + columns.replace("POSE", order))
         info = cdtool.info(data("ur10e/no_torque.csv"), machine=machine)
-        told[order] = sum("another order" in item.message for item in info.findings)
+        told[order] = sum(isinstance(item.fact, JointsSwapped) for item in info.findings)
     assert told == {"1, 2, 3, 4, 5, 6": 0, "2, 1, 3, 4, 5, 6": 2}
 
 
@@ -117,7 +123,7 @@ def test_an_hour_of_an_accelerometer_is_checked():
     recording = Recording("hour", "", ("a",), {"speed": speed, "acceleration": acceleration})
     with noted(2.0):  # 18,000 windows of 20 samples: not all samples for each of them
         (found,) = accelerometer_findings(recording, ())
-    assert "fits the speed" in found.message
+    assert type(found.fact) is AccelerometerFit
 
 
 def test_a_torque_without_values_causes_no_traceback(tmp_path):

@@ -31,7 +31,6 @@ from cdtool.evaluation.builds.rows import (
 from cdtool.evaluation.builds.words import SAME_RESULTS, gone_words, overall_words, pairing_words, row_words
 from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
-from cdtool.evaluation.truth.labels import LABEL_FILE
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted, shorten
 
@@ -205,6 +204,7 @@ class Changed:
 
 def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: Sequence[str]) -> None:
     """Raise ConfigurationError if a rule that defines the results of these groups differs."""
+    _refuse_onsets_in_samples(old, new)
     for key, where in _RULES.items():
         before, after = old.get(key), new.get(key)
         if key in _BY_GROUP:
@@ -212,27 +212,22 @@ def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: 
         if key == "label_file":
             # Other recordings have other labels; the same ones with other onsets are refused where they are paired.
             before, after = before is not None, after is not None
-        if key == "onset":
-            before, after = (_without_label_file(rule) for rule in (before, after))
         for name, one, other in _leaves(key, before, after):
-            if key == "onset" and _in_samples(one) != _in_samples(other):
-                which = "old" if _in_samples(one) else "new"
-                raise ConfigurationError(
-                    f"{which} is of an earlier version, whose onsets are counted in samples, not in ms",
-                    f"run the benchmark of {which} again with this version: such results cannot be compared",
-                )
             raise ConfigurationError(
                 f"{name} differs: {_shown(one)} in old, {_shown(other)} in new",
                 f"such results cannot be compared: use the same {where} in the benchmark file and run one again",
             )
 
 
-def _in_samples(rule: Any) -> bool:
-    return isinstance(rule, str) and bool(re.search(r"\bfor \d+ samples?\b", rule))
-
-
-def _without_label_file(rule: Any) -> Any:
-    return rule.partition(LABEL_FILE)[0] if isinstance(rule, str) else rule
+def _refuse_onsets_in_samples(old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    """Raise ConfigurationError if one of the files is of a version that counted onsets in samples."""
+    if old.get("onset_unit") == new.get("onset_unit"):
+        return
+    which = "old" if old.get("onset_unit") else "new"
+    raise ConfigurationError(
+        f"{which} is of an earlier version, whose onsets are counted in samples, not in ms",
+        f"run the benchmark of {which} again with this version: such results cannot be compared",
+    )
 
 
 def _changed_settings(old: Mapping[str, Any], new: Mapping[str, Any], detectors: Sequence[str]) -> list[Changed]:

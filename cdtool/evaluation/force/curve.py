@@ -196,6 +196,7 @@ def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatA
             raise RecordingError(
                 f"{recording.name}: mass_before_cell requires the channel '{channel}'",
                 "map it in [channels], or set mass_before_cell to 0",
+                channel=channel,
             )
     measured = recording["acceleration"]
     if measured.unit != "m/s2":

@@ -8,8 +8,9 @@ import numpy as np
 
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
-from cdtool.plain_text import digits
-from cdtool.recording import Contact, Finding, FloatArray, Recording, Series
+from cdtool.findings import Finding
+from cdtool.findings.truth import FollowsTorque, ForceBeginsLate, ForceLeft, NotTared, RestLevelShifted
+from cdtool.recording import Contact, FloatArray, Recording, Series
 
 # Above this magnitude of the correlation the force follows the torque.
 _FOLLOWS = 0.95
@@ -58,9 +59,7 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     found += [item for item in [_begins_late(recording, contacts, rule)] if item]
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
-        name = f" of {joint}" if len(recording.joints) > 1 else ""
-        text = f"follows the torque{name} without lag (r = {r:.3f}): not an independent truth, if it is made from it"
-        found.append(Finding(text, "force"))
+        found.append(Finding(FollowsTorque(joint if len(recording.joints) > 1 else "", r), "force"))
     return found
 
 
@@ -69,11 +68,7 @@ def _not_tared(contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     first = next((item for item in contacts if item.found_by == "load cell" and not item.in_progress), None)
     if first is None or abs(first.rest) <= max(rule.above or 0.0, _NOT_TARED * first.peak_force):
         return None
-    rest = digits(float(f"{first.rest:.3g}"))
-    text = (
-        f"the cell rests at {rest} N before the contact at {first.start:.3f} s: not tared, or pressed already; forces"
-    )
-    return Finding(f"{text} count from there", "force")
+    return Finding(NotTared(first.rest, first.start), "force")
 
 
 def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
@@ -84,11 +79,7 @@ def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     begins, onset = float(force.time[0]), contacts[0].start
     if begins - recording.start <= longest_step(force.time) or onset - begins > rule.separation:
         return None
-    return Finding(
-        f"begins at {begins:.3f} s, {1e3 * (onset - begins):.0f} ms before the contact at {onset:.3f} s: if that is "
-        "the rebound of an earlier one, its latency is longer",
-        "force",
-    )
+    return Finding(ForceBeginsLate(begins, onset), "force")
 
 
 def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
@@ -105,11 +96,7 @@ def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Fi
         return None  # below the level at which a contact ends: the log was cut off while the axis rebounds
     if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
         return None
-    return Finding(
-        f"{digits(float(f'{left:.2g}'))} N are left at the end of the contact that began at {contact.start:.3f} s: it "
-        "still presses, or the reading at rest has shifted and hides later contacts",
-        "force",
-    )
+    return Finding(ForceLeft(left, contact.start), "force")
 
 
 def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[str, float]:
@@ -171,9 +158,4 @@ def _has_drifted(contact: Contact, rule: OnsetRule) -> bool:
 
 
 def _drifted(contact: Contact) -> Finding:
-    rate = f", {digits(float(f'{contact.drift:.2g}'))} N/s just before it" if contact.drift else ""
-    return Finding(
-        f"the reading at rest shifted by {digits(float(f'{contact.shift:.3g}'))} N before the contact at "
-        f"{contact.start:.3f} s{rate}: the onset counts from where it was then",
-        "force",
-    )
+    return Finding(RestLevelShifted(contact.shift, contact.start, contact.drift), "force")

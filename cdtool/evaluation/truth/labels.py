@@ -16,8 +16,6 @@ from cdtool.recording import Contact
 
 _REQUIRED = ("recording", "start_s", "end_s")
 _OPTIONAL = ("kind", "uncertainty_s")
-# Between the onset rule and the label file's name, where reports state the rule.
-LABEL_FILE = "; label file "
 
 
 @dataclass(frozen=True)

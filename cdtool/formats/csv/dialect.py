@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cdtool.channels import TablePins
+from cdtool.findings import Finding
 from cdtool.formats.csv.cells import SEPARATORS
 from cdtool.formats.csv.marks import Marks, Seen
 from cdtool.formats.csv.stamps import Stamped
 from cdtool.formats.csv.text import Text
-from cdtool.recording import Finding
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,17 @@ from typing import Any
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.tables import (
+    DoubtfulPoint,
+    FooterSkipped,
+    NamedSeparator,
+    NamesFromComment,
+    NumbersAboveRows,
+    OtherEncoding,
+    PinnedLinesSkipped,
+    WordsAboveRows,
+)
 from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
 from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
 from cdtool.formats.csv.dialect import Dialect
@@ -25,12 +36,11 @@ from cdtool.formats.csv.doubtful_marks import (
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
-from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines, shown_lines
+from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.marks import Marks, Seen, find_marks
 from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.stamps import Stamped, find_layout
 from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
-from cdtool.recording import Finding
 
 _SCORED = 150
 # A separator that stands in this share of the lines, as often in each, is one whatever else the cells hold.
@@ -202,8 +212,8 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
         dialect = _dialect(path, *footer.without(text, stream), pins)
         findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
     marks = dialect.marks if dialect.marks.sure else settled_marks(dialect)
-    if marks.note:
-        findings.append(Finding(marks.note, severity="warning"))
+    if marks.doubt:
+        findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
     text = without_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
     return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
 
@@ -315,25 +325,20 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
 def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
     found = []
     if lines.skipped:
-        found.append(Finding(f"{shown_lines(lines.skipped)} skipped, as [csv] says", severity="note"))
+        found.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
     shown = _SHOWN_ENCODINGS.get(text.encoding)
     if shown:
-        found.append(Finding(f"not valid UTF-8, read as {shown}", severity="note"))
+        found.append(Finding(OtherEncoding(shown), severity="note"))
     if lines.separator:
         line = lines.separator
-        found.append(Finding(f"line {line.number} ({line.text.strip()[:12]}) names the separator", severity="note"))
+        found.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
     if head.numbers:
-        lost = f"{shown_lines(head.numbers)} above the rows skipped though {_holds(head.numbers)} numbers"
-        found.append(Finding(f"{lost}; skip_lines in [csv] says that they are no rows", severity="loss"))
+        found.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
     if words := [line for line in head.preamble if line not in head.numbers]:
-        found.append(Finding(f"{shown_lines(words)} above the rows skipped: no names, no numbers", severity="note"))
+        found.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
     if head.from_comment:
-        found.append(Finding(f"the names are those of the comment in line {head.header_line}", severity="note"))
+        found.append(Finding(NamesFromComment(head.header_line), severity="note"))
     return found
-
-
-def _holds(lines: Sequence[int]) -> str:
-    return "it holds" if len(lines) == 1 else "they hold"
 
 
 def _unique(cells: Sequence[str]) -> list[str]:
@@ -352,8 +357,7 @@ class Footer:
 
     def finding(self, first_line: int) -> Finding:
         """What is said of a footer that begins in that line of the file."""
-        lines = shown_lines([first_line + line for line in self.lines])
-        return Finding(f"{lines} skipped: a footer ({self.shown[:40]!r}), no sample")
+        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.shown))
 
     def without(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
         """The text, and the sample of its stream, up to the footer."""

@@ -11,8 +11,8 @@ from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import holds_numbers, kind, split_line
 from cdtool.formats.csv.head_words import are_numbered, are_types, is_unit
-from cdtool.formats.csv.lines import Line, is_ruler, shown_lines
-from cdtool.plain_text import counted
+from cdtool.formats.csv.lines import Line, is_ruler
+from cdtool.plain_text import counted, shown_lines
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1

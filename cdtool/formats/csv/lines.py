@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
-from cdtool.plain_text import counted
 
 COMMENTS = ("#", "%", "//")
 _RULER, _DRAWN = re.compile(r"[-=+|\s:]*"), re.compile(r"[-=]{2}")
@@ -94,16 +92,6 @@ def comment_mark(lines: list[Line], pinned: str | None) -> str:
             if line.is_comment(mark):
                 return mark
     return COMMENTS[0]
-
-
-def shown_lines(numbers: Sequence[int]) -> str:
-    """`line 3`, `lines 1 to 7`, `4 lines (3, 9, 12, ...)`."""
-    if len(numbers) == 1:
-        return f"line {numbers[0]}"
-    if numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"lines {numbers[0]} to {numbers[-1]}"
-    listed = ", ".join(str(number) for number in numbers[:3])
-    return f"{counted(len(numbers), 'line')} ({listed}{', ...' if len(numbers) > 3 else ''})"
 
 
 def _joined(raw: list[bytes], first: int) -> int:

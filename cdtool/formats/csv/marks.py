@@ -31,14 +31,14 @@ class Seen:
 
 @dataclass(frozen=True)
 class Marks:
-    """The decimal mark, the thousands separator ("" for none), and what is to be said of them.
+    """The decimal mark, the thousands separator ("" for none), and the number that might be read otherwise.
 
     Not `sure`: no number showed a decimal mark, and a point is taken for one.
     """
 
     decimal: str
     thousands: str = ""
-    note: str = ""
+    doubt: Seen | None = None
     sure: bool = True
 
 
@@ -113,13 +113,10 @@ def find_marks(
         shown = " and ".join(str(seen) for seen in groups.values())
         raise RecordingError(f"{path}: thousands are parted in two ways: {shown}", "pin thousands in [csv]")
     parted = next(iter(groups), "")
-    note = ""
     alone = evidence.either.get(found)
     certain = bool(decimal or evidence.decimal or groups)
-    if separator != "," and found == "." and alone and not certain:
-        whole = alone.text.replace(".", "")
-        note = f"{alone} is read as {alone.text}, not as {whole}: pin decimal and thousands in [csv] if that is wrong"
-    return Marks(found, parted, note, certain)
+    is_doubtful = separator != "," and found == "." and not certain
+    return Marks(found, parted, alone if is_doubtful else None, certain)
 
 
 def _decimal(path: Path, evidence: _Evidence) -> str:

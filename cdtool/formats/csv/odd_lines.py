@@ -7,17 +7,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.tables import (
+    BlankLines,
+    BlankRows,
+    BlankSamples,
+    CellAdvice,
+    CommentLines,
+    DrawnLines,
+    HeaderLines,
+    NotNumeric,
+    NulLines,
+    SkippedLines,
+    UnreadCells,
+    WordsBelowRows,
+)
 from cdtool.formats.csv.cells import STAMP_LIKE, holds_numbers, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect, quoted
-from cdtool.formats.csv.lines import begins_comment, is_ruler, shown_lines
+from cdtool.formats.csv.lines import begins_comment, is_ruler
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
 from cdtool.plain_text import counted
-from cdtool.recording import Finding
 
 # A survey keeps a column of numbers with so many cells that are none, or with this share of the rows.
 _FEW, _SHARE = 3, 0.05
-_LAYOUT = 'repair it, or pin time_format in [csv], e.g. "%d.%m.%Y %H:%M:%S.%f"'
 
 
 @dataclass(frozen=True)
@@ -50,7 +63,7 @@ class OddLines:
     dropped: dict[int, int] = field(default_factory=dict)
     left_out: dict[int, Finding] = field(default_factory=dict)
     unread: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
-    skipped: dict[str, list[int]] = field(default_factory=dict)
+    skipped: dict[type[SkippedLines], list[int]] = field(default_factory=dict)
     cut_line: int = 0
     ends_skipped: bool = False
     blank: list[int] = field(default_factory=list)
@@ -64,7 +77,7 @@ class OddLines:
             self.ends_skipped = item.unfinished
             return
         if item.unfinished and line > self.dialect.first_line:
-            self._drop(item, line, "")
+            self._drop(item, line)
             self.cut_line = line
         else:
             self._judge(item, line, rows)
@@ -74,32 +87,32 @@ class OddLines:
         found = list(self.left_out.values())
         found += [self._unread(column) for column in self.unread if column not in self.left_out]
         if self.empty:
-            found.append(Finding(f"{shown_lines(self.empty)} blank: taken as missing samples"))
+            found.append(Finding(BlankRows(tuple(self.empty))))
         blank = [line for line in self.blank if line < last_line]
         if blank and self.dialect.width == 1 and 2 * len(blank) < last_line - self.dialect.first_line:
-            found.append(Finding(f"{shown_lines(blank)} skipped: blank, perhaps missing samples", severity="loss"))
+            found.append(Finding(BlankSamples(tuple(blank)), severity="loss"))
         elif blank:
-            found.append(Finding(f"{shown_lines(blank)} skipped: blank", severity="note"))
-        for what, lines in self.skipped.items():
-            severity = "loss" if "NUL" in what else "note"
-            found.append(Finding(f"{shown_lines(lines)} skipped: {what}", severity=severity))  # type: ignore[arg-type]
+            found.append(Finding(BlankLines(tuple(blank)), severity="note"))
+        for kind_of_lines, lines in self.skipped.items():
+            is_loss = kind_of_lines is NulLines
+            found.append(Finding(kind_of_lines(tuple(lines)), severity="loss" if is_loss else "note"))
         return found
 
-    def _drop(self, item: OddLine, line: int, what: str) -> None:
+    def _drop(self, item: OddLine, line: int, as_what: type[SkippedLines] | None = None) -> None:
         self.dropped[item.row] = line
-        if what:
-            self.skipped.setdefault(what, []).append(line)
+        if as_what is not None:
+            self.skipped.setdefault(as_what, []).append(line)
 
     def _is_skipped(self, item: OddLine, line: int) -> bool:
         text = self.dialect.text.decode(item.text).rstrip("\r")
         if self._is_comment(text):
-            self._drop(item, line, "comments")
+            self._drop(item, line, CommentLines)
         elif text.strip() in {told.strip() for told in self.dialect.header_text}:
-            self._drop(item, line, "the header again")
+            self._drop(item, line, HeaderLines)
         elif is_ruler(text):
-            self._drop(item, line, "drawn lines")
+            self._drop(item, line, DrawnLines)
         elif b"\0" in item.text:
-            self._drop(item, line, "damaged, they hold NUL bytes")
+            self._drop(item, line, NulLines)
         else:
             return False
         return True
@@ -135,7 +148,7 @@ class OddLines:
     def _not_a_row(self, item: OddLine, line: int, cells: list[str], text: str) -> None:
         """Words below the rows are a footer, if nothing but words follows; anything else is a row of another width."""
         if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not holds_numbers(text):
-            self._drop(item, line, "words below the rows")
+            self._drop(item, line, WordsBelowRows)
             self.words = self.words or (item.row, line, text)
             return
         if self.words is not None:
@@ -198,13 +211,12 @@ class OddLines:
         so_far = max(self.dialect.sampled, line - self.dialect.first_line)
         if len(unread) > max(_FEW, _SHARE * so_far):
             self.targets[column] = LEFT
-            text = f"{not_numeric(name, *unread[0]).message}; {_hint(self.dialect, unread[0][1])}"
-            self.left_out[column] = Finding(text)
+            self.left_out[column] = Finding(NotNumeric(name, *unread[0], _advice(self.dialect, unread[0][1])))
 
     def _unreadable(self, line: int, column: int, target: int, cell: str) -> RecordingError:
         """A cell of a wanted column that cannot be read."""
         found = self.dialect.stamped.get(column)
-        what, hint = "is not a number", _hint(self.dialect, cell)
+        what, hint = "is not a number", str(_advice(self.dialect, cell))
         if found is not None and target <= STAMP:
             what = f"is no time written as {found.layouts[0].pattern}"
         elif found is not None and STAMP_LIKE.fullmatch(cell):
@@ -216,8 +228,9 @@ class OddLines:
 
     def _unread(self, column: int) -> Finding:
         cells = self.unread[column]
-        text = f"{shown_lines([line for line, _ in cells])}: {cells[0][1][:40]!r} cannot be read, taken as missing"
-        return Finding(f"{text}; {_hint(self.dialect, cells[0][1])}", self.dialect.names[column], "loss")
+        first = cells[0][1]
+        fact = UnreadCells(tuple(line for line, _ in cells), first, _advice(self.dialect, first))
+        return Finding(fact, self.dialect.names[column], "loss")
 
     def _number(self, cell: str) -> float | None:
         if cell in self.dialect.missing:
@@ -230,14 +243,14 @@ class OddLines:
 
 def not_numeric(name: str, line: int, cell: str) -> Finding:
     """A column that is left out of a survey."""
-    text = f"column '{name}' is not numeric (line {line} holds {cell[:40]!r}): left out"
-    return Finding(f"{text}; {_LAYOUT}" if STAMP_LIKE.fullmatch(cell) else text, severity="note")
+    advice = CellAdvice("time") if STAMP_LIKE.fullmatch(cell) else None
+    return Finding(NotNumeric(name, line, cell, advice), severity="note")
 
 
-def _hint(dialect: Dialect, cell: str) -> str:
+def _advice(dialect: Dialect, cell: str) -> CellAdvice:
     """What to do about a cell that cannot be read."""
     if STAMP_LIKE.fullmatch(cell):
-        return _LAYOUT
+        return CellAdvice("time")
     if any(letter.isdigit() for letter in cell):
-        return f"decimal mark: {dialect.details['decimal mark']}; empty and nan are missing values"
-    return f"if it stands for a missing value, missing = [{quoted(cell[:40])}] in [csv] of the machine file says so"
+        return CellAdvice("number", dialect.details["decimal mark"])
+    return CellAdvice("word", quoted(cell[:40]))

@@ -17,10 +17,11 @@ import numpy as np
 from cdtool.clock import EPOCH
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import ClockDifference, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.plain_text import counted, first_of
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
@@ -97,10 +98,9 @@ def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatA
     for k, group in enumerate(clocks.groups[1:], 1):
         columns = [names[column] for column, its in clocks.of.items() if its == k]
         first, other = names[clocks.groups[0][0]], names[group[0]]
-        apart = _apart(dialect, values, first, other) if columns and {first, other} <= values.keys() else ""
+        apart = _apart(dialect, values, first, other) if columns and {first, other} <= values.keys() else None
         if apart:
-            text = f"another clock than '{first}' ({apart}), next to {first_of(columns)}"
-            found.append(Finding(f"{text}; {OWN} in a machine file gives each channel the clock beside it", other))
+            found.append(Finding(OtherClock(first, apart, tuple(columns)), other))
     return found
 
 
@@ -121,17 +121,15 @@ def own_clocks(
         times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
     starts = [float(time[np.isfinite(time)][0]) for time in times.values() if np.isfinite(time).any()]
     origin = min(starts) if starts and min(starts) > EPOCH else 0.0
-    shown = ", ".join(f"'{dialect.names[clocks.groups[group][0]]}'" for group in times)
-    columns, findings = {}, [Finding(f"each channel is on the clock beside it: {shown}", "time", "note")]
+    used = OwnClocks(tuple(dialect.names[clocks.groups[group][0]] for group in times))
+    columns, findings = {}, [Finding(used, "time", "note")]
     for key in keys:
         time = times[clocks.group(dialect.names.index(key)) or 0]
         timed = np.isfinite(time)
         columns[key] = Column(key, values[key][timed], time[timed] - origin, told_unit(dialect, key))
         lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
         if lost:
-            findings.append(
-                Finding(f"{counted(lost, 'value')} in rows in which its clock is empty: left out", key, "loss")
-            )
+            findings.append(Finding(ValuesWithoutTime(lost), key, "loss"))
     return columns, origin, findings
 
 
@@ -150,15 +148,15 @@ def _factor(dialect: Dialect, name: str, default: float) -> float:
     return unit.factor if unit is not None and unit.si == "s" else default
 
 
-def _apart(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> str:
-    """In what two clocks differ in the same rows; empty where they are one clock in two units or from two starts."""
+def _apart(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> ClockDifference | None:
+    """In what two clocks differ in the same rows; None where they are one clock in two units or from two starts."""
     a, b = values[first], values[other]
     both = np.isfinite(a) & np.isfinite(b)
     a, b = a[both], b[both]
     if len(a) < 3:
-        return ""
+        return None
     if min(np.mean(np.diff(a) > 0.0), np.mean(np.diff(b) > 0.0)) < _FORWARD:  # a name alone makes no clock
-        return ""
+        return None
     step, other_step = float(np.median(np.diff(a))), float(np.median(np.diff(b)))
     ratio = other_step / step
     told = _factor(dialect, first, np.nan) / _factor(dialect, other, np.nan)
@@ -166,10 +164,10 @@ def _apart(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other
     factors = (told,) if np.isfinite(told) else (1.0,) if alike else _FACTORS
     scale = min(factors, key=lambda factor: abs(np.log(ratio / factor)))
     if abs(ratio / scale - 1.0) > _SAME_FACTOR:
-        return f"their steps are {other_step:.4g} and {step:.4g}"
+        return ClockDifference("steps", step, other_step)
     b = b / scale
     offset, length = float(b[0] - a[0]), float(a[-1] - a[0])
     if 0.5 * step < abs(offset) <= length:
-        return f"it starts at {b[0]:.6g}, not {a[0]:.6g}"
+        return ClockDifference("start", float(a[0]), float(b[0]))
     drift = float(np.max(np.abs((b - b[0]) - (a - a[0]))))
-    return f"they drift apart by {drift:.3g}" if drift > 0.5 * step else ""
+    return ClockDifference("drift", 0.0, drift) if drift > 0.5 * step else None

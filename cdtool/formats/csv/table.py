@@ -16,6 +16,9 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import WrittenTimes
+from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
@@ -26,7 +29,7 @@ from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
 from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrapped
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import Finding, FloatArray
+from cdtool.recording import FloatArray
 
 RECENT = 20
 _SHAPE = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
@@ -87,14 +90,16 @@ class StampColumns:
         """How each is written, and what its seconds count from."""
         found = []
         for column in self._columns:
-            text, wrap = "", self._layout(column).wraps[1]
-            if column in self._dates:
-                text = f"joined with the days of column '{self._dialect.names[self._dates[column]]}'; "
-            elif self._passed[column]:
-                text = f"passes {wrap} {self._passed[column]} times; "
-            since = f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wrap
-            text += f"written as {self._layout(column).pattern}; in s since {since}"
-            found.append(Finding(text, self._dialect.names[column], "note"))
+            layout = self._layout(column)
+            wraps = layout.wraps[1]
+            fact = WrittenTimes(
+                layout.pattern,
+                f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
+                days_column=self._dialect.names[self._dates[column]] if column in self._dates else "",
+                wraps=wraps,
+                wrapped=self._passed[column],
+            )
+            found.append(Finding(fact, self._dialect.names[column], "note"))
         return found
 
 
@@ -161,9 +166,9 @@ class _Reading:
             findings += _judge_last_line(self.dialect, rows, self.asked, before)
         if odd.cut_line or text.padding:
             line = odd.cut_line or rows.line(rows.count)
-            findings.insert(0, Finding(f"the last line ({line}) is cut off, dropped", severity="loss"))
+            findings.insert(0, Finding(LastLineCut(line), severity="loss"))
         if text.padding:
-            findings.append(Finding(f"the file ends in {text.padding} NUL bytes: was the power lost?", severity="loss"))
+            findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
         return findings
 
     def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> Table:
@@ -242,11 +247,12 @@ def _sorted_out(
             else:
                 numeric.append(column)
         elif found.layout is None:
-            text = f"column '{name}': {found.readings}"
             timed = found.layouts[0].timed or _clock_beside(dialect, column) is not None
             if not survey or timed:
-                raise RecordingError(f"{path}: {text}", "pin time_format in [csv] of the machine file")
-            left_out[column] = Finding(f"{text}: left out; pin time_format in [csv]")
+                raise RecordingError(
+                    f"{path}: column '{name}': {found.readings}", "pin time_format in [csv] of the machine file"
+                )
+            left_out[column] = Finding(AmbiguousTimes(name, found.readings))
         else:
             stamps.append(column)
     return numeric, stamps, left_out
@@ -335,14 +341,13 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
     if whole and (certain or not dialect.text.padding):
         if certain:
             return []
-        return [Finding(f"the last line ({line}) has no line end: its last cell '{cell}' is taken to be whole")]
+        return [Finding(LastLineKept(line, cell))]
     rows.count -= 1
     rows.numbers, rows.stamps = rows.numbers[:, :-1], rows.stamps[:, :-1]
     rows.not_rows = np.append(rows.not_rows, line)
     if dialect.text.padding:
         return []
-    text = f"the last line ({line}) has no line end, and '{cell}' may be cut off, dropped"
-    return [Finding(text, severity="loss")]
+    return [Finding(LastLineDropped(line, cell), severity="loss")]
 
 
 @dataclass(frozen=True)

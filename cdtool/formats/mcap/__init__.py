@@ -14,6 +14,7 @@ from typing import ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
@@ -30,7 +31,6 @@ from cdtool.messages.gathering import Gathering
 from cdtool.messages.taken import Bound
 from cdtool.messages.topic import Taken, Topic, in_order, wanted_columns, wanted_topics
 from cdtool.messages.topic_survey import TopicSurvey
-from cdtool.recording import Finding
 
 __all__ = ["Mcap"]
 
@@ -204,5 +204,5 @@ def mapped_source_of(log: Log, wanted: ChannelMap, topics: Mapping[str, Topic]) 
 
 def source_of(log: Log, columns: Mapping[str, Column], findings: Sequence[Finding], origin: int) -> Source:
     """Return these columns of a log that was run through; their times count from `origin` [ns]."""
-    details = {topic.name: f"{topic.schema}, {topic.encoding}, {topic.count} messages" for topic in log.topics.values()}
-    return Source(log.path, "mcap", columns, origin / 1e9, tuple(findings), details, tuple(columns))
+    start, names = origin / 1e9, tuple(columns)
+    return Source(log.path, "mcap", columns, start, tuple(findings), names=names, topics=log.topic_details)

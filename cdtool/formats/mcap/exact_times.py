@@ -37,7 +37,7 @@ def with_exact_times(source: Source, wanted: ChannelMap, read: Callable[[Channel
     They count from the first message on, so that a log whose clock began at 5 s would else begin at 0 s. `read` gives
     the fields of a map.
     """
-    converted = any(text.startswith(f"{PACKAGE}/") for text in source.details.values())
+    converted = any(topic.schema.startswith(f"{PACKAGE}/") for topic in source.topics.values())
     metadata = exact_times(source.path) if converted else None
     if metadata is None:
         return source

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.findings import Finding
+from cdtool.findings.messages import MissingMessages
 from cdtool.formats.mcap.container.log import Messages
-from cdtool.recording import Finding
 
 Numbers = npt.NDArray[np.uint32]
 
@@ -85,7 +86,4 @@ class _Count:
         counts = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
         if not self._jumps or not counts:
             return []
-        places = "one place" if self._jumps == 1 else f"{self._jumps} places"
-        text = f"the numbers of {'its' if self._topic else 'the'} messages jump in {places}"
-        text += f", the first after {self._where:.3f} s: {self._missing} did not reach the log"
-        return [Finding(text, self._topic)]
+        return [Finding(MissingMessages(self._jumps, self._missing, self._where, bool(self._topic)), self._topic)]

@@ -30,7 +30,7 @@ _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
     *("not_met", "met", "results", "comparisons", "force", "points", "forces", "recordings", "not_assessable"),
-    *("skipped", "findings", "calibration"),
+    *("skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.

@@ -22,7 +22,7 @@ _LIMITS_OPEN = 12
 # The model's tables below the results, collapsed; its tables of the provenance follow.
 _FOLDED = (
     *("missed", "false_alarms", "not_assessable_contacts", "in_progress", "not_assessable", "force_exceptions"),
-    *("skipped", "findings", "calibration", "scored"),
+    *("skipped", "damaged", "findings", "calibration", "scored"),
 )
 
 

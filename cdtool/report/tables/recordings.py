@@ -6,14 +6,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from cdtool.evaluation.alike import alike
+from cdtool.evaluation.alike import Reason, alike
 from cdtool.evaluation.results import (
     ContactResult,
     ExposureResult,
     FalseAlarmResult,
     RecordingResult,
     Results,
-    Skipped,
 )
 from cdtool.evaluation.summary import later_ms
 from cdtool.plain_text import counted
@@ -159,17 +158,17 @@ def not_assessable_table(results: Results) -> Table:
     return tabulate("not_assessable", "Samples not assessable", fields, items, "exposure")
 
 
-def reasons_tables(results: Results) -> tuple[Table, Table]:
-    """Return what was left out, and the warnings about recordings that were used."""
-    fields: Fields[Skipped] = (
+def reasons_tables(results: Results) -> list[Table]:
+    """Return what was left out, what is lost of recordings that were used, and the warnings about these."""
+    fields: Fields[Reason] = (
         (Column("recording"), lambda item: name_cell(item.recording)),
         (Column("reason"), lambda item: Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING)),
     )
-    skipped, findings = alike(results.skipped), alike(results.findings)
-    return (
-        tabulate("skipped", "Left out", fields, skipped, "skipped"),
-        tabulate("findings", "Warnings", fields, findings, "findings"),
-    )
+    return [
+        tabulate("skipped", "Left out", fields, alike(results.skipped), "skipped"),
+        tabulate("damaged", "Damaged but used", fields, alike(results.losses), "findings"),
+        tabulate("findings", "Warnings", fields, alike(results.warnings), "findings"),
+    ]
 
 
 def log_of(group: str, operation: str, logs: frozenset[Log]) -> Log:

@@ -16,9 +16,11 @@ from cdtool.detectors import DETECTORS
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.results import Results, Skipped
+from cdtool.evaluation.results import RecordingFinding, Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.findings import Finding
+from cdtool.findings.scoring import DetectorLeftOut, LimitsUnchecked
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.operations import Operation
 from cdtool.registry import plugin_packages
@@ -115,14 +117,15 @@ def benchmark(
     base = setup.path.parent
     learn = load_runs(setup.learn, machine_file, RunReading(setup.operations, onset=setup.onset, base=base, jobs=jobs))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
-    left_out: list[Skipped] = []
+    left_out: list[RecordingFinding] = []
     if list(detectors) == ["all"]:
         used, left_out = that_can_run(used, learn.operations, machine_file.machine)
-        left_out += [Skipped(name, f"left out: {fault}") for name, fault in DETECTORS.broken_plugins().items()]
+        broken = DETECTORS.broken_plugins().items()
+        left_out += [RecordingFinding.of(name, Finding(DetectorLeftOut(str(fault)))) for name, fault in broken]
         setup = with_only(setup, [detector.name for detector in used])
     if len(setup.limits) < limits:
-        words = f"{limits - len(setup.limits)} of {limits} limits are set for detectors that were not run: not checked"
-        left_out.append(Skipped(str(setup.path), words))
+        unchecked = Finding(LimitsUnchecked(limits - len(setup.limits), limits))
+        left_out.append(RecordingFinding.of(str(setup.path), unchecked))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
     detect = detect_with(setup, used, learned.thresholds, learned.unusable)

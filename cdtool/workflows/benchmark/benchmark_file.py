@@ -15,7 +15,7 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
-from cdtool.evaluation.truth.labels import LABEL_FILE, Labels
+from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
@@ -80,7 +80,7 @@ class BenchmarkFile:
     def scoring(self) -> dict[str, Any]:
         """Return the settings that determine the results, for provenance; only results with equal settings compare."""
         return {
-            "onset": self.onset.described + (f"{LABEL_FILE}{Path(self.labels.source).name}" if self.labels else ""),
+            "onset": self.onset.described,
             "separation_s": self.onset.separation,
             "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
             "operations": self.operations,

@@ -8,7 +8,9 @@ from typing import Any
 
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, NothingValidError, SignatureError
-from cdtool.evaluation.results import CalibrationResult, Skipped
+from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
+from cdtool.findings import Finding
+from cdtool.findings.scoring import DetectorLeftOut, DetectorUnassessable
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold
@@ -28,7 +30,7 @@ class LearnedThresholds:
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
     skipped: list[Skipped]
-    not_assessable: list[Skipped]
+    not_assessable: list[RecordingFinding]
     calibration: list[CalibrationResult]
     unusable: dict[str, str]
     unused: set[str]
@@ -57,7 +59,8 @@ def learn_thresholds(
             fitted = with_left_out(fit, [*unread, *unusable])(pairs)
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
-            learned.not_assessable.append(Skipped(detector.name, f"not assessable: {fault.message}"))
+            unassessable = Finding(DetectorUnassessable(fault.message))
+            learned.not_assessable.append(RecordingFinding.of(detector.name, unassessable))
             continue
         except NoUsableRunError as fault:
             learned.thresholds[detector.name] = ()
@@ -91,15 +94,15 @@ def _none_usable(unusable: Mapping[str, str], known: bool) -> SignatureError:
 
 def that_can_run(
     detectors: Sequence[Any], operations: Sequence[Operation], machine: Machine
-) -> tuple[list[Any], list[Skipped]]:
+) -> tuple[list[Any], list[RecordingFinding]]:
     """Return the detectors whose channels are all in the first run, and the reasons for the others."""
     able: list[Any] = []
-    left_out: list[Skipped] = []
+    left_out: list[RecordingFinding] = []
     for detector in detectors:
         try:
             for operation in operations[:1]:
                 run_detector(operation, machine, detector)
             able.append(detector)
         except CdtoolError as fault:
-            left_out.append(Skipped(detector.name, f"left out: {fault.message}"))
+            left_out.append(RecordingFinding.of(detector.name, Finding(DetectorLeftOut(fault.message))))
     return able, left_out

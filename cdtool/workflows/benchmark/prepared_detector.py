@@ -10,7 +10,7 @@ from typing import Any
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
@@ -26,8 +26,8 @@ class PreparedBenchmark:
     """A detector with its threshold in `cdtool benchmark`; `described` states in words where the threshold is from.
 
     `learned` has the hashes of the logs learned from, `ranges` the ranges of their channels and `normals` their
-    normal motion. `skipped` lists the runs left out in learning, with the reason. `notes` concern a signature file of
-    an earlier version.
+    normal motion. `skipped` lists the runs left out in learning, with the reason; `losses` lists what is lost of the
+    others. `notes` concern a signature file of an earlier version.
     """
 
     setup: BenchmarkFile
@@ -37,8 +37,9 @@ class PreparedBenchmark:
     run: Detect
     ranges: PlausibleRanges | None
     normals: NormalMotions
-    notes: tuple[Skipped, ...] = ()
+    notes: tuple[RecordingFinding, ...] = ()
     skipped: tuple[Skipped, ...] = ()
+    losses: tuple[RecordingFinding, ...] = ()
 
     def score(self, log: Path) -> Scored:
         """Return the log's rows as in a benchmark, with the window of its group if it has one. Raises nothing."""
@@ -108,8 +109,17 @@ def prepare_benchmark(
     hashes = {operation.recording.digest: operation.recording.name for operation in used}
     run = detect_with(setup, [instance], fitted.thresholds, fitted.unusable)
     normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
-    left_out = (*runs.skipped, *fitted.skipped)
-    return PreparedBenchmark(setup, instance.name, described, hashes, run, runs.ranges, normals, skipped=left_out)
+    return PreparedBenchmark(
+        setup,
+        instance.name,
+        described,
+        hashes,
+        run,
+        runs.ranges,
+        normals,
+        skipped=(*runs.skipped, *fitted.skipped),
+        losses=tuple(item for item in runs.findings if item.is_loss),
+    )
 
 
 def _chosen(setup: BenchmarkFile, detector: str | None) -> str:

@@ -11,13 +11,22 @@ from typing import Any
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, judge
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, RecordingResult, Skipped
+from cdtool.evaluation.results import (
+    ContactResult,
+    FalseAlarmResult,
+    ForceResult,
+    RecordingFinding,
+    RecordingResult,
+    Skipped,
+)
 from cdtool.evaluation.sweep import sweep
+from cdtool.findings import Finding
+from cdtool.findings.scoring import ForceUnassessable
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Contact, Finding, FloatArray, Recording
+from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows
@@ -27,7 +36,7 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import DAMAGED, absent_truth, load_operations, lost, unread
+from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
 
 
 @dataclass
@@ -41,7 +50,7 @@ class Scored:
     forces: list[ForceResult] = field(default_factory=list)
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
-    findings: list[Skipped] = field(default_factory=list)
+    findings: list[RecordingFinding] = field(default_factory=list)
     # Names of logs assumed to be free of impacts, with the ground truth that is missing from them.
     unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
@@ -125,27 +134,27 @@ def score_log(
         return scored
     scored.reading = perf_counter() - begin
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
-    scored.skipped += lost(recording)
+    scored.findings += lost(recording)
     if group == HOLDOUT:
         unwanted = unwanted_contacts(recording, rules)
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
         if not operations:
-            scored.findings = log_warnings(recording, unwanted, setup.onset)
+            scored.findings += log_warnings(recording, unwanted, setup.onset)
             return scored
     scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
     found = detect(operations, scored)
     detected = DetectedLog(recording, operations, setup.operations, contacts, found)
     matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
-    scored.findings += matched.warnings
+    scored.findings += matched.findings
     scored.matched, curves = matched, matched.curves
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
         scored.verdicts = {number: judge(curve, profile) for number, curve in curves.items()}
         scored.forces = force_rows(scored.recording, scored.verdicts, curves)
-        scored.skipped += _force_not_seen(recording, profile.name, scored.verdicts, curves)
+        scored.findings += _force_not_seen(recording, profile.name, scored.verdicts, curves)
         numbered = enumerate(contacts, 1)
         unseen = [f"contact {number}" for number, item in numbered if number not in curves and not item.in_progress]
         if unseen:
@@ -160,14 +169,14 @@ def score_log(
 
 def _force_not_seen(
     recording: Recording, profile: str, verdicts: Mapping[int, ForceVerdict], curves: Mapping[int, ForceTimeCurve]
-) -> list[Skipped]:
+) -> list[RecordingFinding]:
     """Return the contacts not assessable by a force profile because load-cell samples are missing: a data loss."""
-    lost = [
-        f"contact {number} is not assessable by {profile}: {verdict.reason}"
+    unassessable = [
+        ForceUnassessable(number, profile, verdict.reason)
         for number, verdict in verdicts.items()
         if verdict.outcome == "not_assessable" and curves[number].has_missing_samples
     ]
-    return [Skipped(recording.name, f"{DAMAGED}{text}") for text in lost]
+    return [RecordingFinding.of(recording.name, Finding(item, severity="loss")) for item in unassessable]
 
 
 def _recording_result(

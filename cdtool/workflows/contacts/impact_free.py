@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.findings import Finding
+from cdtool.findings.scoring import AssumedImpactFree
 from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
-from cdtool.recording import Contact, Finding, Recording
+from cdtool.recording import Contact, Recording
 
 # A load cell whose resolution is coarser than its noise flickers by one step, which is not a contact.
 _STEPS = 3.0
@@ -45,13 +47,13 @@ def without_contacts(
     return free, left_out
 
 
-def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[Skipped]:
+def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[RecordingFinding]:
     """Return one line on the logs, by name, whose freedom from impacts cannot be checked."""
     if not notes:
         return []
     logs = list(dict.fromkeys(name for name, _ in notes))
     which = logs[0] if len(logs) == 1 else f"{counted(len(logs), 'log')}, the first {logs[0]}"
-    return [Skipped(which, f"{notes[0][1]}: assumed to be free of impacts")]
+    return [RecordingFinding.of(which, Finding(AssumedImpactFree(str(notes[0][1]))))]
 
 
 def _described(contact: Contact) -> str:

@@ -10,16 +10,17 @@ import numpy as np
 from cdtool.detection import Alarm
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, Skipped
+from cdtool.evaluation.results import ContactResult, FalseAlarmResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import match
+from cdtool.findings import Finding
+from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
+from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection
-from cdtool.plain_text import counted
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.log_checks.log_findings import IN_PROGRESS, log_warnings
-from cdtool.workflows.runs import DAMAGED
+from cdtool.workflows.log_checks.log_findings import log_warnings
 
 # A stroke counts as assessable if at least this share of its samples is.
 _JUDGED = 0.5
@@ -30,8 +31,7 @@ class MatchedLog:
     """The outcome of a log's contacts and alarms.
 
     `judged` has one entry and `contacts` a list of rows per operation. `curves` is the force by the contact's number.
-    `not_scored` lists contacts that have no onset, are outside all operations or began where load-cell samples are
-    missing; `warnings` concern the log itself.
+    `not_scored` lists contacts that have no onset or are outside all operations; `findings` concern the log itself.
     """
 
     judged: tuple[Judged, ...]
@@ -39,7 +39,7 @@ class MatchedLog:
     false_alarms: tuple[FalseAlarmResult, ...]
     curves: dict[int, ForceTimeCurve]
     not_scored: tuple[Skipped, ...]
-    warnings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,12 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     inside = _by_operation(log.operations, contacts)
     curves, doubts = _curves(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
+    findings = [
+        *_unseen_onsets(contacts, rules.window),
+        *_uncut_log(recording, found, log.cut_by),
+        *_unseen_forces(contacts, curves),
+        *doubts,
+    ]
     crossings = _pooled(found)
     judged = []
     for operation, own, detections in zip(log.operations, inside, found, strict=True):
@@ -80,8 +86,8 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         tuple(tuple(contact_rows(item, recording, contacts, curves, rules.synchronisation)) for item in judged),
         tuple(row for item in judged for row in false_alarm_rows(item)),
         curves,
-        (*_not_scored(recording, contacts, inside, log.cut_by), *_unseen_onsets(recording, contacts, rules.window)),
-        (*warned, *_uncut_log(recording, found, log.cut_by), *_unseen_forces(recording, contacts, curves), *doubts),
+        tuple(_not_scored(recording, contacts, inside, log.cut_by)),
+        (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
     )
 
 
@@ -113,39 +119,31 @@ def _not_scored(
     found = []
     for contact in contacts:
         if contact.in_progress:
-            found.append(Skipped(recording.name, f"{IN_PROGRESS.format(end=contact.end)}, it is not scored"))
+            found.append(Skipped(recording.name, f"{InProgress(contact.end).sentence()}, it is not scored"))
         elif not any(contact in own for own in inside):
             text = f"the contact at {contact.start:.3f} s is outside all operations (cut by {cut_by})"
             found.append(Skipped(recording.name, text))
     return found
 
 
-def _unseen_onsets(recording: Recording, contacts: Sequence[Contact], window: float) -> list[Skipped]:
-    """Return a line for each contact that began where load-cell samples are missing: a loss, its latency is unknown."""
+def _unseen_onsets(contacts: Sequence[Contact], window: float) -> list[Finding]:
+    """Return a loss for each contact that began where load-cell samples are missing: its latency is unknown."""
     found = []
     for number, contact in enumerate(contacts, 1):
         if contact.hole and not contact.in_progress:
-            later = 1e3 * contact.uncertainty
-            what = f"its latency may be up to {later:.0f} ms longer"
-            what = "its latency is unknown" if contact.uncertainty >= window else what
-            text = (
-                f"load-cell samples are missing for {1e3 * contact.hole:.0f} ms where contact {number}, first seen at"
-            )
-            found.append(Skipped(recording.name, f"{DAMAGED}{text} {contact.start:.3f} s, may have begun: {what}"))
+            later = contact.uncertainty if contact.uncertainty < window else None
+            found.append(Finding(OnsetUnseen(number, contact.hole, contact.start, later), severity="loss"))
     return found
 
 
-def _unseen_forces(
-    recording: Recording, contacts: Sequence[Contact], curves: Mapping[int, ForceTimeCurve]
-) -> list[Skipped]:
+def _unseen_forces(contacts: Sequence[Contact], curves: Mapping[int, ForceTimeCurve]) -> list[Finding]:
     """Return a warning for each contact with a known onset whose force is partly missing."""
     found = []
     for number, curve in curves.items():
         contact = contacts[number - 1]
         hole = curve.longest_hole(contact.end - contact.start)
         if hole and not contact.hole:
-            text = f"load-cell samples are missing for {1e3 * hole:.0f} ms during contact {number}"
-            found.append(Skipped(recording.name, f"{text}: its peak may be larger than the one reported"))
+            found.append(Finding(PeakUnseen(number, hole)))
     return found
 
 
@@ -160,10 +158,10 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
 
 def _curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
-) -> tuple[dict[int, ForceTimeCurve], list[Skipped]]:
+) -> tuple[dict[int, ForceTimeCurve], list[Finding]]:
     """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""
     found: dict[int, ForceTimeCurve] = {}
-    missing: list[Skipped] = []
+    missing: list[Finding] = []
     if "force" not in recording:
         return found, missing
     ends = [*(contact.start for contact in contacts[1:]), float("inf")]
@@ -173,11 +171,11 @@ def _curves(
         try:
             found[number] = force_time_curve(recording, contact, mass_before_cell, until)
         except CdtoolError as fault:
-            missing.append(Skipped(recording.name, f"contact {number}: no force: {fault.message}"))
+            missing.append(Finding(NoForce(number, fault.message)))
     return found, missing
 
 
-def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Skipped]:
+def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Finding]:
     """Return a warning if the first stroke of an uncut log is assessable and a later one is not.
 
     `found` are the detections of its operations, `cut_by` how the log is divided into them.
@@ -191,14 +189,7 @@ def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_b
         for number, stroke in enumerate(strokes[1:], 2)
         if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
     ]
-    if not blind:
-        return []
-    which = f"stroke {blind[0]} is" if len(blind) == 1 else f"{len(blind)} of them are"
-    text = (
-        f"contains {counted(len(strokes), 'stroke')} in one operation, and {which} not assessable: cut it with "
-        'operations = "motion" in the benchmark file, or --operations motion'
-    )
-    return [Skipped(recording.name, text)]
+    return [Finding(LogNotCut(len(strokes), tuple(blind)))] if blind else []
 
 
 def _strokes(recording: Recording) -> list[Operation]:

@@ -12,7 +12,7 @@ from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.runs import DAMAGED, absent_truth, lost
+from cdtool.workflows.runs import absent_truth, lost
 
 # A load cell that ends earlier than this [s] before its log does not cover all of it.
 _TAIL = 0.1
@@ -70,7 +70,7 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
 def _missing(recording: Recording) -> str:
     """Return what is missing from a log that may contain the contact; empty for a complete log."""
     if damage := lost(recording):
-        return f"part of the log is lost: {damage[0].reason.removeprefix(DAMAGED)}"
+        return f"part of the log is lost: {damage[0].reason}"
     if "force" not in recording:
         return ""
     cell = recording["force"]

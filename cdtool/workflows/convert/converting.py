@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from cdtool.errors import RecordingError, UsageError, nearest
 from cdtool.files import replaced
+from cdtool.findings import Finding
+from cdtool.findings.containers import Unverified
 from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.parts import joined_digest
 from cdtool.ingest.reading import FoundParts, log_parts
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
-from cdtool.recording import Finding
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.convert.converted_machine import converted_machine
@@ -192,7 +193,7 @@ def _provenance(
         told["parts"] = "; ".join(f"{name} {digest}" for name, digest in digests.items())
     if lost := [str(finding) for finding in findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
-    if unverified := [finding.message for finding in findings if finding.message.endswith(": unverified")]:
+    if unverified := [finding.message for finding in findings if isinstance(finding.fact, Unverified)]:
         told[UNVERIFIED] = "; ".join(unverified)
     if machine_file is not None:
         told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.files import write_text
+from cdtool.findings import Finding
+from cdtool.findings.motion import AccelerometerTurned
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
-from cdtool.recording import CHANNELS, Finding
 from cdtool.workflows.information import info
 from cdtool.workflows.init.channel_guess import guess_channels
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
@@ -21,10 +21,6 @@ from cdtool.workflows.init.streams import Channels, streams_of
 from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
-
-_CHANNEL = re.compile(r"channels\.(?:mcap\.)?(\w+)|channel '(\w+)'")
-# Wording of log_checks for an accelerometer mounted the other way round.
-_TURNED = "opposite sign"
 
 
 @dataclass(frozen=True)
@@ -93,12 +89,11 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             try:
                 findings = info(log, machine=read_machine_file(trial)).findings
             except CdtoolError as fault:
-                bad = _blamed(fault, mapped)
-                if bad is None:
+                if fault.channel not in mapped or len(mapped) == 1:  # the draft cannot do without it
                     raise
-                left_out.append(bad)
+                left_out.append(fault.channel)
                 continue
-            if turned or not any(_TURNED in found.message for found in findings if found.channel == "acceleration"):
+            if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
                 return Drafted("", text, mapped, tuple(left_out), findings)
             turned = True
 
@@ -115,7 +110,7 @@ def _drafted(log: Path) -> Draft:
     channels = guess_channels(streams, topics)
     own = any(column.time is not None for column in source.columns.values()) and not topics
     clock = None if own else clock
-    types = {topic: text.split(",")[0] for topic, text in source.details.items()} if topics else {}
+    types = {name: topic.schema for name, topic in source.topics.items()}
     motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
     messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
     ratio = ratio_of(channels, clock, messages_si)
@@ -141,7 +136,7 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
 
 def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
     """Return the doubt about a clock's unit known only from its name, if only another unit fits the ratio."""
-    if clock is None or not clock.told.endswith("name") or ratio is None or ratio.fitting:
+    if clock is None or not clock.by_name or ratio is None or ratio.fitting:
         return ""
     other = ratio_of(channels, replace(clock, told=""), messages_si=False)
     if other is None or not other.fitting or other.tick:
@@ -175,12 +170,3 @@ def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
         return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
     rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
     return Clock(name, clock.unit, why, f"the unit is not stated: steps of {clock.step:.4g} are {rates}")
-
-
-def _blamed(fault: CdtoolError, mapped: tuple[str, ...]) -> str | None:
-    """Return the channel that an error names, if the draft works without it."""
-    for match in _CHANNEL.finditer(fault.message):
-        name = match[1] or match[2]
-        if name in CHANNELS and name in mapped and len(mapped) > 1:
-            return name
-    return None

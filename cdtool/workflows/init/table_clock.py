@@ -25,7 +25,8 @@ _RARE = 2.0  # minutes are this much less likely than an unusual rate
 class TableClock:
     """A table's clock: the median `step` of its stamps, in its own unit, and the seconds assumed per unit.
 
-    `told` is the certain source of the unit; if empty, `unit` is guessed from the steps.
+    `told` is the certain source of the unit; if empty, `unit` is guessed from the steps. `by_name`: this source is only
+    the name of the column.
     """
 
     column: str
@@ -34,6 +35,7 @@ class TableClock:
     unit: str
     told: str
     counts: bool = False
+    by_name: bool = False
 
     def units(self) -> tuple[str, ...]:
         """Return the possible units of its stamps; empty for a counter."""
@@ -73,7 +75,7 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
         return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
-        return replace(clock, unit=named, told="the unit in its name"), found
+        return replace(clock, unit=named, told="the unit in its name", by_name=True), found
     return replace(clock, unit=min(clock.units() or (unit,), key=clock.unlikely)), found
 
 

@@ -10,14 +10,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
-from cdtool.recording import Contact, Finding, FloatArray, Recording, worst_first
+from cdtool.findings import Fact, Finding, worst_first
+from cdtool.findings.motion import (
+    AccelerometerFit,
+    AccelerometerScaleUncheckable,
+    AccelerometerScaleWrong,
+    AccelerometerTurned,
+    AccelerometerUncheckable,
+)
+from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.workflows.log_checks.motion_check import motion_findings
 
-# Of a contact without an onset; where contacts are scored it is named as left out.
-IN_PROGRESS = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"
 # Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.
 _WINDOW = 0.2
 # Below this correlation the motion does not say enough about the sign, or about the scale.
@@ -36,10 +42,10 @@ def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     return worst_first(dict.fromkeys([*found, *truth_findings(recording, contacts, rule)]))
 
 
-def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Skipped]:
+def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[RecordingFinding]:
     """Return the warnings among the findings of a log, under its name; losses are reported by `runs.lost`."""
     found = log_findings(recording, contacts, rule)
-    return [Skipped(recording.name, str(item)) for item in found if item.severity == "warning"]
+    return [RecordingFinding.of(recording.name, item) for item in found if item.severity == "warning"]
 
 
 def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
@@ -50,13 +56,13 @@ def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) ->
     found = []
     ranges = [_range(recording["speed"].values[:, j]) for j in range(len(recording.joints))]
     for j, joint in enumerate(recording.joints):
-        name = f" of {joint}" if len(recording.joints) > 1 else ""
+        name = joint if len(recording.joints) > 1 else ""
         if ranges[j] < _HARDLY * max(ranges):
-            text = f"accelerometer{name} cannot be checked: the joint hardly moves"
-            found.append(Finding(text, "acceleration", "note"))
+            found.append(Finding(AccelerometerUncheckable(name, "joint hardly moves"), "acceleration", "note"))
             continue
-        expected, measured = _pairs(recording, j)
-        found.append(_judge(expected, measured, name))
+        fact = _compare(*_pairs(recording, j), name)
+        is_wrong = isinstance(fact, AccelerometerTurned | AccelerometerScaleWrong)
+        found.append(Finding(fact, "acceleration", "warning" if is_wrong else "note"))
     return found
 
 
@@ -72,28 +78,29 @@ def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Record
     return recording.between(since, first) if contacts else recording
 
 
-def _judge(expected: FloatArray, measured: FloatArray, name: str) -> Finding:
+def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
     if len(expected) < 5 or np.std(expected) == 0.0 or np.std(measured) == 0.0:
-        return Finding(f"accelerometer{name} cannot be checked: the speed hardly changes", "acceleration", "note")
+        return AccelerometerUncheckable(joint, "speed hardly changes")
     correlation = float(np.corrcoef(expected, measured)[0, 1])
     slope = float(np.polyfit(expected, measured, 1)[0])
     if abs(correlation) < _TELLING:
-        text = f"accelerometer{name} cannot be checked: correlation with the speed's derivative {correlation:.2f}"
-        return Finding(text, "acceleration", "note")
-    figures = f"slope {slope:.3g}, correlation {correlation:.2f} over the speed's derivative"
+        return AccelerometerUncheckable(joint, "correlation", correlation)
     if slope < 0.0:
-        return Finding(f"accelerometer{name} has the opposite sign ({figures}): give scale = -1", "acceleration")
-    if 0.7 < slope < 1.4:
-        return Finding(f"accelerometer{name} fits the speed ({figures})", "acceleration", "note")
+        return AccelerometerTurned(joint, slope, correlation)
+    if _fits(slope):
+        return AccelerometerFit(joint, slope, correlation)
     if correlation < _TELLING_SCALE:
-        return Finding(f"accelerometer{name}: its scale cannot be checked ({figures})", "acceleration", "note")
-    for factor, advice in (
-        (_STANDARD_GRAVITY, "the log may hold m/s2, not g"),
-        (1 / _STANDARD_GRAVITY, "the log may hold g"),
-    ):
-        if 0.7 < slope / factor < 1.4:
-            return Finding(f"accelerometer{name} has the wrong scale ({figures}): {advice}", "acceleration")
-    return Finding(f"accelerometer{name} has the wrong scale ({figures}): check unit and ratio", "acceleration")
+        return AccelerometerScaleUncheckable(joint, slope, correlation)
+    if _fits(slope / _STANDARD_GRAVITY):
+        return AccelerometerScaleWrong(joint, slope, correlation, "m/s2")
+    if _fits(slope * _STANDARD_GRAVITY):
+        return AccelerometerScaleWrong(joint, slope, correlation, "g")
+    return AccelerometerScaleWrong(joint, slope, correlation)
+
+
+def _fits(slope: float) -> bool:
+    """Whether the accelerometer's scale is about right."""
+    return 0.7 < slope < 1.4
 
 
 def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:

@@ -7,11 +7,22 @@ import numpy as np
 from cdtool.clock import GAP_PERIODS, integrate, previous_value
 from cdtool.detectors.base import of_joint
 from cdtool.errors import CdtoolError
+from cdtool.findings import Finding
+from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
+from cdtool.findings.motion import (
+    BelowMinimumSpeed,
+    JointsSwapped,
+    Motion,
+    NoMotion,
+    NoMotionMapped,
+    Poles,
+    SpeedSignOpposite,
+    SpeedUnitDoubtful,
+)
 from cdtool.machine_file import MachineFile
 from cdtool.motion import motion_class
 from cdtool.operations import operations_of
-from cdtool.plain_text import counted
-from cdtool.recording import Finding, FloatArray, Recording, Series
+from cdtool.recording import FloatArray, Recording, Series
 
 # Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
 # one correlates with the other's more than the second, have their columns mixed up.
@@ -32,26 +43,23 @@ _FACTORS = (
 def motion_findings(recording: Recording) -> list[Finding]:
     """How the machine moves and how many operations that makes; what does not fit together."""
     if "speed" not in recording:
-        return [Finding("neither speed nor position is mapped: no operation can be cut or classed", "speed", "note")]
+        return [Finding(NoMotionMapped(), "speed", "note")]
     motion = motion_class(recording)
     if motion.direction == 0:
-        return [Finding("the axis does not move", "speed", "note")]
+        return [Finding(NoMotion(), "speed", "note")]
     unit = recording["speed"].unit
     try:
         strokes = len(operations_of(recording, "motion"))
     except CdtoolError:
         strokes = 0
-    word = "forward" if motion.direction > 0 else "backward"
-    text = f"{counted(strokes, 'stroke')} by motion; nominal speed {motion.nominal_speed:.4g} {unit}, mainly {word}"
-    return [Finding(text, "speed", "note"), *_consistency(recording)]
+    fact = Motion(strokes, motion.nominal_speed, unit, "forward" if motion.direction > 0 else "backward")
+    return [Finding(fact, "speed", "note"), *_consistency(recording)]
 
 
 def _consistency(recording: Recording) -> list[Finding]:
     """Does the mapped speed fit the derivative of the mapped position?"""
-    derived = any(
-        item.channel in ("speed", "position") and "not in the log" in item.message for item in recording.findings
-    )
-    if derived or "position" not in recording:
+    is_derived = any(isinstance(item.fact, DerivedSpeed | IntegratedPosition) for item in recording.findings)
+    if is_derived or "position" not in recording:
         return []
     found = []
     speed, position = recording["speed"], recording["position"]
@@ -59,7 +67,7 @@ def _consistency(recording: Recording) -> list[Finding]:
     for j in range(speed.joint_count):
         if moved[j] <= _HARDLY * max(moved):
             continue
-        of = f"of {recording.joints[j]}: " if len(recording.joints) > 1 else ""
+        joint = recording.joints[j] if len(recording.joints) > 1 else ""
         integrated, travelled = _without_gaps(speed, position, j)
         if not len(travelled):
             continue
@@ -67,15 +75,10 @@ def _consistency(recording: Recording) -> list[Finding]:
         if way <= 0.0 or seen <= 0.0:
             continue
         if not 0.8 < way / seen < 1.25:
-            ratio = max(way / seen, seen / way)
-            text = (
-                f"{of}integrates to {way:.4g} {position.unit}, the position spans {seen:.4g} {position.unit} "
-                f"(a factor of {ratio:.4g}{_as_between(ratio)}): check the units of speed (read as {speed.unit}) "
-                f"and position (read as {position.unit})"
-            )
-            found.append(Finding(text, "speed"))
+            between = _as_between(max(way / seen, seen / way))
+            found.append(Finding(SpeedUnitDoubtful(joint, way, seen, position.unit, speed.unit, between), "speed"))
         elif abs(travelled[-1]) > 0.5 * seen and np.sign(travelled[-1]) != np.sign(integrated[-1]):
-            found.append(Finding(f"{of}has the opposite sign of the position's derivative", "speed"))
+            found.append(Finding(SpeedSignOpposite(joint), "speed"))
     return [*found, *_swapped(recording)]
 
 
@@ -103,7 +106,7 @@ def _as_between(ratio: float) -> str:
     """Which units differ by a factor."""
     for factor, units in _FACTORS:
         if abs(ratio / factor - 1.0) < 0.05:
-            return f", as between {units}"
+            return units
     return ""
 
 
@@ -124,8 +127,7 @@ def _swapped(recording: Recording) -> list[Finding]:
     for j, joint in enumerate(recording.joints):
         best = int(np.argmax(fit[:, j]))
         if fit[best, j] > _OTHER_FIT and max(fit[j, j], fit[best, best]) < _OWN_FIT:
-            text = f"that of {joint} follows the speed of {recording.joints[best]}: columns in another order?"
-            found.append(Finding(text, "position"))
+            found.append(Finding(JointsSwapped(joint, recording.joints[best]), "position"))
     return found
 
 
@@ -156,9 +158,7 @@ def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[
     motion = motion_class(recording)
     detector = of_joint(machine_file.detector("friction_ekf"), motion.joint, len(recording.joints))
     if motion.nominal_speed < detector.minimum_speed:
-        return [
-            Finding(f"nominal speed below minimum_speed ({detector.minimum_speed:g}): not applicable", "friction_ekf")
-        ]
+        return [Finding(BelowMinimumSpeed(detector.minimum_speed), "friction_ekf")]
     inertia = float(machine_file.machine.nominal_inertia[motion.joint])
     if inertia <= 0.0:
         return []
@@ -168,6 +168,5 @@ def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[
         return []
     friction = float(np.median(np.abs(torque))) / motion.nominal_speed
     poles, _ = detector.steady_state(inertia, motion.nominal_speed, friction, recording["speed"].period)
-    slow, quick = float(poles[0]), float(poles[1])
-    text = f"poles at {motion.nominal_speed:.3g} {recording['speed'].unit}: {slow:.3g} and {quick:.3g} rad/s"
-    return [Finding(text, "friction_ekf", "note")]
+    fact = Poles(motion.nominal_speed, recording["speed"].unit, float(poles[0]), float(poles[1]))
+    return [Finding(fact, "friction_ekf", "note")]

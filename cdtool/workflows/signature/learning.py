@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.motion import MotionClass
@@ -32,7 +32,7 @@ class Learned:
     signature: SignatureFile
     runs: tuple[tuple[MotionClass | None, int], ...]
     skipped: tuple[Skipped, ...]
-    findings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from dataclasses import replace
 from statistics import median
 
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding
+from cdtool.findings import Finding, Remark
 from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
@@ -34,9 +35,10 @@ def normals_of(file: SignatureFile) -> NormalMotions:
     return NormalMotions(file.normal or (), Absence.OLDER_FILE if file.normal is None else Absence.FEW_RUNS)
 
 
-def notes_on(file: SignatureFile) -> list[Skipped]:
+def notes_on(file: SignatureFile) -> list[RecordingFinding]:
     """Return the notes on a signature file of an earlier version, under its name; else empty."""
-    return [Skipped(file.source, file.of_earlier_version)] if file.of_earlier_version else []
+    note = Finding(Remark(file.of_earlier_version), severity="note")
+    return [RecordingFinding.of(file.source, note)] if file.of_earlier_version else []
 
 
 def with_operation(

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError, UsageError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.evaluation.upkeep.advice import advice
 from cdtool.evaluation.upkeep.audit import DriftAudit
@@ -61,7 +61,7 @@ class Checked:
     file: SignatureFile
     classes: tuple[CheckedClass, ...]
     skipped: tuple[Skipped, ...]
-    findings: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Updated:
     file: SignatureFile
     added: tuple[str, ...]
     refused: tuple[Skipped, ...]
-    findings: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cdtool.evaluation.truth.doubts import follows_torque, truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
+from cdtool.findings.truth import FollowsTorque, ForceLeft, RestLevelShifted
 from cdtool.recording import FloatArray, Recording, Series
 from tests.data_folder import data, needs_data
 
@@ -29,8 +31,10 @@ def log(force: FloatArray, torque: FloatArray, clock: FloatArray = TIME) -> Reco
     return Recording("r", "r", ("a", "b"), channels)
 
 
-def warnings_of(recording: Recording) -> list[str]:
-    return [str(item) for item in truth_findings(recording, find_contacts(recording, RULE), RULE)]
+def warnings_of(recording: Recording) -> list[Any]:
+    found = truth_findings(recording, find_contacts(recording, RULE), RULE)
+    assert all((item.channel, item.severity) == ("force", "warning") for item in found)
+    return [item.fact for item in found]
 
 
 @pytest.mark.parametrize("scale", [0.8, -25.0])
@@ -39,9 +43,8 @@ def test_a_force_computed_from_the_torque_is_not_independent_truth(scale, rate):
     clock = np.arange(0.0, 6.0, rate)
     torque = np.column_stack((np.sin(clock), 2.0 + press(clock) / abs(scale)))
     force = np.sign(scale) * press(TIME) + noise(2.0, 1)
-    (text,) = warnings_of(log(force, torque, clock))
-    assert text.startswith("force: follows the torque of b without lag (r = ")
-    assert text.endswith("): not an independent truth, if it is made from it")
+    (fact,) = warnings_of(log(force, torque, clock))
+    assert fact == FollowsTorque("b", pytest.approx(np.sign(scale), abs=0.05))
 
 
 @pytest.mark.parametrize("lag", [0.01, 0.03, 0.08])
@@ -63,9 +66,9 @@ def test_without_contacts_or_required_channels_nothing_is_reported():
 
 def test_a_rest_level_that_drifted_beyond_the_lower_level_is_reported():
     torque = np.column_stack((np.sin(TIME), np.cos(TIME)))
-    (text,) = warnings_of(log(press(TIME) + noise(2.0, 1) + 30.0 * TIME / 7.0, torque))
-    assert text.startswith("force: the reading at rest shifted by 16")
-    assert "N before the contact at 4.0" in text and "N/s just before it: the onset counts from where it was" in text
+    (fact,) = warnings_of(log(press(TIME) + noise(2.0, 1) + 30.0 * TIME / 7.0, torque))
+    assert isinstance(fact, RestLevelShifted) and fact.drift
+    assert (fact.shift, fact.onset) == (pytest.approx(16.5, abs=0.5), pytest.approx(4.05, abs=0.05))
     assert warnings_of(log(press(TIME) + noise(2.0, 1) + 7.0 * TIME / 7.0, torque)) == []
 
 
@@ -73,8 +76,8 @@ def test_a_force_next_to_nothing_that_stays_to_the_end_of_the_log_is_named():
     torque = np.column_stack((np.sin(TIME), np.cos(TIME)))
     hit = np.where((TIME > 3.0) & (TIME < 3.2), 900.0, 0.0) + noise(2.0, 1)
     assert warnings_of(log(hit, torque)) == []
-    (text,) = warnings_of(log(hit + 25.0 * (TIME > 3.1), torque))
-    assert text.startswith("force: 25 N are left at the end of the contact that began at 3.0")
+    (fact,) = warnings_of(log(hit + 25.0 * (TIME > 3.1), torque))
+    assert fact == ForceLeft(pytest.approx(25.0, abs=0.5), pytest.approx(3.0, abs=0.05))
     assert warnings_of(log(press(TIME) + noise(2.0, 1), torque)) == []
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.mcap.container.log import Log
-from cdtool.recording import Finding
 
 COMPRESSIONS = ("none", "lz4", "zstd")
 Message = tuple[str, int, bytes]

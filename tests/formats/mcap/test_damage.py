@@ -7,6 +7,8 @@ import struct
 import numpy as np
 import pytest
 
+from cdtool.findings import Finding
+from cdtool.findings.containers import LostBytes, MessageCountDiffers, Unverified
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, small_file
 
@@ -64,10 +66,9 @@ def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compressi
     assert 0 < lost < 12
     assert set(found) < set(sent)
     assert [loss.chunks for loss in log.section.losses.places] == [1]
-    assert f"a chunk of {hit.chunk_length} bytes lost, {lost} messages, " in str(findings[0])
-    seconds = (hit.message_end_time - hit.message_start_time) / 1e9
-    assert f"{seconds:.3f} s from {(hit.message_start_time - 10**9) / 1e9:.3f} s on" in str(findings[0])
-    assert any(f"says {len(sent)} messages, {len(found)} were read" in str(finding) for finding in findings)
+    span = tuple((stamp - 10**9) / 1e9 for stamp in (hit.message_start_time, hit.message_end_time))
+    assert findings[0].fact.lost == LostBytes(hit.chunk_length, True, lost, span)
+    assert Finding(MessageCountDiffers(len(sent), len(found)), severity="loss") in findings
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -93,7 +94,7 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     found, findings, log = read(path)
     assert found == sent[:-1]
     assert 0 < log.unverified < len(found)
-    assert f"{log.unverified} of {len(found)} messages without a checksum: unverified" in str(findings[-1])
+    assert findings[-1].fact == Unverified(log.unverified, len(found))
 
 
 def test_a_lost_definition_is_taken_from_the_summary(tmp_path):
@@ -127,9 +128,7 @@ def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     found, findings, log = read(path)
     assert found == sent
     assert log.unverified == len(sent)
-    assert [str(finding) for finding in findings] == [
-        f"{len(sent)} of {len(sent)} messages without a checksum: unverified"
-    ]
+    assert findings == [Finding(Unverified(len(sent), len(sent)), severity="note")]
 
 
 def test_a_message_shorter_than_its_header_ends_what_can_be_trusted(tmp_path):
@@ -159,5 +158,5 @@ def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
     path.write_bytes(path.read_bytes().replace(b"Monday", b"Friday"))
     found, findings, _ = read(path)
     assert len(found) == 1
-    assert "the checksum of an attachment does not fit" in str(findings[0])
     assert findings[0].severity == "loss"
+    assert findings[0].fact.reason == "the checksum of an attachment does not fit"

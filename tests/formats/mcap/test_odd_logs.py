@@ -10,6 +10,9 @@ from mcap.writer import Writer
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
+from cdtool.findings.clocks import OutOfOrder
+from cdtool.findings.containers import DamagedAt, LostBytes, SeveralWriters
+from cdtool.findings.messages import UndecodableMessages
 from cdtool.formats.mcap import Mcap
 from cdtool.workflows.recovering import recover
 from tests.formats.mcap.small_files import small_file
@@ -47,8 +50,8 @@ def json_state(names, position):
     return json.dumps({"name": names, "position": position}).encode()
 
 
-def texts(source):
-    return [str(finding) for finding in source.findings if finding.severity != "note"]
+def told_of(source):
+    return [finding.fact for finding in source.findings if finding.severity != "note"]
 
 
 @pytest.mark.parametrize(("late", "told"), [(2, "note"), (300, "warning")])
@@ -58,24 +61,24 @@ def test_stamps_that_run_back_are_told_with_the_message(tmp_path, late, told, su
     times[350] -= late
     path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
     source = Mcap().columns(path, None if survey else wanted(("/a", "force")))
-    (finding,) = [item for item in source.findings if "out of order" in item.message]
+    (finding,) = [item for item in source.findings if isinstance(item.fact, OutOfOrder)]
     assert finding.severity == told
-    assert f"1 of 400 messages out of order, by up to {late - 1} ms" in finding.message
-    assert (told == "note") or f"message 350 is stamped {(late - 1) / 1e3:g} s before" in finding.message
+    back = pytest.approx((late - 1) / 1e3)
+    assert finding.fact == OutOfOrder(1, 400, back, set_back=told == "warning", worst=350)
 
 
 def test_stamps_in_order_are_not_told(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
-    assert not texts(Mcap().columns(path))
+    assert not told_of(Mcap().columns(path))
 
 
 def test_two_channels_of_a_topic_are_told(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
-        assert texts(source) == ["/a: 2 channels write to it: their messages are one column, sorted by time"]
+        assert told_of(source) == [SeveralWriters(2)]
     path = write(tmp_path / "log.mcap", [(0, time, payload) for _, time, payload in messages], channels=2)
-    assert not texts(Mcap().columns(path))
+    assert not told_of(Mcap().columns(path))
 
 
 @pytest.mark.parametrize("every", [1, 3])
@@ -88,7 +91,8 @@ def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_pa
         return
     source = Mcap().columns(path, wanted(("/a", "force")))
     assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
-    assert "10 of 30 messages cannot be decoded" in texts(source)[0]
+    fact = told_of(source)[0]
+    assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (10, 30)
 
 
 def test_up_to_three_bytes_of_padding_are_none_of_the_message(tmp_path):
@@ -139,8 +143,8 @@ def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_
     small_file(second, messages=30)
     size, behind = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
-    (text,) = texts(Mcap().columns(first))
-    assert f"damaged at byte {size} (the log ends here: another file joined to it?): {behind} bytes" in text
+    (fact,) = told_of(Mcap().columns(first))
+    assert fact == DamagedAt(size, "the log ends here: another file joined to it?", LostBytes(behind))
 
 
 def test_what_is_recovered_keeps_the_profile(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from mcap.reader import make_reader
 
 from cdtool.errors import RecordingError, UsageError
+from cdtool.findings.containers import Unverified
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.records import Attachment
 from cdtool.workflows.recovering import recover
@@ -86,7 +87,7 @@ def test_without_any_checksum_nothing_is_kept_unless_it_is_asked_for(tmp_path):
     assert found == sent
     assert log.unverified == len(sent)
     assert not log.summary.verified
-    assert "24 of 24 messages without a checksum" in str(findings[0])
+    assert findings[0].fact == Unverified(24, 24)
 
 
 def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
+from cdtool.findings import Finding
+from cdtool.findings.messages import MissingMessages, UndecodableMessages
 from cdtool.formats.mcap import Mcap
 from tests.formats.mcap.small_files import small_file
 
@@ -30,16 +32,13 @@ def write(path, messages, chunk_size=400):
 
 
 def told(path):
-    return [str(found) for found in Mcap().columns(path).findings if "did not reach the log" in found.message]
+    return [found for found in Mcap().columns(path).findings if isinstance(found.fact, MissingMessages)]
 
 
 def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
     numbers = [i + 1 for i in range(400) if i not in (100, 101, 102, 300)]
     path = write(tmp_path / "log.mcap", [("/a", number - 1, number) for number in numbers])
-    text = "the numbers of its messages jump in 2 places, the first after 0.099 s: 4 did not reach the log"
-    assert told(path) == [f"/a: {text}"]
-    (finding,) = [found for found in Mcap().columns(path).findings if "numbers" in found.message]
-    assert finding.severity == "warning"
+    assert told(path) == [Finding(MissingMessages(2, 4, 0.099, of_topic=True), "/a", "warning")]
 
 
 @pytest.mark.parametrize(
@@ -63,7 +62,7 @@ def test_each_topic_is_counted_by_itself(tmp_path):
     messages += [("/b", 10 * i, i + 1) for i in range(30)]
     messages.sort(key=lambda item: item[1])
     (only,) = told(write(tmp_path / "log.mcap", messages))
-    assert only.startswith("/a: the numbers of its messages jump in one place, the first after 0.199 s: 1 did not")
+    assert only == Finding(MissingMessages(1, 1, 0.199, of_topic=True), "/a")
 
 
 def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_path):
@@ -71,7 +70,7 @@ def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_pa
     assert not told(tmp_path / "whole.mcap")
     messages = [("/b" if i % 3 == 2 else "/a", i, i + 1) for i in range(300) if not 100 <= i < 110]
     (only,) = told(write(tmp_path / "log.mcap", messages))
-    assert only == "the numbers of the messages jump in one place, the first after 0.099 s: 10 did not reach the log"
+    assert only == Finding(MissingMessages(1, 10, 0.099, of_topic=False))
 
 
 @settings(max_examples=40, deadline=None)
@@ -81,7 +80,7 @@ def test_any_loss_between_the_first_and_the_last_message_is_counted(tmp_path_fac
     found = told(write(tmp_path_factory.mktemp("jumps") / "log.mcap", messages, chunk))
     assert len(found) == bool(lost)
     if lost:
-        assert f": {len(lost)} did not reach the log" in found[0]
+        assert found[0].fact.missing == len(lost)
 
 
 def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_read(tmp_path):
@@ -96,5 +95,5 @@ def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_
         writer.finish()
     source = Mcap().columns(path)
     assert source.columns["/a v"].values.tolist() == list(range(50))
-    assert any("50 of 100 messages cannot be decoded" in str(found) for found in source.findings)
+    assert any(isinstance(found.fact, UndecodableMessages) and found.fact.count == 50 for found in source.findings)
     assert Mcap().element_names(path, "/a") == ("x",)

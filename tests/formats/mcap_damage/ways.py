@@ -10,10 +10,10 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.source import Source
-from cdtool.recording import Finding
 from tests.formats.mcap_damage.truth import FIELDS, Message
 
 # What tells messages apart: topic and value, or topic and payload.

@@ -17,6 +17,7 @@ from cdtool.evaluation.results import (
     ForceResult,
     ForceStepResult,
     PointResult,
+    RecordingFinding,
     RecordingResult,
     Results,
     Skipped,
@@ -70,7 +71,10 @@ def case(named: Naming = str, contacts: int = 12, *, limits: bool = True) -> tup
         sweep=tuple(_sweep(detector, group, i) for group in groups for detector in detectors for i in range(3)),
         calibration=(CalibrationResult(detectors[0], "1/15op", 5.5, 30, 0.06, 2),),
         skipped=(Skipped(named("broken.csv"), f"{named('broken.csv')}: {named('empty file')}"),),
-        findings=(Skipped(named("odd.csv"), named("a gap of 2 s")),),
+        findings=(
+            RecordingFinding(named("odd.csv"), named("a gap of 2 s"), "warning", named("kind"), named("channel")),
+            RecordingFinding(named("cut.csv"), named("its end"), "loss"),
+        ),
     )
     rules = [
         LimitRule(key, *(part if part == "*" else named(part) for part in (detector, group)), figure, largest=largest)

@@ -353,8 +353,9 @@ def test_a_hash_sign_in_a_logs_own_name_is_no_operation():
 
 
 def test_what_was_left_out_and_the_provenance_are_shown(page):
-    assert page.tables["skipped-table"][1] == ["broken.csv", "empty file"]
-    assert page.tables["findings-table"][1] == ["odd.csv", "a gap of 2 s"]
+    assert page.tables["skipped-table"][1:] == [["broken.csv", "empty file"]]
+    assert page.tables["damaged-table"][1:] == [["cut.csv", "its end"]]
+    assert page.tables["findings-table"][1:] == [["odd.csv", "a gap of 2 s"]]
     assert page.tables["not-assessable-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
     assert page.tables["calibration-table"][1] == ["quick (q)", "1/15op", "5.50", "2", "30", "0.0600"]
     assert ["cdtool version", "9.8.7"] in page.tables["provenance-table"]

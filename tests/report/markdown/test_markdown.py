@@ -20,6 +20,7 @@ from cdtool.evaluation.results import (
     ExposureResult,
     FalseAlarmResult,
     LimitResult,
+    RecordingFinding,
     RecordingResult,
     Results,
     Skipped,
@@ -160,13 +161,16 @@ def test_onset_rule_skipped_recordings_and_provenance_are_shown(evaluated):
 
 def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
     budget = CalibrationResult("momentum", "1/1000op", 6.5, 3000, 6.0, 1)
-    text = to_markdown(Report(evaluate(replace(results, calibration=(budget,), findings=(Skipped("a.csv", "a gap"),)))))
+    findings = (RecordingFinding("a.csv", "a gap"), RecordingFinding("b.csv", "its end is cut off", "loss"))
+    text = to_markdown(Report(evaluate(replace(results, calibration=(budget,), findings=findings))))
+    assert ["b.csv", "its end is cut off"] in rows(text) and "**2 entries of data left out or lost**" in text
     assert folded(text) == [
         "Contacts missed",
         "False alarms",
         "Contacts not assessable",
         "Samples not assessable",
         "Left out",
+        "Damaged but used",
         "Warnings",
         "False-alarm budget",
         "Recordings scored",
@@ -253,7 +257,7 @@ def nothing_is_active(text: str, tables: int) -> None:
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_are_shown_as_text(results, kind):
     name = HOSTILE[kind]
-    nothing_is_active(to_markdown(Report(named(results, name), images=(Image("a.png", name, name),))), 17)
+    nothing_is_active(to_markdown(Report(named(results, name), images=(Image("a.png", name, name),))), 18)
 
 
 @settings(max_examples=60, deadline=None)

@@ -10,6 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.containers import (
+    ChannelCountsDiffer,
+    ChunkTimesDiffer,
+    DefinedOtherwise,
+    IndexDisagrees,
+    MessageCountDiffers,
+    NoMessage,
+    SeveralWriters,
+    SummaryDamaged,
+    Unverified,
+)
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
@@ -19,10 +31,9 @@ from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
 from cdtool.formats.mcap.container.room import Piece
 from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.taken import Part, Taker
-from cdtool.plain_text import counted
-from cdtool.recording import Finding
 
 _LONGEST_HEADER = 1 << 12
 
@@ -99,6 +110,11 @@ class Log:
     def count(self) -> int:
         """Messages that were read."""
         return sum(self.counts.values())
+
+    @property
+    def topic_details(self) -> dict[str, TopicDetails]:
+        """What the file says of each topic."""
+        return {topic.name: TopicDetails(topic.schema, topic.count, topic.encoding) for topic in self.topics.values()}
 
     def expected(self, topic: str) -> int:
         """How many messages of a topic the summary foretells; 0 where nothing can be relied on."""
@@ -192,21 +208,17 @@ class Log:
         section, statistics = self.section, self.summary.statistics
         found = section.losses.findings(self.count, self.origin)
         if self.summary.problem and not section.losses.stopped:
-            text = f"the summary is damaged ({self.summary.problem}): {counted(self.count, 'message')} read without it"
-            found.append(Finding(text, severity="loss"))
+            found.append(Finding(SummaryDamaged(self.summary.problem, self.count), severity="loss"))
         if statistics is not None and statistics.message_count != self.count:
-            text = f"the file's summary says {statistics.message_count} messages, {self.count} were read"
-            found.append(Finding(text, severity="loss"))
+            found.append(Finding(MessageCountDiffers(statistics.message_count, self.count), severity="loss"))
         found += self._disagreements()
         if self.unverified:
-            text = f"{self.unverified} of {counted(self.count, 'message')} without a checksum: unverified"
-            found.append(Finding(text, severity="note"))
+            found.append(Finding(Unverified(self.unverified, self.count), severity="note"))
         for topic in self.topics.values():
             if topic.channels > 1 and self._wanted(topic.name):
-                text = f"{topic.channels} channels write to it: their messages are one column, sorted by time"
-                found.append(Finding(text, topic.name))
+                found.append(Finding(SeveralWriters(topic.channels), topic.name))
         if not self.count:
-            found.append(Finding("holds no message"))
+            found.append(Finding(NoMessage()))
         return found
 
     def _disagreements(self) -> list[Finding]:
@@ -214,32 +226,28 @@ class Log:
         section, summary = self.section, self.summary
         if section.losses or summary.problem:
             return []
-        found = []
+        found: list[Finding] = []
         chunks = section.chunks
         if summary.chunks:
             missing = len(chunks.keys() - summary.chunks.keys())
             absent = len(summary.chunks.keys() - chunks.keys())
             both = chunks.keys() & summary.chunks.keys()
             other = sum(not same_figures(summary.chunks[at], chunks[at]) for at in both)
-            for number, what in (
-                (missing, "are not in its index"),
-                (absent, "are in its index alone"),
-                (other, "have other sizes or times than its index says"),
-            ):
-                if number:
-                    found.append(Finding(f"the summary disagrees with the data: {counted(number, 'chunk', what)}"))
-        if section.other_times:
-            found.append(
-                Finding(f"{counted(section.other_times, 'chunk', 'claim')} other times than the messages have")
+            differences = (
+                IndexDisagrees(missing, "not indexed"),
+                IndexDisagrees(absent, "only indexed"),
+                IndexDisagrees(other, "other values"),
             )
+            found += [Finding(item) for item in differences if item.count]
+        if section.other_times:
+            found.append(Finding(ChunkTimesDiffer(section.other_times)))
         statistics = summary.statistics
         if statistics is not None and statistics.channel_message_counts:
             stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
             read = {channel: count for channel, count in self.counts.items() if count}
             if stated != read and statistics.message_count == self.count:
-                found.append(Finding("the summary disagrees with the data: other message counts by channel"))
-        text = "the summary defines it otherwise than the data"
-        return found + [Finding(text, topic) for topic in self._definitions.told_otherwise()]
+                found.append(Finding(ChannelCountsDiffer()))
+        return found + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.told_otherwise()]
 
 
 def profile_of(file: FileBytes) -> str:

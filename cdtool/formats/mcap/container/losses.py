@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
+from cdtool.findings import Finding
+from cdtool.findings.containers import ChunksRefused, DamagedAt, LostBytes, MessagesLost, MoreDamage
 from cdtool.formats.mcap.container.chunks import ChunkHeader
 from cdtool.formats.mcap.container.summary import Summary
-from cdtool.plain_text import counted
-from cdtool.recording import Finding
 
 _LISTED = 10
 
@@ -38,16 +38,10 @@ class Loss:
         usable = known is not None or span[0] <= span[1] < 1 << 63
         return cls(header.at, header.length, reason, 1, None, span if usable else None, refused)
 
-    def described(self, origin: int) -> str:
-        """What is lost, in words; times in seconds after `origin` [ns]."""
-        what = "a chunk of " if self.chunks else ""
-        parts = [f"{what}{self.size} bytes lost"]
-        if self.messages is not None:
-            parts.append(f"{self.messages} messages")
-        if self.time is not None:
-            start, end = ((stamp - origin) / 1e9 for stamp in self.time)
-            parts.append(f"{end - start:.3f} s from {start:.3f} s on")
-        return ", ".join(parts)
+    def since(self, origin: int) -> LostBytes:
+        """What is lost, with times in seconds after `origin` [ns]."""
+        time = None if self.time is None else ((self.time[0] - origin) / 1e9, (self.time[1] - origin) / 1e9)
+        return LostBytes(self.size, bool(self.chunks), self.messages, time)
 
 
 @dataclass
@@ -72,32 +66,24 @@ class Losses:
         found = [self._finding(loss, loss is last, count, origin) for loss in self.places[:_LISTED]]
         rest = self.places[_LISTED:]
         if rest:
-            known = sum(loss.messages or 0 for loss in rest)
-            text = f"damaged at {counted(len(rest), 'more place')}: {counted(sum(loss.size for loss in rest), 'byte')}"
-            chunks = counted(sum(loss.chunks for loss in rest), "chunk")
-            text += f" and {chunks} lost, {counted(known, 'message')} named by indexes"
-            found.append(Finding(text, severity="loss"))
+            more = MoreDamage(
+                len(rest),
+                sum(loss.size for loss in rest),
+                sum(loss.chunks for loss in rest),
+                sum(loss.messages or 0 for loss in rest),
+            )
+            found.append(Finding(more, severity="loss"))
             if last is not None:
                 found.append(self._finding(last, True, count, origin))
         for reason, lost in self.messages.items():
-            found.append(Finding(f"{reason}: {counted(lost, 'message')} lost", severity="loss"))
+            found.append(Finding(MessagesLost(reason, lost), severity="loss"))
         return found + self._refused()
 
     def _refused(self) -> list[Finding]:
         """The way out for an honest log: images of a dark camera shrink as no messages of joints and sensors do."""
         count = sum(loss.refused for loss in self.places)
-        if not count:
-            return []
-        what = counted(count, "chunk", "are")
-        text = f"{what} not damaged but refused: they would grow as only a bomb or images of nothing do"
-        way = "If the log is yours, `mcap decompress LOG -o PLAIN` (mcap.dev) makes one that is read whole"
-        return [Finding(f"{text}. {way}")]
+        return [Finding(ChunksRefused(count))] if count else []
 
     def _finding(self, loss: Loss, final: bool, count: int, origin: int) -> Finding:
-        where = f"damaged at byte {loss.at} ({' '.join(loss.reason.split())[:200]})"
-        if final:
-            behind = f"; {loss.described(origin)}" if loss.size else ""
-            return Finding(
-                f"{where}: only what lies before it was read ({counted(count, 'message')}){behind}", severity="loss"
-            )
-        return Finding(f"{where}: {loss.described(origin)}", severity="loss")
+        reason = " ".join(loss.reason.split())[:200]
+        return Finding(DamagedAt(loss.at, reason, loss.since(origin), count if final else None), severity="loss")

@@ -1,0 +1,224 @@
+"""Facts about channels: values that no sensor gives, units that disagree, channels that were derived."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import counted
+
+
+def _of_joint(joint: str) -> str:
+    return f" of joint {joint}" if joint else ""
+
+
+@dataclass(frozen=True)
+class AbsentTruth(Fact):
+    """A column or topic of ground truth that is mapped and not in the log; `similar` is the nearest name in it."""
+
+    what: Literal["column", "topic"]
+    name: str
+    similar: str = ""
+
+    def sentence(self) -> str:
+        """Return the name, and the nearest one."""
+        meant = f"; did you mean '{self.similar}'?" if self.similar else ""
+        return f"is not in this log: no {self.what} '{self.name}'{meant}"
+
+
+@dataclass(frozen=True)
+class MissingValues(Fact):
+    """Values that are NaN."""
+
+    count: int
+    values: int
+
+    def sentence(self) -> str:
+        """Return how many of how many."""
+        verb = "is" if self.count == 1 else "are"
+        return f"{self.count} of {counted(self.values, 'value')} {verb} missing (NaN)"
+
+
+@dataclass(frozen=True)
+class MaskedValues(Fact):
+    """Values that are masked; `joint` is empty where there is but one."""
+
+    count: int
+    joint: str
+
+    @property
+    @abstractmethod
+    def what(self) -> str:
+        """What the values are."""
+
+    def sentence(self) -> str:
+        """Return how many and why."""
+        verb = "is" if self.count == 1 else "are"
+        return f"{counted(self.count, 'value')}{_of_joint(self.joint)} {verb} {self.what}, masked"
+
+
+@dataclass(frozen=True)
+class InfiniteValues(MaskedValues):
+    """Infinite values."""
+
+    what = "infinite"
+
+
+@dataclass(frozen=True)
+class SaturatedValues(MaskedValues):
+    """Values at the limits of the sensor's range."""
+
+    what = "at the sensor's limit"
+
+
+@dataclass(frozen=True)
+class ImpossibleValues(MaskedValues):
+    """Values outside of the range that the machine file states, or beyond what any machine reaches."""
+
+    what = "outside the possible range"
+
+
+@dataclass(frozen=True)
+class ImplausibleValues(Fact):
+    """Values far from all that was learned: the first one, where it is, and the usual range."""
+
+    count: int
+    joint: str
+    first: float
+    time: float
+    centre: float
+    reach: float
+    unit: str
+
+    def sentence(self) -> str:
+        """Return how many, the first one, and the usual range."""
+        verb = "is" if self.count == 1 else "are"
+        return (
+            f"{counted(self.count, 'value')}{_of_joint(self.joint)} {verb} implausible (first {self.first:.4g} "
+            f"{self.unit} at {self.time:.3f} s; usual: {self.centre:.3g} +- {self.reach:.3g} {self.unit}), masked"
+        )
+
+
+@dataclass(frozen=True)
+class Leap:
+    """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values are valid again, NaN if never."""
+
+    time: float
+    before: float
+    after: float
+    new_zero: float = math.nan
+
+
+@dataclass(frozen=True)
+class LeapingValues(Fact):
+    """Values behind leaps that are faster than the machine moves."""
+
+    count: int
+    joint: str
+    leaps: tuple[Leap, ...]
+    unit: str
+
+    def sentence(self) -> str:
+        """Return how many, the first leap, and where the values count again."""
+        first = self.leaps[0]
+        text = (
+            f"{counted(self.count, 'value')}{_of_joint(self.joint)} behind {counted(len(self.leaps), 'leap')} faster "
+            f"than the machine moves (first from {first.before:.4g} to {first.after:.4g} {self.unit} at "
+            f"{first.time:.3f} s), masked"
+        )
+        zeros = [leap.new_zero for leap in self.leaps if math.isfinite(leap.new_zero)]
+        if zeros:
+            text += f"; read from a new zero from {zeros[0]:.3f} s on"
+            text += f", and at {counted(len(zeros) - 1, 'more time')}" if len(zeros) > 1 else ""
+        return text
+
+
+@dataclass(frozen=True)
+class LearnedInOtherUnit(Fact):
+    """A channel whose plausible range was learned in another unit."""
+
+    logged: str
+    learned: str
+
+    def sentence(self) -> str:
+        """Return both units."""
+        return f"logged in {self.logged}, learned in {self.learned}: not checked for implausible values"
+
+
+@dataclass(frozen=True)
+class StuckChannel(Fact):
+    """A channel that never changes while the machine moves; `joint` is empty where there is but one."""
+
+    joint: str
+
+    def sentence(self) -> str:
+        """Return the joint."""
+        return f"the value{_of_joint(self.joint)} never changes while the machine moves: stuck?"
+
+
+@dataclass(frozen=True)
+class UnitContradicted(Fact):
+    """The header of a column, and of `more` others, states another unit than the machine file.
+
+    `stated` is what the machine file says, `ratio` the factor between both units (0: they measure different things),
+    `scale_needed` the unit of a scale that the header's unit needs, `scale_unneeded`: the stated scale then goes.
+    """
+
+    header: str
+    header_unit: str
+    more: int
+    stated: str
+    ratio: float
+    advice: Literal["unit", "unit and scale", "unit without scale", "other column"]
+    scale: str = ""
+
+    def sentence(self) -> str:
+        """Return both units, and what to write if the header is right."""
+        more = f" and {self.more} more so" if self.more else ""
+        ratio = f" (a factor of {self.ratio:.4g})" if self.ratio else ""
+        text = f"the header says '{self.header}'{more}, the machine file {self.stated}{ratio}"
+        if self.advice == "other column":
+            return f"{text}: is it another column?"
+        scale = {"unit and scale": f" with a scale in {self.scale}", "unit without scale": " without that scale"}
+        return f'{text}: write unit = "{self.header_unit}"{scale.get(self.advice, "")} if the header is right'
+
+
+@dataclass(frozen=True)
+class DerivedSpeed(Fact):
+    """The speed is the derivative of the position, through two low-passes at `low_pass` [Hz]."""
+
+    low_pass: float
+
+    def sentence(self) -> str:
+        """Return how it was derived."""
+        return f"not in the log: derived causally from position (two first-order low-passes at {self.low_pass:g} Hz)"
+
+
+@dataclass(frozen=True)
+class IntegratedPosition(Fact):
+    """The position is the integral of the speed."""
+
+    def sentence(self) -> str:
+        """Return how it was derived."""
+        return "not in the log: the speed, integrated from 0"
+
+
+@dataclass(frozen=True)
+class IntegratedReference(Fact):
+    """The reference position is the integral of the reference speed."""
+
+    def sentence(self) -> str:
+        """Return how it was derived."""
+        return "not in the log: the reference speed, integrated from the first position"
+
+
+@dataclass(frozen=True)
+class LinkAccelerations(Fact):
+    """Specific forces on the links became their angular accelerations."""
+
+    def sentence(self) -> str:
+        """Return what they are now."""
+        return "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"

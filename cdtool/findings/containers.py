@@ -1,0 +1,386 @@
+"""Facts about binary containers: what they do not hold, what is lost, what their checksums and indexes say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import counted
+
+
+@dataclass(frozen=True)
+class ColumnLeftOut(Fact):
+    """A column without numbers; `what` it is instead."""
+
+    column: str
+    what: str
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.what
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
+
+    def sentence(self) -> str:
+        """Return the column and what it is."""
+        return f"column '{self.column}' is {self.what}: left out"
+
+
+@dataclass(frozen=True)
+class VariableLeftOut(Fact):
+    """A MATLAB variable without real numbers; `what` it is instead."""
+
+    variable: str
+    what: str
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.what
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.variable
+
+    def sentence(self) -> str:
+        """Return the variable and what it is."""
+        return f"variable '{self.variable}' is {self.what}: left out"
+
+
+@dataclass(frozen=True)
+class RowsAsColumns(Fact):
+    """A matrix with more columns than rows is read across."""
+
+    thing: Literal["dataset", "variable"]
+    name: str
+    rows: int
+    columns: int
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.name
+
+    def sentence(self) -> str:
+        """Return name and shape."""
+        return f"{self.thing} '{self.name}' is {self.rows} x {self.columns}: its rows are taken as columns"
+
+
+@dataclass(frozen=True)
+class PackedValues(Fact):
+    """Values are packed by the CF conventions."""
+
+    scale: float
+    offset: float
+
+    def sentence(self) -> str:
+        """Return scale and offset."""
+        return f"packed (CF): times {self.scale:g}, plus {self.offset:g}"
+
+
+@dataclass(frozen=True)
+class RoundedIntegers(Fact):
+    """Integers of more digits than float64 has."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return (
+            f"{counted(self.count, 'value')} beyond 2^53: of integers that large the last digits are rounded to float64"
+        )
+
+
+@dataclass(frozen=True)
+class RoundedColumn(Fact):
+    """A column of integers of which some have more digits than float64."""
+
+    def sentence(self) -> str:
+        """Return what is done with them."""
+        return "integers beyond 2^53 are rounded to float64"
+
+
+@dataclass(frozen=True)
+class ValuesCutOff(Fact):
+    """A column ends before its declared length: `count` values are missing from number `first` on."""
+
+    count: int
+    first: int
+
+    def sentence(self) -> str:
+        """Return how many and from where."""
+        return f"{self.count} values from number {self.first} on are missing"
+
+
+@dataclass(frozen=True)
+class NeverFinalised(Fact):
+    """The recorder did not close the file."""
+
+    def sentence(self) -> str:
+        """Return what may be missing."""
+        return "the recording was never finalised: its end may be missing"
+
+
+@dataclass(frozen=True)
+class LastSegmentIncomplete(Fact):
+    """The file ends within a segment."""
+
+    def sentence(self) -> str:
+        """Return what is lost."""
+        return "the last segment is not complete: the rest of it is lost"
+
+
+@dataclass(frozen=True)
+class CutBehindRow(Fact):
+    """The file is cut off or damaged behind a row."""
+
+    row: int
+
+    def sentence(self) -> str:
+        """Return the row."""
+        return f"the file is cut off or damaged behind row {self.row}: what came after is lost"
+
+
+@dataclass(frozen=True)
+class LibraryMessage(Fact):
+    """A line that a library wrote about the file."""
+
+    library: str
+    text: str
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.text
+
+    def sentence(self) -> str:
+        """Return the line."""
+        return f"{self.library} says: {self.text}"
+
+
+@dataclass(frozen=True)
+class BagDamaged(Fact):
+    """A ROS bag is damaged where the count of its messages does not show it; `reason` is its library's."""
+
+    reason: str
+
+    def sentence(self) -> str:
+        """Return the reason."""
+        return f"the bag is damaged: {self.reason}"
+
+
+@dataclass(frozen=True)
+class MessagesUnreadable(Fact):
+    """Of the messages of a topic so many cannot be read; `reason` is empty where the bag does not say why."""
+
+    count: int
+    messages: int
+    reason: str = ""
+
+    def sentence(self) -> str:
+        """Return how many."""
+        why = f": {self.reason}" if self.reason else ""
+        return f"{self.count} of {counted(self.messages, 'message')} cannot be read{why}"
+
+
+@dataclass(frozen=True)
+class LostBytes:
+    """What is lost at a damaged place: bytes, perhaps a chunk, its messages and its time [s], where these are known."""
+
+    size: int
+    is_chunk: bool = False
+    messages: int | None = None
+    time: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        parts = [f"{'a chunk of ' if self.is_chunk else ''}{self.size} bytes lost"]
+        if self.messages is not None:
+            parts.append(f"{self.messages} messages")
+        if self.time is not None:
+            start, end = self.time
+            parts.append(f"{end - start:.3f} s from {start:.3f} s on")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class DamagedAt(Fact):
+    """A damaged place of a file; `read_before`: nothing behind it, and so many messages before it, could be read."""
+
+    byte: int
+    reason: str
+    lost: LostBytes
+    read_before: int | None = None
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
+    def sentence(self) -> str:
+        """Return place, reason and loss."""
+        where = f"damaged at byte {self.byte} ({self.reason})"
+        if self.read_before is None:
+            return f"{where}: {self.lost}"
+        behind = f"; {self.lost}" if self.lost.size else ""
+        return f"{where}: only what lies before it was read ({counted(self.read_before, 'message')}){behind}"
+
+
+@dataclass(frozen=True)
+class MoreDamage(Fact):
+    """Damaged places that are not listed one by one."""
+
+    places: int
+    size: int
+    chunks: int
+    messages: int
+
+    def sentence(self) -> str:
+        """Return how many, and what is lost in them."""
+        return (
+            f"damaged at {counted(self.places, 'more place')}: {counted(self.size, 'byte')} and "
+            f"{counted(self.chunks, 'chunk')} lost, {counted(self.messages, 'message')} named by indexes"
+        )
+
+
+@dataclass(frozen=True)
+class MessagesLost(Fact):
+    """Single messages that are lost for one reason."""
+
+    reason: str
+    count: int
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
+    def sentence(self) -> str:
+        """Return reason and count."""
+        return f"{self.reason}: {counted(self.count, 'message')} lost"
+
+
+@dataclass(frozen=True)
+class ChunksRefused(Fact):
+    """Chunks that expand as only a bomb does, or images of a dark camera."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many, and the way out for an honest log."""
+        return (
+            f"{counted(self.count, 'chunk', 'are')} not damaged but refused: they would grow as only a bomb or images "
+            "of nothing do. If the log is yours, `mcap decompress LOG -o PLAIN` (mcap.dev) makes one that is read whole"
+        )
+
+
+@dataclass(frozen=True)
+class SummaryDamaged(Fact):
+    """The file's summary is damaged, and so many messages were read without it."""
+
+    reason: str
+    messages: int
+
+    def sentence(self) -> str:
+        """Return the reason."""
+        return f"the summary is damaged ({self.reason}): {counted(self.messages, 'message')} read without it"
+
+
+@dataclass(frozen=True)
+class MessageCountDiffers(Fact):
+    """The file's summary states another number of messages than were read."""
+
+    stated: int
+    read: int
+
+    def sentence(self) -> str:
+        """Return both numbers."""
+        return f"the file's summary says {self.stated} messages, {self.read} were read"
+
+
+@dataclass(frozen=True)
+class Unverified(Fact):
+    """Messages that no checksum covers."""
+
+    count: int
+    messages: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"{self.count} of {counted(self.messages, 'message')} without a checksum: unverified"
+
+
+@dataclass(frozen=True)
+class SeveralWriters(Fact):
+    """Several channels write to one topic."""
+
+    channels: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"{self.channels} channels write to it: their messages are one column, sorted by time"
+
+
+@dataclass(frozen=True)
+class NoMessage(Fact):
+    """A log without a message."""
+
+    def sentence(self) -> str:
+        """Return that it is empty."""
+        return "holds no message"
+
+
+@dataclass(frozen=True)
+class IndexDisagrees(Fact):
+    """Chunks that the summary's index does not have, has alone, or describes otherwise."""
+
+    count: int
+    how: Literal["not indexed", "only indexed", "other values"]
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.how
+
+    def sentence(self) -> str:
+        """Return how many."""
+        verb = {
+            "not indexed": "are not in its index",
+            "only indexed": "are in its index alone",
+            "other values": "have other sizes or times than its index says",
+        }[self.how]
+        return f"the summary disagrees with the data: {counted(self.count, 'chunk', verb)}"
+
+
+@dataclass(frozen=True)
+class ChunkTimesDiffer(Fact):
+    """Chunks whose headers claim other times than their messages have."""
+
+    chunks: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"{counted(self.chunks, 'chunk', 'claim')} other times than the messages have"
+
+
+@dataclass(frozen=True)
+class ChannelCountsDiffer(Fact):
+    """The summary states other message counts by channel."""
+
+    def sentence(self) -> str:
+        """Return what disagrees."""
+        return "the summary disagrees with the data: other message counts by channel"
+
+
+@dataclass(frozen=True)
+class DefinedOtherwise(Fact):
+    """The summary defines a topic's channel or schema otherwise than the data."""
+
+    def sentence(self) -> str:
+        """Return what disagrees."""
+        return "the summary defines it otherwise than the data"

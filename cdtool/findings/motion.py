@@ -1,0 +1,196 @@
+"""Facts about the motion in a log, and whether its channels agree with each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import counted
+
+
+@dataclass(frozen=True)
+class NoMotionMapped(Fact):
+    """Neither speed nor position is mapped."""
+
+    def sentence(self) -> str:
+        """Return what cannot be done."""
+        return "neither speed nor position is mapped: no operation can be cut or classed"
+
+
+@dataclass(frozen=True)
+class NoMotion(Fact):
+    """The axis stands still."""
+
+    def sentence(self) -> str:
+        """Return that it does not move."""
+        return "the axis does not move"
+
+
+@dataclass(frozen=True)
+class Motion(Fact):
+    """Strokes, nominal speed and main direction."""
+
+    strokes: int
+    nominal_speed: float
+    unit: str
+    direction: Literal["forward", "backward"]
+
+    def sentence(self) -> str:
+        """Return all of it."""
+        return (
+            f"{counted(self.strokes, 'stroke')} by motion; nominal speed {self.nominal_speed:.4g} {self.unit}, "
+            f"mainly {self.direction}"
+        )
+
+
+@dataclass(frozen=True)
+class SpeedUnitDoubtful(Fact):
+    """The integral of the speed and the position differ by a factor, as two units do that are named `as_between`.
+
+    `joint` is empty where there is but one.
+    """
+
+    joint: str
+    integrated: float
+    spanned: float
+    position_unit: str
+    speed_unit: str
+    as_between: str = ""
+
+    def sentence(self) -> str:
+        """Return both distances and their ratio."""
+        of = f"of {self.joint}: " if self.joint else ""
+        ratio = max(self.integrated / self.spanned, self.spanned / self.integrated)
+        between = f", as between {self.as_between}" if self.as_between else ""
+        return (
+            f"{of}integrates to {self.integrated:.4g} {self.position_unit}, the position spans {self.spanned:.4g} "
+            f"{self.position_unit} (a factor of {ratio:.4g}{between}): check the units of speed (read as "
+            f"{self.speed_unit}) and position (read as {self.position_unit})"
+        )
+
+
+@dataclass(frozen=True)
+class SpeedSignOpposite(Fact):
+    """The speed has the opposite sign of the position's derivative; `joint` is empty where there is but one."""
+
+    joint: str
+
+    def sentence(self) -> str:
+        """Return the joint."""
+        return f"{f'of {self.joint}: ' if self.joint else ''}has the opposite sign of the position's derivative"
+
+
+@dataclass(frozen=True)
+class JointsSwapped(Fact):
+    """The position of one joint follows the speed of another one."""
+
+    joint: str
+    follows: str
+
+    def sentence(self) -> str:
+        """Return both joints."""
+        return f"that of {self.joint} follows the speed of {self.follows}: columns in another order?"
+
+
+@dataclass(frozen=True)
+class BelowMinimumSpeed(Fact):
+    """The nominal speed is below the detector's `minimum` one."""
+
+    minimum: float
+
+    def sentence(self) -> str:
+        """Return the minimum."""
+        return f"nominal speed below minimum_speed ({self.minimum:g}): not applicable"
+
+
+@dataclass(frozen=True)
+class Poles(Fact):
+    """The friction EKF's poles [rad/s] at the nominal speed."""
+
+    speed: float
+    unit: str
+    slow: float
+    fast: float
+
+    def sentence(self) -> str:
+        """Return speed and poles."""
+        return f"poles at {self.speed:.3g} {self.unit}: {self.slow:.3g} and {self.fast:.3g} rad/s"
+
+
+def _of(joint: str) -> str:
+    return f" of {joint}" if joint else ""
+
+
+@dataclass(frozen=True)
+class AccelerometerUncheckable(Fact):
+    """The accelerometer cannot be checked against the speed; `joint` is empty where there is but one.
+
+    `correlation` is that with the speed's derivative, where it is what is too small.
+    """
+
+    joint: str
+    reason: Literal["joint hardly moves", "speed hardly changes", "correlation"]
+    correlation: float = 0.0
+
+    @property
+    def variant(self) -> str:
+        """What tells apart those that are not merged."""
+        return self.reason
+
+    def sentence(self) -> str:
+        """Return the reason."""
+        why = {
+            "joint hardly moves": "the joint hardly moves",
+            "speed hardly changes": "the speed hardly changes",
+            "correlation": f"correlation with the speed's derivative {self.correlation:.2f}",
+        }[self.reason]
+        return f"accelerometer{_of(self.joint)} cannot be checked: {why}"
+
+
+@dataclass(frozen=True)
+class AccelerometerFit(Fact):
+    """`slope` and `correlation` of the acceleration over the speed's derivative; the fit is good."""
+
+    joint: str
+    slope: float
+    correlation: float
+
+    @property
+    def figures(self) -> str:
+        """Slope and correlation in words."""
+        return f"slope {self.slope:.3g}, correlation {self.correlation:.2f} over the speed's derivative"
+
+    def sentence(self) -> str:
+        """Return the fit."""
+        return f"accelerometer{_of(self.joint)} fits the speed ({self.figures})"
+
+
+@dataclass(frozen=True)
+class AccelerometerTurned(AccelerometerFit):
+    """The accelerometer is mounted the other way round."""
+
+    def sentence(self) -> str:
+        """Return the fit, and the next step."""
+        return f"accelerometer{_of(self.joint)} has the opposite sign ({self.figures}): give scale = -1"
+
+
+@dataclass(frozen=True)
+class AccelerometerScaleUncheckable(AccelerometerFit):
+    """The sign is right, and the correlation too small to check the scale."""
+
+    def sentence(self) -> str:
+        """Return the fit."""
+        return f"accelerometer{_of(self.joint)}: its scale cannot be checked ({self.figures})"
+
+
+@dataclass(frozen=True)
+class AccelerometerScaleWrong(AccelerometerFit):
+    """The scale is wrong; the log may hold another unit: m/s2 where g is stated, or g."""
+
+    may_hold: Literal["m/s2", "g", ""] = ""
+
+    def sentence(self) -> str:
+        """Return the fit, and the next step."""
+        advice = {"m/s2": "the log may hold m/s2, not g", "g": "the log may hold g", "": "check unit and ratio"}
+        return f"accelerometer{_of(self.joint)} has the wrong scale ({self.figures}): {advice[self.may_hold]}"

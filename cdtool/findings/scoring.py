@@ -1,0 +1,168 @@
+"""Facts about a log, or a detector, that a command found while it scored contacts and alarms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import counted
+
+
+@dataclass(frozen=True)
+class OnsetUnseen(Fact):
+    """Load-cell samples are missing for `hole` [s] where a contact may have begun that is first seen at `time` [s].
+
+    Its latency may be up to `later` [s] longer; None: it is unknown.
+    """
+
+    contact: int
+    hole: float
+    time: float
+    later: float | None
+
+    def sentence(self) -> str:
+        """Return hole and latency."""
+        latency = "is unknown" if self.later is None else f"may be up to {1e3 * self.later:.0f} ms longer"
+        return (
+            f"load-cell samples are missing for {1e3 * self.hole:.0f} ms where contact {self.contact}, first seen at "
+            f"{self.time:.3f} s, may have begun: its latency {latency}"
+        )
+
+
+@dataclass(frozen=True)
+class PeakUnseen(Fact):
+    """Load-cell samples are missing for `hole` [s] during a contact."""
+
+    contact: int
+    hole: float
+
+    def sentence(self) -> str:
+        """Return contact and hole."""
+        return (
+            f"load-cell samples are missing for {1e3 * self.hole:.0f} ms during contact {self.contact}: "
+            "its peak may be larger than the one reported"
+        )
+
+
+@dataclass(frozen=True)
+class NoForce(Fact):
+    """A contact's force cannot be computed."""
+
+    contact: int
+    reason: str
+
+    def sentence(self) -> str:
+        """Return contact and reason."""
+        return f"contact {self.contact}: no force: {self.reason}"
+
+
+@dataclass(frozen=True)
+class ForceUnassessable(Fact):
+    """A force profile cannot assess a contact, since load-cell samples are missing."""
+
+    contact: int
+    profile: str
+    reason: str
+
+    def sentence(self) -> str:
+        """Return contact, profile and reason."""
+        return f"contact {self.contact} is not assessable by {self.profile}: {self.reason}"
+
+
+@dataclass(frozen=True)
+class LogNotCut(Fact):
+    """Of the strokes in one operation those with these numbers are not assessable."""
+
+    strokes: int
+    not_assessable: tuple[int, ...]
+
+    def sentence(self) -> str:
+        """Return the strokes, and the next step."""
+        number = self.not_assessable
+        which = f"stroke {number[0]} is" if len(number) == 1 else f"{len(number)} of them are"
+        return (
+            f"contains {counted(self.strokes, 'stroke')} in one operation, and {which} not assessable: cut it with "
+            'operations = "motion" in the benchmark file, or --operations motion'
+        )
+
+
+@dataclass(frozen=True)
+class AssumedImpactFree(Fact):
+    """Whether a log is free of impacts cannot be checked; `absent` is the ground truth that is missing from it."""
+
+    absent: str
+
+    def sentence(self) -> str:
+        """Return what is absent."""
+        return f"{self.absent}: assumed to be free of impacts"
+
+
+@dataclass(frozen=True)
+class LearnedFromIt(Fact):
+    """The signature was learned from the log."""
+
+    def sentence(self) -> str:
+        """Return what follows."""
+        return "the signature was learned from this log: the absence of alarms is no evidence"
+
+
+@dataclass(frozen=True)
+class PlotsLeftOut(Fact):
+    """Operations with a miss or a false alarm for which no trigger plot is kept."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"{self.count} more operations with a miss or a false alarm have no trigger plot"
+
+
+@dataclass(frozen=True)
+class LimitsUnchecked(Fact):
+    """Limits that are set for detectors that were not run."""
+
+    count: int
+    limits: int
+
+    def sentence(self) -> str:
+        """Return how many of how many."""
+        return f"{self.count} of {self.limits} limits are set for detectors that were not run: not checked"
+
+
+@dataclass(frozen=True)
+class DetectorLeftOut(Fact):
+    """A detector could not be run."""
+
+    reason: str
+
+    def sentence(self) -> str:
+        """Return the reason."""
+        return f"left out: {self.reason}"
+
+
+@dataclass(frozen=True)
+class DetectorUnassessable(Fact):
+    """A detector can assess none of the runs to learn from."""
+
+    reason: str
+
+    def sentence(self) -> str:
+        """Return the reason."""
+        return f"not assessable: {self.reason}"
+
+
+@dataclass(frozen=True)
+class RecordingsWithoutRow(Fact):
+    """Recordings without a row for a detector in a trigger file: they are `left_out`, or count as without an alarm."""
+
+    detector: str
+    missing: int
+    recordings: int
+    left_out: bool
+    first: str
+
+    def sentence(self) -> str:
+        """Return how many, and what they count as."""
+        share = f"{self.missing} of {counted(self.recordings, 'recording')}"
+        counted_as = "left out" if self.left_out else "counted as monitored without an alarm"
+        return f"{self.detector}: {share} without a row: {counted_as}; first {self.first}"

@@ -1,0 +1,303 @@
+"""Facts about text tables: lines, cells, marks, encodings."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import shown_lines
+
+# Of a cell so many characters are shown.
+_SHOWN = 40
+
+
+@dataclass(frozen=True)
+class CellAdvice:
+    """What to do about a cell that cannot be read: it looks like a date, a number, or a word.
+
+    `text` is the table's decimal mark for a number, the cell as TOML writes it for a word.
+    """
+
+    looks_like: Literal["time", "number", "word"]
+    text: str = ""
+
+    def __str__(self) -> str:
+        if self.looks_like == "time":
+            return 'repair it, or pin time_format in [csv], e.g. "%d.%m.%Y %H:%M:%S.%f"'
+        if self.looks_like == "number":
+            return f"decimal mark: {self.text}; empty and nan are missing values"
+        return f"if it stands for a missing value, missing = [{self.text}] in [csv] of the machine file says so"
+
+
+@dataclass(frozen=True)
+class PinnedLinesSkipped(Fact):
+    """Lines that [csv] says to skip."""
+
+    lines: tuple[int, ...]
+
+    def sentence(self) -> str:
+        """Return the lines."""
+        return f"{shown_lines(self.lines)} skipped, as [csv] says"
+
+
+@dataclass(frozen=True)
+class OtherEncoding(Fact):
+    """The text is not UTF-8."""
+
+    encoding: str
+
+    def sentence(self) -> str:
+        """Return the encoding."""
+        return f"not valid UTF-8, read as {self.encoding}"
+
+
+@dataclass(frozen=True)
+class NamedSeparator(Fact):
+    """A line names the separator, as Excel writes it."""
+
+    line: int
+    text: str
+
+    def sentence(self) -> str:
+        """Return the line."""
+        return f"line {self.line} ({self.text}) names the separator"
+
+
+@dataclass(frozen=True)
+class NumbersAboveRows(Fact):
+    """Lines with numbers above the rows were skipped."""
+
+    lines: tuple[int, ...]
+
+    def sentence(self) -> str:
+        """Return the lines, and the next step."""
+        holds = "it holds" if len(self.lines) == 1 else "they hold"
+        return (
+            f"{shown_lines(self.lines)} above the rows skipped though {holds} numbers; "
+            "skip_lines in [csv] says that they are no rows"
+        )
+
+
+@dataclass(frozen=True)
+class WordsAboveRows(Fact):
+    """Lines of words above the rows were skipped."""
+
+    lines: tuple[int, ...]
+
+    def sentence(self) -> str:
+        """Return the lines."""
+        return f"{shown_lines(self.lines)} above the rows skipped: no names, no numbers"
+
+
+@dataclass(frozen=True)
+class NamesFromComment(Fact):
+    """The columns' names are given in a comment."""
+
+    line: int
+
+    def sentence(self) -> str:
+        """Return the line."""
+        return f"the names are those of the comment in line {self.line}"
+
+
+@dataclass(frozen=True)
+class FooterSkipped(Fact):
+    """Lines below the rows that are no samples; `text` is the first of them."""
+
+    lines: tuple[int, ...]
+    text: str
+
+    def sentence(self) -> str:
+        """Return the lines and how they begin."""
+        return f"{shown_lines(self.lines)} skipped: a footer ({self.text[:_SHOWN]!r}), no sample"
+
+
+@dataclass(frozen=True)
+class DoubtfulPoint(Fact):
+    """A number such as `1.234` is read with a decimal point, though the point might separate thousands."""
+
+    text: str
+    line: int
+
+    def sentence(self) -> str:
+        """Return both readings, and how to pin one."""
+        return (
+            f"'{self.text}' (line {self.line}) is read as {self.text}, not as {self.text.replace('.', '')}: "
+            "pin decimal and thousands in [csv] if that is wrong"
+        )
+
+
+@dataclass(frozen=True)
+class NotNumeric(Fact):
+    """A column that is left out for a cell that is not a number, with the advice on that cell."""
+
+    column: str
+    line: int
+    cell: str
+    advice: CellAdvice | None = None
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
+
+    def sentence(self) -> str:
+        """Return column and cell."""
+        advice = f"; {self.advice}" if self.advice else ""
+        return (
+            f"column '{self.column}' is not numeric (line {self.line} holds {self.cell[:_SHOWN]!r}): left out{advice}"
+        )
+
+
+@dataclass(frozen=True)
+class AmbiguousTimes(Fact):
+    """A column of dates that can be read in two ways."""
+
+    column: str
+    readings: str
+
+    @property
+    def subject(self) -> str:
+        """What it is about."""
+        return self.column
+
+    def sentence(self) -> str:
+        """Return both readings, and how to pin one."""
+        return f"column '{self.column}': {self.readings}: left out; pin time_format in [csv]"
+
+
+@dataclass(frozen=True)
+class UnreadCells(Fact):
+    """Cells of a column that cannot be read; `cell` is the first of them."""
+
+    lines: tuple[int, ...]
+    cell: str
+    advice: CellAdvice
+
+    def sentence(self) -> str:
+        """Return lines, first cell and advice."""
+        return f"{shown_lines(self.lines)}: {self.cell[:_SHOWN]!r} cannot be read, taken as missing; {self.advice}"
+
+
+@dataclass(frozen=True)
+class BlankRows(Fact):
+    """Blank lines that are rows without values."""
+
+    lines: tuple[int, ...]
+
+    def sentence(self) -> str:
+        """Return the lines."""
+        return f"{shown_lines(self.lines)} blank: taken as missing samples"
+
+
+@dataclass(frozen=True)
+class SkippedLines(Fact):
+    """Lines between the rows that are no rows."""
+
+    lines: tuple[int, ...]
+
+    @property
+    @abstractmethod
+    def what(self) -> str:
+        """What stands in them."""
+
+    def sentence(self) -> str:
+        """Return the lines and what they hold."""
+        return f"{shown_lines(self.lines)} skipped: {self.what}"
+
+
+@dataclass(frozen=True)
+class BlankLines(SkippedLines):
+    """Lines without anything."""
+
+    what = "blank"
+
+
+@dataclass(frozen=True)
+class BlankSamples(SkippedLines):
+    """Lines without anything in a table of one column, where a missing sample looks the same."""
+
+    what = "blank, perhaps missing samples"
+
+
+@dataclass(frozen=True)
+class CommentLines(SkippedLines):
+    """Lines that begin with the comment mark."""
+
+    what = "comments"
+
+
+@dataclass(frozen=True)
+class HeaderLines(SkippedLines):
+    """Lines that repeat the header."""
+
+    what = "the header again"
+
+
+@dataclass(frozen=True)
+class DrawnLines(SkippedLines):
+    """Lines of dashes."""
+
+    what = "drawn lines"
+
+
+@dataclass(frozen=True)
+class WordsBelowRows(SkippedLines):
+    """Lines of words below the last row."""
+
+    what = "words below the rows"
+
+
+@dataclass(frozen=True)
+class NulLines(SkippedLines):
+    """Lines that hold NUL bytes."""
+
+    what = "damaged, they hold NUL bytes"
+
+
+@dataclass(frozen=True)
+class LastLineCut(Fact):
+    """The last line is cut off."""
+
+    line: int
+
+    def sentence(self) -> str:
+        """Return the line."""
+        return f"the last line ({self.line}) is cut off, dropped"
+
+
+@dataclass(frozen=True)
+class NulBytesAtEnd(Fact):
+    """The file ends in NUL bytes."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"the file ends in {self.count} NUL bytes: was the power lost?"
+
+
+@dataclass(frozen=True)
+class LastLineKept(Fact):
+    """The last line has no line end, and its last cell looks whole."""
+
+    line: int
+    cell: str
+
+    def sentence(self) -> str:
+        """Return line and cell."""
+        return f"the last line ({self.line}) has no line end: its last cell '{self.cell}' is taken to be whole"
+
+
+@dataclass(frozen=True)
+class LastLineDropped(Fact):
+    """The last line has no line end, and its last cell may be cut off."""
+
+    line: int
+    cell: str
+
+    def sentence(self) -> str:
+        """Return line and cell."""
+        return f"the last line ({self.line}) has no line end, and '{self.cell}' may be cut off, dropped"

@@ -1,0 +1,98 @@
+"""Facts about a load cell as the truth of a log's contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cdtool.findings.finding import Fact
+from cdtool.plain_text import digits
+
+
+def _rounded(value: float, significant: int) -> str:
+    return digits(float(f"{value:.{significant}g}"))
+
+
+@dataclass(frozen=True)
+class FollowsTorque(Fact):
+    """The force follows the torque without lag, with the correlation `r`; `joint` is empty where there is but one."""
+
+    joint: str
+    r: float
+
+    def sentence(self) -> str:
+        """Return joint and correlation."""
+        of = f" of {self.joint}" if self.joint else ""
+        return f"follows the torque{of} without lag (r = {self.r:.3f}): not an independent truth, if it is made from it"
+
+
+@dataclass(frozen=True)
+class NotTared(Fact):
+    """The load cell rests off zero [N] before its first contact at `onset` [s]."""
+
+    rest: float
+    onset: float
+
+    def sentence(self) -> str:
+        """Return the rest level."""
+        return (
+            f"the cell rests at {_rounded(self.rest, 3)} N before the contact at {self.onset:.3f} s: not tared, or "
+            "pressed already; forces count from there"
+        )
+
+
+@dataclass(frozen=True)
+class ForceBeginsLate(Fact):
+    """The load cell's record begins [s] shortly before its first contact at `onset` [s]."""
+
+    begin: float
+    onset: float
+
+    def sentence(self) -> str:
+        """Return both times."""
+        return (
+            f"begins at {self.begin:.3f} s, {1e3 * (self.onset - self.begin):.0f} ms before the contact at "
+            f"{self.onset:.3f} s: if that is the rebound of an earlier one, its latency is longer"
+        )
+
+
+@dataclass(frozen=True)
+class ForceLeft(Fact):
+    """A small force [N] is left at the end of the contact that began at `onset` [s]."""
+
+    force: float
+    onset: float
+
+    def sentence(self) -> str:
+        """Return the force."""
+        return (
+            f"{_rounded(self.force, 2)} N are left at the end of the contact that began at {self.onset:.3f} s: it "
+            "still presses, or the reading at rest has shifted and hides later contacts"
+        )
+
+
+@dataclass(frozen=True)
+class RestLevelShifted(Fact):
+    """The reading at rest shifted [N] before the contact at `onset` [s], at last by `drift` [N/s]."""
+
+    shift: float
+    onset: float
+    drift: float
+
+    def sentence(self) -> str:
+        """Return shift and drift."""
+        rate = f", {_rounded(self.drift, 2)} N/s just before it" if self.drift else ""
+        return (
+            f"the reading at rest shifted by {_rounded(self.shift, 3)} N before the contact at {self.onset:.3f} s"
+            f"{rate}: the onset counts from where it was then"
+        )
+
+
+@dataclass(frozen=True)
+class InProgress(Fact):
+    """A contact is in progress when the log begins, until `end` [s]."""
+
+    end: float
+
+    def sentence(self) -> str:
+        """Return until when."""
+        return f"a contact is in progress when it begins, until {self.end:.3f} s: its onset is not recorded"
