@@ -15,7 +15,8 @@
 * **Single callers.** Modules that only one module imports, if it is in the same folder. A module that a table names in
   a string (`"cdtool.detectors.momentum:Momentum"`) is registered and does not count.
 * **Code lines.** Lines without docstrings, comments, blank lines and imports.
-* **Complexity.** Functions above ruff's C901 (10) or PLR0913 (7); compiled kernels are left out, `noqa` is ignored.
+* **Complexity.** Functions above ruff's C901 (10) or PLR0913 (7); `noqa` is ignored. Compiled kernels are left out, and
+  the commands in cli/ from PLR0913: typer makes an option of each parameter.
 """
 
 from __future__ import annotations
@@ -498,9 +499,9 @@ def measure(show: bool) -> bool:
         by_rule = Counter(item.rule for item in found)
         add(f"functions above C901 {MOST_COMPLEX}", by_rule["C901"], 0)
         add("  the largest", max((item.size for item in found if item.rule == "C901"), default=0))
-        add(f"functions above PLR0913 {MOST_ARGUMENTS}", by_rule["PLR0913"], 0)
-        add("  the largest", max((item.size for item in found if item.rule == "PLR0913"), default=0))
-        add("  of them in cli/", sum("/cli/" in item.place for item in found if item.rule == "PLR0913"))
+        commands = [item for item in found if item.rule == "PLR0913" and "/cli/" in item.place]
+        add(f"functions above PLR0913 {MOST_ARGUMENTS}", by_rule["PLR0913"] - len(commands), 0)
+        add("  commands in cli/", len(commands))
         lists["Functions above the limits"] = [f"{item.rule} {item.size:3} {item.place}" for item in found]
     rooms = lines_by_room(modules)
     add("code lines", sum(lines for _, lines in rooms.values()), MOST_LINES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -108,7 +109,7 @@ class _Bag:
 
     def wanted(self, wanted: ChannelMap) -> tuple[dict[str, Column], list[Finding]]:
         """Return the fields of a map."""
-        topics = wanted_topics(self.path, wanted, Gathering)
+        topics = wanted_topics(self.path, wanted, partial(Gathering, expected={}))
         for stream, batch in self._batches(topics.__contains__):
             topics[stream.topic].add(stream, batch)
         held = with_topics(self.path, wanted, [name for name, (_, count) in self.topics.items() if count])

@@ -19,7 +19,7 @@ from cdtool.impact.drives import SpeedController
 from cdtool.impact.rigidity import Rigidity, rigidity
 from cdtool.impact.sensors import QUANTITIES, Sensor
 from cdtool.impact.transmission import ElasticTransmission
-from cdtool.impact.transmission_simulation import Motion, simulate_impact
+from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 _SAMPLES = 10_000
@@ -57,8 +57,7 @@ class ImpactCase:
             self.transmission,
             controller,
             self.obstacle,
-            gap=0.0,
-            load_speed=self.speed,
+            Start(gap=0.0, load_speed=self.speed),
             duration=self.window,
             samples=_SAMPLES,
         )

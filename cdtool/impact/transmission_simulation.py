@@ -65,20 +65,24 @@ class Motion:
     contacts: tuple[Contact, ...]
 
 
-def simulate_impact(  # noqa: PLR0913  every part of the simulated impact
-    transmission: Transmission,
-    drive: Drive,
-    law: ContactLaw,
-    *,
-    gap: float,
-    duration: float,
-    load_speed: float = 0.0,
-    motor_speed: float | None = None,
-    samples: int = 2000,
-) -> Motion:
-    """Solve 4.20, or 4.21 and 4.23 (corrected), from a `gap` [m] before the obstacle at `load_speed` [m/s].
+@dataclass(frozen=True)
+class Start:
+    """The state in which a simulated impact starts.
 
-    A negative gap starts pressed in. `motor_speed` [rad/s]: only behind an elastic transmission; None: as the load.
+    `gap` [m]: distance of the load from the obstacle; negative: the load already presses into it. `load_speed` [m/s].
+    `motor_speed` [rad/s]: only with an elastic transmission; None: as the load.
+    """
+
+    gap: float
+    load_speed: float = 0.0
+    motor_speed: float | None = None
+
+
+def simulate_impact(
+    transmission: Transmission, drive: Drive, law: ContactLaw, start: Start, *, duration: float, samples: int = 2000
+) -> Motion:
+    """Solve 4.20, or 4.21 and 4.23 (corrected), from `start` on.
+
     There are at least `samples` samples over `duration` [s], and a thousand more per contact. Events find touch
     and separation, relative tolerance 1e-9. Raises UsageError for values without meaning, for a law with a memory,
     where the contacts never end (a law that loses nothing against a steady push), and where the motion is far quicker
@@ -89,9 +93,9 @@ def simulate_impact(  # noqa: PLR0913  every part of the simulated impact
     if getattr(law, "permanent_indentation", 0.0):
         raise UsageError("the contact law leaves a dent", "its memory is followed by cdtool.impact.collision only")
     solver = _Solver(transmission, drive, law, duration)
-    steady = transmission.steady_torque(load_speed)
-    state = [*transmission.start(-gap, load_speed, motor_speed), *drive.start(steady), 0.0]
-    touching = gap < 0.0 or (gap == 0.0 and load_speed > 0.0)
+    steady = transmission.steady_torque(start.load_speed)
+    state = [*transmission.start(-start.gap, start.load_speed, start.motor_speed), *drive.start(steady), 0.0]
+    touching = start.gap < 0.0 or (start.gap == 0.0 and start.load_speed > 0.0)
     time, parts, contacts = 0.0, [], []
     while time < duration:
         part = solver.until_crossing(time, state, -1.0 if touching else +1.0)

@@ -6,7 +6,7 @@ Arrays grow by batches, without a copy where their length was expected; others m
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -116,7 +116,7 @@ class _FieldRows:
 
 
 class Gathering(Topic):
-    """A topic whose rows are kept in memory; `expected` is how many messages of a topic there will be, as a hint."""
+    """A topic whose rows are kept in memory; `expected` hints how many messages of a topic there will be."""
 
     def __init__(
         self,
@@ -125,12 +125,12 @@ class Gathering(Topic):
         texts: Iterable[str],
         clock: str,
         joints: Sequence[str],
-        expected: Callable[[str], int] = lambda _: 0,
+        expected: Mapping[str, int],
     ) -> None:
         super().__init__(path, topic, texts, clock, joints)
-        self._rows = {text: _FieldRows(expected(topic)) for text in self.fields}
+        self._rows = {text: _FieldRows(expected.get(topic, 0)) for text in self.fields}
         # A header's stamp may lie before 1970.
-        self._stamps = Rows(expected(topic), np.int64 if self.clock == "header" else np.uint64)
+        self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     def add(self, stream: Stream, batch: Batch) -> None:

@@ -14,7 +14,7 @@ from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.impact import Collision
-from cdtool.impact.transmission_simulation import Motion, simulate_impact
+from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 STIFFNESS = 9.8261e8
@@ -58,9 +58,9 @@ def by_bodies(law: HuntCrossley) -> tuple[float, float, float, float]:
 
 
 def by_drive(law: HuntCrossley) -> tuple[float, float, float, float]:
-    hit = simulate_impact(example.TRANSMISSION, example.TORQUE, law, gap=0.0, load_speed=0.25, duration=5e-3).contacts[
-        0
-    ]
+    hit = simulate_impact(
+        example.TRANSMISSION, example.TORQUE, law, Start(gap=0.0, load_speed=0.25), duration=5e-3
+    ).contacts[0]
     return hit.peak_force, 1e3 * hit.max_penetration, 1e3 * hit.duration, 100.0 * hit.energy_loss
 
 
@@ -149,7 +149,7 @@ def test_eight_contacts_part_and_the_ninth_stays(motion, collision):
 
 
 def test_the_load_comes_to_rest_where_the_push_is_carried():
-    settled = simulate_impact(example.TRANSMISSION, example.TORQUE, example.CONTACT, gap=1e-3, duration=1.0)
+    settled = simulate_impact(example.TRANSMISSION, example.TORQUE, example.CONTACT, Start(gap=1e-3), duration=1.0)
     assert 1e3 * settled.penetration[-1] == pytest.approx(0.01048, abs=5e-6)
     assert settled.force[-1] == pytest.approx(33.3, abs=0.05)
 

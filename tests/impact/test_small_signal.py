@@ -22,7 +22,7 @@ from cdtool.impact.linearised import (
 )
 from cdtool.impact.transfer import Transfer
 from cdtool.impact.transmission import Transmission
-from cdtool.impact.transmission_simulation import Motion, simulate_impact
+from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 DAMPED = replace(example.ELASTIC, damping=0.01, motor_friction=0.02, load_friction=5.0)
@@ -49,7 +49,9 @@ class Linear:
 def moved(
     transmission: Transmission, drive: Drive, law: ContactLaw, time: FloatArray, gap: float, speed: float = 0.0
 ) -> Motion:
-    return simulate_impact(transmission, drive, law, gap=gap, load_speed=speed, duration=float(time[-1]), samples=4000)
+    return simulate_impact(
+        transmission, drive, law, Start(gap=gap, load_speed=speed), duration=float(time[-1]), samples=4000
+    )
 
 
 def at(time: FloatArray, motion: Motion, name: str) -> FloatArray:
@@ -95,7 +97,7 @@ def test_the_momentum_of_the_load_moves_load_and_motor_as_4_27_and_4_28_say():
     # The impulse M_l v on a drive that is slack and at rest: the obstacle hits the load.
     drive, law, speed = replace(DAMPED, load_friction=0.0), Linear(1e5, 20.0), 0.3
     found = simulate_impact(
-        drive, ConstantTorque(0.0), law, gap=0.0, load_speed=speed, motor_speed=0.0, duration=0.01, samples=6000
+        drive, ConstantTorque(0.0), law, Start(gap=0.0, load_speed=speed, motor_speed=0.0), duration=0.01, samples=6000
     )
     time = np.linspace(0.0, 0.8 * found.contacts[0].duration, 1500)
     depth = penetration_by_momentum(drive, law.stiffness, law.damping)

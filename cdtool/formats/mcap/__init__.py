@@ -101,7 +101,7 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
     asked = {source.topic for source in wanted.sources}
     taker = UniformTaker(publish=wanted.time.clock == "publish")
     log = Log(path, asked.__contains__, taker=taker)
-    topics = wanted_topics(path, wanted, partial(Gathering, expected=log.expected))
+    topics = wanted_topics(path, wanted, partial(Gathering, expected={topic: log.expected(topic) for topic in asked}))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
     for piece in chain(islice(pieces, 1), ahead(pieces)):
