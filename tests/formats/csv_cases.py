@@ -20,8 +20,9 @@ Made = tuple["str | bytes", "Columns | None"]
 
 @dataclass(frozen=True)
 class Case:
-    """`content` is the file. `columns` are all that a survey gives (None: refused); `said` words of a finding or error.
+    """`content` is the file. `columns` are all that a survey gives (None: refused); `said` are words of the error.
 
+    `kind` is that of a finding, empty where none is required.
     `pins` are the lines of `[csv]` with which it is read; `clock` and `time` the column of the time and its truth [s].
     """
 
@@ -29,6 +30,7 @@ class Case:
     content: bytes
     columns: Columns | None
     said: str = ""
+    kind: str = ""
     pins: str = ""
     clock: str = ""
     time: list[float] = field(default_factory=list)
@@ -100,7 +102,8 @@ def cases(seed: int) -> list[Case]:
     for number, (name, make, told) in enumerate(_MAKERS):
         content, columns = make(Table(np.random.default_rng([seed, number])))
         raw = content.encode() if isinstance(content, str) else content
-        made.append(Case(name, raw, columns, said=told.get("said", ""), pins=told.get("pins", "")))
+        said, kind, pins = (told.get(key, "") for key in ("said", "kind", "pins"))
+        made.append(Case(name, raw, columns, said, kind, pins))
     return made
 
 
@@ -140,7 +143,7 @@ for _codec, _names in {
     "utf-16": ("t", "力", "b"),
 }.items():
     _MAKERS.append((f"letters of {_codec}", lambda table, c=_codec, n=_names: _lettered(table, c, n), {}))
-_plain("sep= of Excel", lambda table: "sep=;\r\n" + table.text(";", ",", "\r\n"), said="names the separator")
+_plain("sep= of Excel", lambda table: "sep=;\r\n" + table.text(";", ",", "\r\n"), kind="named_separator")
 _plain("sep= of a tab", lambda table: "sep=\t\r\n" + table.text("\t", end="\r\n"))
 _refused("sep= that the rows contradict", lambda table: "sep=;\n" + table.text(","), "one cell")
 _plain("blanks about the cells", lambda table: table.text(" ; "))
@@ -229,7 +232,7 @@ _refused(
 )
 
 
-@_case("a first row with a number in brackets keeps its place", said="'(1.5)' cannot be read")
+@_case("a first row with a number in brackets keeps its place", kind="unread_cells")
 def _(table: Table) -> Made:
     truth = table.truth()
     truth["a"][0] = math.nan
@@ -264,7 +267,7 @@ def _(table: Table) -> Made:
     }
 
 
-@_case("infinite, nan, empty, Microsoft's", said="")
+@_case("infinite, nan, empty, Microsoft's")
 def _(table: Table) -> Made:
     words = {
         "inf": math.inf,
@@ -321,42 +324,42 @@ _plain("a row of types", lambda table: table.text("\t", below_header="LREAL\tREA
 _plain(
     "a preamble of keys and values",
     lambda table: table.text(above="Model,MSO2024\nSample Interval,1e-3\nRecord Length,1000\n"),
-    said="above the rows",
+    kind="words_above_rows",
 )
 _plain(
     "a preamble of words",
     lambda table: table.text(";", above="Messung vom 3. April\nPrüfstand 4\n\n"),
-    said="above the rows",
+    kind="words_above_rows",
 )
 _plain("a preamble that is wider than the rows", lambda table: table.text(above="a,b,c,d,e,f,g\nh,i,j,k,l,m,n\n\n"))
 _plain("comments above", lambda table: table.text(above="# rig 3\n# 1 kHz"))
 _plain(
     "comments between the rows",
     lambda table: table.text().replace("\n" + table.t[4], "\n# paused\n" + table.t[4], 1),
-    said="comments",
+    kind="comment_lines",
 )
 _plain("comments of MATLAB", lambda table: table.text(" ", above="% made by hand\n% 1 kHz"))
-_plain("names in a comment, as NumPy writes them", lambda table: "# " + table.text(" "), said="names")
-_plain("rostopic echo -p", lambda table: "%" + table.text(), said="names")
+_plain("names in a comment, as NumPy writes them", lambda table: "# " + table.text(" "), kind="names_from_comment")
+_plain("rostopic echo -p", lambda table: "%" + table.text(), kind="names_from_comment")
 _plain("a drawn line below the names", lambda table: table.text(" | ", below_header="----+----+----"))
 _plain(
     "the header again",
     lambda table: table.text().replace("\n" + table.t[6], "\nt,a,b\n" + table.t[6], 1),
-    said="header again",
+    kind="header_lines",
 )
 _plain(
     "the header again, with units",
     lambda table: table.text(below_header="s,A,rpm").replace("\n" + table.t[6], "\nt,a,b\ns,A,rpm\n" + table.t[6], 1),
 )
-_plain("blank lines", lambda table: table.text(end="\n\n"), said="blank")
+_plain("blank lines", lambda table: table.text(end="\n\n"), kind="blank_lines")
 _plain("blank lines above", lambda table: "\n\n" + table.text())
 _plain("a separator behind every line", lambda table: table.text(";", ",", trail=";", head_trail=";"))
 _plain("a separator behind the rows only", lambda table: table.text(trail=","))
 _plain("a separator behind the header only", lambda table: table.text(head_trail=","))
 _plain("a separator behind the rows, no header", lambda table: table.text(trail=",", header=False), ("0", "1", "2"))
-_plain("a footer", lambda table: table.text() + "End of file\n", said="words below")
-_plain("a footer with sums", lambda table: table.text() + "\nSum,1.5,2\nMean,0.1,0.2\n", said="a footer")
-_plain("a footer padded to the width", lambda table: table.text(";", ",") + "End of file;;\n", said="a footer")
+_plain("a footer", lambda table: table.text() + "End of file\n", kind="words_below_rows")
+_plain("a footer with sums", lambda table: table.text() + "\nSum,1.5,2\nMean,0.1,0.2\n", kind="footer_skipped")
+_plain("a footer padded to the width", lambda table: table.text(";", ",") + "End of file;;\n", kind="footer_skipped")
 _plain(
     "a scope: x-axis and second",
     lambda table: table.text(header=False, above="x-axis,1,2\nsecond,Volt,Volt"),
@@ -401,7 +404,7 @@ def _(table: Table) -> Made:
     return "\n".join([*lines, *(",".join(row) + ",," for row in table.rows)]) + "\n", truth
 
 
-@_case("LabVIEW measurement", said="above the rows")
+@_case("LabVIEW measurement", kind="words_above_rows")
 def _(table: Table) -> Made:
     head = "LabVIEW Measurement\t\nWriter_Version\t2\nDate\t2025/04/03\n***End_of_Header***\t\n\nChannels\t2\t\n"
     head += "X_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\nX_Value\tTorque\tSpeed\tComment\n"
@@ -445,22 +448,22 @@ def _without_last(table: Table) -> Columns:
     return {name: values[:-1] for name, values in table.truth().items()}
 
 
-def _cut(name: str, cut: Callable[[str], str | bytes], said: str) -> None:
-    _MAKERS.append((name, lambda table: (cut(table.text()), _without_last(table)), {"said": said}))
+def _cut(name: str, cut: Callable[[str], str | bytes], kind: str) -> None:
+    _MAKERS.append((name, lambda table: (cut(table.text()), _without_last(table)), {"kind": kind}))
 
 
-_cut("cut within the last row", lambda text: text[: text.rindex(",")], "cut off")
-_cut("cut behind a separator", lambda text: text[: text.rindex(",") + 1], "dropped")
-_cut("cut behind a sign or the first digit", lambda text: text[: text.rindex(",") + 2], "dropped")
-_cut("cut within the last number", lambda text: text[:-2], "may be cut off")
-_cut("cut before the last decimals", lambda text: text[:-3], "dropped")
+_cut("cut within the last row", lambda text: text[: text.rindex(",")], "last_line_cut")
+_cut("cut behind a separator", lambda text: text[: text.rindex(",") + 1], "last_line_dropped")
+_cut("cut behind a sign or the first digit", lambda text: text[: text.rindex(",") + 2], "last_line_dropped")
+_cut("cut within the last number", lambda text: text[:-2], "last_line_dropped")
+_cut("cut before the last decimals", lambda text: text[:-3], "last_line_dropped")
 _plain("cut of the last line end only", lambda table: table.text(last=False))
-_plain("NUL bytes at the end", lambda table: table.text().encode() + bytes(500), said="NUL")
-_cut("cut within a row, NUL bytes behind", lambda text: text[:-4].encode() + bytes(4096), "NUL")
-_cut("cut within a row, UTF-16", lambda text: text[:-4].encode("utf-16"), "dropped")
+_plain("NUL bytes at the end", lambda table: table.text().encode() + bytes(500), kind="nul_bytes_at_end")
+_cut("cut within a row, NUL bytes behind", lambda text: text[:-4].encode() + bytes(4096), "nul_bytes_at_end")
+_cut("cut within a row, UTF-16", lambda text: text[:-4].encode("utf-16"), "last_line_dropped")
 
 
-@_case("NUL bytes between the rows", said="NUL")
+@_case("NUL bytes between the rows", kind="nul_lines")
 def _(table: Table) -> Made:
     lines = table.text().encode().splitlines(keepends=True)
     lines[5] = lines[5][:3] + bytes(40) + b"\n"
@@ -525,7 +528,7 @@ _timed(
 )
 
 
-@_case("time of day over midnight", said="midnight")
+@_case("time of day over midnight", kind="written_times")
 def _(table: Table) -> Made:
     stamps = [100 * i for i in range(table.count)]
     body = "".join(f"{_at(ms, '%H:%M:%S.%L')};{a}\n" for ms, a in zip(stamps, table.a, strict=True))

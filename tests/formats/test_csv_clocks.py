@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
+from cdtool.findings import Fact
+from cdtool.findings.clocks import BackwardStamps, WrittenTimes
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.stamps import NS, unwrapped
 from cdtool.formats.pieces import joined
@@ -16,8 +18,8 @@ SECONDS = COLUMNS.replace('"ms"', '"s"')
 START = 45231 + 13 / 24  # 2023-11-01 13:00
 
 
-def said(source) -> str:
-    return " ".join(map(str, source.findings))
+def facts(source) -> list[Fact]:
+    return [finding.fact for finding in source.findings]
 
 
 def table(stamps) -> str:
@@ -64,7 +66,7 @@ def test_minutes_and_seconds_go_on_past_the_full_hour(log, machine, pin):
     times = 3590.0 + 0.5 * np.arange(15_000)  # two hours and five minutes: past three full hours
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS + pin))
     assert recording["speed"].time.tolist() == times.tolist()
-    assert "passes the full hour 3 times; written as %M:%S.%f; in s since the full hour" in said(recording)
+    assert WrittenTimes("%M:%S.%f", "the full hour", wraps="the full hour", wrapped=3) in facts(recording)
     assert not [found for found in recording.findings if found.channel == "time"]
 
 
@@ -79,7 +81,7 @@ def test_a_stray_step_back_is_no_full_hour_and_is_told(log, machine):
     times = [*np.arange(1800.0, 1810.0), 1801.5, *np.arange(1810.0, 1820.0)]
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS))
     assert recording["speed"].time.tolist() == [*np.arange(1800.0, 1820.0)]
-    assert "1 time stamp runs backward (line 12)" in said(recording)
+    assert BackwardStamps(1, 21, (12,), "line") in facts(recording)
 
 
 def test_half_days_without_their_letters_go_on_past_noon(log, machine):

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import UsageError
+from cdtool.findings.tables import NotNumeric
 from cdtool.formats.csv import Csv, write_csv
 from tests.data_folder import data, needs_data
 from tests.noted_times import noted
@@ -70,4 +71,5 @@ def test_the_ur3e_files_are_read_whatever_their_line_ends(name):
     source = read(data("ur3e") / f"{name}.csv")
     assert len(source.names) == 175
     assert len(source.columns["target_q_0"].values) > 20
-    assert "'_id' is not numeric" in str(source.findings[0])
+    fact = source.findings[0].fact
+    assert isinstance(fact, NotNumeric) and fact.column == "_id"
