@@ -22,7 +22,7 @@ Made = tuple["str | bytes", "Columns | None"]
 class Case:
     """`content` is the file. `columns` are all that a survey gives (None: refused); `said` are words of the error.
 
-    `kind` is that of a finding, empty where none is required.
+    `kind` is that of a finding, empty where none is required; "a or b" is one of the two.
     `pins` are the lines of `[csv]` with which it is read; `clock` and `time` the column of the time and its truth [s].
     """
 
@@ -454,7 +454,11 @@ def _cut(name: str, cut: Callable[[str], str | bytes], kind: str) -> None:
 
 _cut("cut within the last row", lambda text: text[: text.rindex(",")], "last_line_cut")
 _cut("cut behind a separator", lambda text: text[: text.rindex(",") + 1], "last_line_dropped")
-_cut("cut behind a sign or the first digit", lambda text: text[: text.rindex(",") + 2], "last_line_dropped")
+_cut(
+    "cut behind a sign or the first digit",
+    lambda text: text[: text.rindex(",") + 2],
+    "last_line_cut or last_line_dropped",
+)
 _cut("cut within the last number", lambda text: text[:-2], "last_line_dropped")
 _cut("cut before the last decimals", lambda text: text[:-3], "last_line_dropped")
 _plain("cut of the last line end only", lambda table: table.text(last=False))
