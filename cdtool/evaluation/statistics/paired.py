@@ -98,11 +98,8 @@ def paired_difference(
     n, k = len(groups.values), len(groups)
     if k < 2:
         return Difference(mean, math.nan, math.nan, n, k)
-    from scipy import stats
-
     sums = groups.sums(groups.values)
-    signed_rank = float(stats.wilcoxon(sums / groups.counts).pvalue) if np.any(sums) else 1.0
-    return Difference(mean, _flipped_p(sums, seed), signed_rank, n, k)
+    return Difference(mean, _flipped_p(sums, seed), _signed_rank_p(sums / groups.counts), n, k)
 
 
 def unpaired_difference(
@@ -320,7 +317,22 @@ def _means(groups: Clusters) -> FloatArray:
     return np.asarray(groups.sums(groups.values) / groups.counts)
 
 
-def _flipped_p(sums: FloatArray, seed: int) -> float:
+def _signed_rank_p(means: FloatArray) -> float:
+    """Wilcoxon's signed-rank test of means (k,) by cluster, two-sided; zeros are left out, ties have their mean rank.
+
+    Exact up to k = 13, with ties and zeros too, where scipy's general permutation test takes a hundred times as long.
+    """
+    from scipy import stats
+
+    different = means[means != 0.0]
+    if not len(different):
+        return 1.0
+    if len(means) > MOST_ENUMERATED:
+        return float(stats.wilcoxon(means).pvalue)
+    return _flipped_p(np.sign(different) * stats.rankdata(np.abs(different)))
+
+
+def _flipped_p(sums: FloatArray, seed: int = 0) -> float:
     """Sign-flip test of sums (k,) by cluster, two-sided.
 
     By itself rather than scipy's permutation test: a product with signs is ten times as fast with thousands of them.

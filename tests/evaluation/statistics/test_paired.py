@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.bootstrap import bca
@@ -57,6 +58,13 @@ def test_signed_ranks_are_rs():
     # wilcox.test(DARWIN)$p.value, wilcox.test(UNTIED)$p.value
     assert paired_difference(DARWIN, range(15)).wilcoxon_p == pytest.approx(0.041259765625, rel=1e-12)
     assert paired_difference(UNTIED, range(8)).wilcoxon_p == pytest.approx(0.109375, rel=1e-12)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.integers(-4, 4), min_size=2, max_size=9))
+def test_signed_ranks_with_ties_and_zeros_are_those_of_scipy(values):
+    expected = float(stats.wilcoxon(values).pvalue) if any(values) else 1.0
+    assert paired_difference(values, range(len(values))).wilcoxon_p == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_contacts_of_a_recording_change_sign_together():
