@@ -77,7 +77,7 @@ def test_an_alarm_shows_channels_in_order_signal_margin_onset_and_debounce(drawn
 
 def test_a_missed_contact_has_a_mark_where_the_signal_was_nearest_to_its_limit(drawn):
     shown = drawn(50.0)
-    assert "missed: no alarm in the 1000 ms" in shown and "nearest, " in shown
+    assert "missed: no alarm within 1000 ms" in shown and "nearest, " in shown
     assert "outside for" not in shown and "\nalarm\n" not in shown
 
 
