@@ -99,7 +99,7 @@ def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp
     for more, words in (
         ("[detectors.tr]\ncut = 5.0\n", "detectors.tr.cut: unknown gain (did you mean cutoff?"),
         ("[detectors.tr]\ncutoff = -1\n", "detectors.tr: gain cutoff is -1"),
-        ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: is torque_rate again"),
+        ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: repeats torque_rate"),
     ):
         wrong = command("detect", log, "-m", machine_with(tmp_path, "\n" + more), "-d", "tr", "--limit", 4)
         assert wrong.returncode == 2 and words in wrong.stderr and wrong.stderr.count("\n") == 1, wrong.stderr

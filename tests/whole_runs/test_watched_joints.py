@@ -88,7 +88,7 @@ def test_limits_set_by_hand_monitor_the_chosen_joints(forearm):
 def test_a_joint_that_the_machine_does_not_have_is_refused_by_name(forearm, tmp_path):
     text = (forearm / "benchmark.toml").read_text().replace('joints = ["forearm"]', 'joints = ["wrist"]')
     (forearm / "wrong.toml").write_text(text)
-    with pytest.raises(ConfigurationError, match=r"joints: names 'wrist'"):
+    with pytest.raises(ConfigurationError, match=r"joints: contains 'wrist'"):
         api.benchmark(forearm / "wrong.toml")
     free = sorted((forearm / "free").iterdir())
     command = ("learn-signature", *free, "-m", forearm / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")

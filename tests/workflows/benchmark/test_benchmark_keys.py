@@ -154,7 +154,7 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofile = "en_12453"\n', "force.profile: unknown force profile 'en_12453'.*en_12453_reducing_gap"),
         (
             '[impacts.x]\nlogs = ["holdout/*.csv"]\nforce_profile = "yard"\n',
-            "x.force_profile: .*'yard': .force. limits does not name",
+            "x.force_profile: .*'yard'; .force. limits does not name",
         ),
         ('[force]\nprofile = "yard"\nfile = "yard.toml"\n', "force.file: unknown key"),
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
