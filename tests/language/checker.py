@@ -1,11 +1,11 @@
 """Check the project's texts for phrases that are not plain technical English.
 
-    python -m tests.language.checker [FILE ...]
+    python -m tests.language.checker [FILE|FOLDER ...]
 
-Without files, it checks all Python and Markdown files under version control. It exits with 1 if it finds a phrase, and
-prints each as file:line: "phrase": what to write in its place. A line that needs the phrase gives its reason in itself:
-`# language: reason` in Python, `<!-- language: reason -->` in Markdown. After the closing quotes of a docstring that
-counts for the whole docstring.
+Without arguments, it checks all Python and Markdown files under version control. It exits with 1 if it finds a phrase,
+and prints each as file:line: "phrase": what to write in its place. A line that needs the phrase gives its reason in
+itself: `# language: reason` in Python, `<!-- language: reason -->` in Markdown. After the closing quotes of a docstring
+that counts for the whole docstring.
 """
 
 from __future__ import annotations
@@ -106,10 +106,19 @@ def is_listed(name: str, entry: str) -> bool:
     return name == entry or name.startswith(f"{entry}/")
 
 
+def files_of(path: Path) -> list[Path]:
+    """Return the file itself, or the Python and Markdown files below a folder in order of their names."""
+    return sorted(file for file in path.rglob("*") if file.suffix in (".py", ".md")) if path.is_dir() else [path]
+
+
 def main(arguments: list[str], root: Path = ROOT) -> int:
-    """Print the hits in the given files, or in all that are not still to be rewritten; return the exit status."""
+    """Print the hits in the given files or folders, or in all files not in TO_REWRITE; return the exit status."""
     if arguments:
-        names = [Path(argument).resolve().relative_to(root).as_posix() for argument in arguments]
+        given = [Path(argument).resolve() for argument in arguments]
+        if unknown := [str(path) for path in given if not path.exists()]:
+            print(f"{', '.join(unknown)}: no such file or folder (check the path)", file=sys.stderr)
+            return 2
+        names = [file.relative_to(root).as_posix() for path in given for file in files_of(path)]
     else:
         names = [name for name in versioned_files(root) if not is_to_rewrite(name)]
     hits = check(names, root)

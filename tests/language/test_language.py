@@ -120,3 +120,15 @@ def test_strings_and_comments_are_those_of_the_tokenizer(file):
     assert [(found.start(), found[0]) for found in strings_and_comments(source)] == list(
         zip(begins, (token.string for token in texts), strict=True)
     )
+
+
+def test_a_folder_is_checked_with_all_its_files_and_an_unknown_path_is_one_line(tmp_path, capsys):
+    (tmp_path / "room" / "inner").mkdir(parents=True)
+    (tmp_path / "room" / "plain.md").write_text("The log is short.\n", encoding="utf-8")
+    phrase = next(iter(PHRASES.values()))
+    assert main([str(tmp_path / "room")], tmp_path) == 0
+    (tmp_path / "room" / "inner" / "odd.md").write_text(phrase.hit + "\n", encoding="utf-8")
+    assert main([str(tmp_path / "room")], tmp_path) == 1
+    assert "room/inner/odd.md:1" in capsys.readouterr().out
+    assert main([str(tmp_path / "no_such_room")], tmp_path) == 2
+    assert capsys.readouterr().err.count("\n") == 1
