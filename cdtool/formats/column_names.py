@@ -88,19 +88,6 @@ def is_absent(column: str | int, names: Sequence[str]) -> bool:
     return column_key(column, names) is None and (isinstance(column, int) or not _alike(column, names))
 
 
-def with_topics(path: Path, wanted: ChannelMap, known: Sequence[str]) -> ChannelMap:
-    """The map without the ground truth that no message of a log holds; raises RecordingError for any other channel."""
-    held = tuple(item for item in wanted.sources if item.topic in known or item.channel not in GROUND_TRUTH)
-    for item in held:
-        if item.topic not in known:
-            raise RecordingError(
-                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')",
-                nearest(item.topic, known),
-                channel=item.channel,
-            )
-    return replace(wanted, sources=held)
-
-
 def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
     """Return the map with the file's own names of its columns (`keys`), without the ground truth that it does not hold.
 

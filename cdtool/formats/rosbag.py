@@ -15,7 +15,6 @@ from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.containers import BagDamaged, MessagesUnreadable
-from cdtool.formats.column_names import with_topics
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source, TopicDetails
@@ -112,8 +111,8 @@ class _Bag:
         topics = wanted_topics(self.path, wanted, partial(Gathering, expected={}))
         for stream, batch in self._batches(topics.__contains__):
             topics[stream.topic].add(stream, batch)
-        held = with_topics(self.path, wanted, [name for name, (_, count) in self.topics.items() if count])
-        columns, findings, self.origin = wanted_columns(self.path, held, topics, self.origin)
+        logged = [name for name, (_, count) in self.topics.items() if count]
+        columns, findings, self.origin = wanted_columns(self.path, wanted, topics, logged, self.origin)
         return columns, self._losses() + findings
 
     def _batches(self, asked: Callable[[str], bool]) -> Iterator[tuple[Stream, Batch]]:

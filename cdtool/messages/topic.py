@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
-from cdtool.errors import RecordingError
+from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
 from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.messages.batch import Batch
@@ -22,7 +23,7 @@ from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import FieldMissingError, missing, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.messages.stream import Stream
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.recording import GROUND_TRUTH, BoolArray, FloatArray
 
 # A field's values in a batch, None: of an array whose width is not known yet, all are empty; and which messages name
 # other joints only, None: none of them does.
@@ -141,13 +142,17 @@ def wanted_topics(
 
 
 def wanted_columns(
-    path: Path, wanted: ChannelMap, topics: Mapping[str, Topic], origin: int
+    path: Path, wanted: ChannelMap, topics: Mapping[str, Topic], logged: Sequence[str], origin: int
 ) -> tuple[dict[str, Column], list[Finding], int]:
-    """Return the columns of a map whose topics the log holds, their findings, and what their times count from [ns].
+    """Return the columns of a map, their findings, and what their times count from [ns].
 
-    A header's clock may be another one (simulated time): its own first stamp is its origin; by the log's clock it is
-    `origin`. Raises RecordingError where no message of a topic can be decoded, or a field's messages do not agree.
+    `logged` are the topics that have messages; ground truth of any other topic has no column. A header's clock may be
+    another one (simulated time): its own first stamp is its origin; by the log's clock it is `origin`.
+
+    Raises RecordingError where no message of a topic can be decoded, a field's messages do not agree, or the topic of
+    another channel has no message.
     """
+    wanted = _logged_only(path, wanted, logged)
     findings: list[Finding] = []
     for name in dict.fromkeys(source.topic for source in wanted.sources):
         findings += topics[name].decoders.told(f"{path}", name) + topics[name].orders.findings()
@@ -161,6 +166,19 @@ def wanted_columns(
             columns[source.described], found = topics[source.topic].column(source.field)
             findings += found
     return columns, findings, origin
+
+
+def _logged_only(path: Path, wanted: ChannelMap, logged: Sequence[str]) -> ChannelMap:
+    """Return the map without ground truth whose topic has no message; raises RecordingError for any other channel."""
+    sources = tuple(item for item in wanted.sources if item.topic in logged or item.channel not in GROUND_TRUTH)
+    for item in sources:
+        if item.topic not in logged:
+            raise RecordingError(
+                f"{path}: no message of topic '{item.topic}' (channel '{item.channel}')",
+                nearest(item.topic, logged),
+                channel=item.channel,
+            )
+    return replace(wanted, sources=sources)
 
 
 def tally(counts: npt.NDArray[np.int64]) -> Counter[int]:

@@ -15,7 +15,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
@@ -197,8 +196,8 @@ class MappedFields:
 
 def mapped_source_of(log: Log, wanted: ChannelMap, topics: Mapping[str, Topic]) -> tuple[Source, int]:
     """Return the columns of a map, once the log was run through, and what their times count from [ns]."""
-    held = with_topics(log.path, wanted, [topic.name for topic in log.topics.values() if topic.count])
-    columns, findings, origin = wanted_columns(log.path, held, topics, log.origin)
+    logged = [topic.name for topic in log.topics.values() if topic.count]
+    columns, findings, origin = wanted_columns(log.path, wanted, topics, logged, log.origin)
     return source_of(log, columns, log.findings() + findings, origin), origin
 
 
