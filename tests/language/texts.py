@@ -9,10 +9,10 @@ from collections.abc import Iterator
 # Strings and comments of Python. A test compares them with those of tokenize, which takes ten times as long.
 _TOKEN = re.compile(
     r"""(?P<prefix>\b[rbuf]{1,2})?(?P<quote>'''|\"""|'|")
-        (?P<body>(?:(?<=''')(?:[^'\\]|\\.|'(?!''))*+
-                   |(?<=\""")(?:[^"\\]|\\.|"(?!""))*+
-                   |(?<!'')(?<=')(?:[^'\\\n]|\\.)*+
-                   |(?<!"")(?<=")(?:[^"\\\n]|\\.)*+))(?P=quote)
+        (?P<body>(?:(?<=''')[^'\\]*(?:(?:\\.|'(?!''))[^'\\]*)*
+                   |(?<=\"\"")[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*
+                   |(?<!'')(?<=')[^'\\\n]*(?:\\.[^'\\\n]*)*
+                   |(?<!"")(?<=")[^"\\\n]*(?:\\.[^"\\\n]*)*))(?P=quote)
         |\#(?P<comment>[^\n]*)""",
     re.IGNORECASE | re.DOTALL | re.VERBOSE,
 )
