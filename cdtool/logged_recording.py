@@ -12,7 +12,7 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class LoggedRecording:
-    """A log's channels as logged, in SI: not yet referred to the load side; `factors` led there from its numbers.
+    """A log's channels as logged, in SI, not yet on the load side; `factors` converted the logged numbers to SI.
 
     `format`, `details` and, of a table of text, `dialect` are what its files state.
     """

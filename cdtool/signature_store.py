@@ -61,8 +61,8 @@ def read_signature(path: str | Path) -> SignatureFile:
         raise _no_signature(file, content)
     if values.get("schema_version") not in _READABLE:
         raise SignatureError(
-            f"{file}: schema_version is {value_in_words(values.get('schema_version'))}, this cdtool reads "
-            f"{' and '.join(map(str, _READABLE))}",
+            f"{file}: schema_version is {value_in_words(values.get('schema_version'))}; this version of cdtool "
+            f"reads {' and '.join(map(str, _READABLE))}",
             "relearn it with this version",
         )
     try:

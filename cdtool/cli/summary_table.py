@@ -65,7 +65,7 @@ def show_table(evaluated: Evaluated) -> None:
 
 
 def show_conclusion(evaluated: Evaluated) -> None:
-    """The first lines on screen: the conclusion, then what of limits, force profiles and contacts is not good."""
+    """Print the conclusion, then limits, force profiles and contacts with a problem."""
     from cdtool.report.model import counts_text
 
     conclusion = evaluated.results.conclusion
@@ -117,7 +117,7 @@ def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
 
 
 def _latency(item: Summary, column: LatencyColumn) -> str:
-    """A figure of the latency; the intervals of quantiles only where they stand for that of a mean."""
+    """Return a latency with its interval; quantiles have theirs only if they replace the mean."""
     from cdtool.report.few_contacts import latency_interval
 
     if column == "range":

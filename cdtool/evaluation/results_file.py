@@ -26,19 +26,19 @@ from cdtool.value_words import value_in_words
 Row = TypeVar("Row")
 # Rows of a detector, of a group or of both.
 _TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
-# Earlier versions that are read: 2 has "kept", "broken" and "not assessable", no conclusion; in 3 what is lost of a
-# recording is listed as left out, and the rule of the onset names the label file.
+# Earlier versions that can be read: 2 has "kept", "broken" and "not assessable", and no conclusion; 3 lists lost data
+# of a recording as skipped, and names the label file in the rule of the onset.
 _SPACED_WORDS, _LOSSES_LEFT_OUT = 2, 3
 _READABLE = (_SPACED_WORDS, _LOSSES_LEFT_OUT, SCHEMA_VERSION)
-# How version 3 and 2 write these.
+# How versions 2 and 3 write these.
 _DAMAGED = "damaged, used as far as it goes: "
 _LABEL_FILE = "; label file "
 _IN_SAMPLES = re.compile(r"\bfor \d+ samples?\b")
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
-_PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+_PLAIN = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
 _SCHEMA_TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
-# What text may be, where it is one of a few words: for one class, or for every one that has the field.
+# The possible values of a text field: of one class, or of every class that has the field.
 WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
     (ContactResult, "outcome"): ("detected", "missed", "not_assessable", "in_progress"),
     (LimitResult, "outcome"): ("met", "violated", "not_assessable"),
@@ -104,17 +104,17 @@ def read_results(path: Path) -> Results:
     if other := _other_kind(path, content):
         raise other
     if not isinstance(values, dict) or "schema_version" not in values:
-        raise _no_results(path, "no schema_version in it")
+        raise _no_results(path, "it has no schema_version")
     if values["schema_version"] not in _READABLE:
-        known = f"this cdtool knows {', '.join(map(str, _READABLE[:-1]))} and {SCHEMA_VERSION}"
+        known = f"this version of cdtool reads {', '.join(map(str, _READABLE[:-1]))} and {SCHEMA_VERSION}"
         raise RecordingError(
-            f"{path}: schema_version is {value_in_words(values['schema_version'])}, {known}",
+            f"{path}: schema_version is {value_in_words(values['schema_version'])}; {known}",
             "run cdtool benchmark again with this version",
         )
     try:
         values = migrated(values)
         results = build(Results, values, "results")
-        _refuse_strangers(results)
+        _refuse_unlisted(results)
     except ValueError as fault:
         raise _no_results(path, str(fault)) from fault
     return results
@@ -124,11 +124,11 @@ def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of an earlier schema_version as those of this one."""
     if values["schema_version"] == _SPACED_WORDS:
         values = _with_joined_words(values)
-    return _with_losses_apart(values) if values["schema_version"] == _LOSSES_LEFT_OUT else dict(values)
+    return _with_losses_as_findings(values) if values["schema_version"] == _LOSSES_LEFT_OUT else dict(values)
 
 
 def _with_joined_words(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of schema_version 2 as those of version 3: other words for verdicts, no conclusion yet."""
+    """Return values of schema_version 2 as those of version 3: it has other words for verdicts, and no conclusion."""
 
     def renamed(rows: Any, name: str) -> Any:
         if not isinstance(rows, list):
@@ -147,10 +147,10 @@ def _with_joined_words(values: Mapping[str, Any]) -> dict[str, Any]:
     return {**values, **tables, "schema_version": _LOSSES_LEFT_OUT}
 
 
-def _with_losses_apart(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of schema_version 3 as those of version 4: losses are findings, the onset's rule is apart.
+def _with_losses_as_findings(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of schema_version 3 as those of version 4: losses are findings, the label file is separate.
 
-    `onset_unit` of the provenance is then "samples" where the onset was counted in these.
+    `onset_unit` of the provenance becomes "samples" if the rule counts samples.
     """
     made = {**values, "schema_version": SCHEMA_VERSION}
     skipped, findings = values.get("skipped", []), values.get("findings", [])
@@ -178,7 +178,7 @@ def _is_loss(row: Any) -> bool:
 def build(kind: type[Row], values: Any, where: str) -> Row:
     """Return a dataclass from JSON values, checked field by field; raises ValueError that names the field."""
     if not isinstance(values, dict):
-        raise ValueError(f"{where} is no object")
+        raise ValueError(f"{where} is not an object")
     known = _field_types(kind)  # type: ignore[arg-type]
     for name in values:
         if name not in known:
@@ -190,11 +190,11 @@ def build(kind: type[Row], values: Any, where: str) -> Row:
     for name, value in made.items():
         words = WORDS.get((kind, name)) or WORDS.get(name)
         if words and value is not None and value not in words:
-            raise ValueError(f"{where}.{name} is '{value}', none of {', '.join(words)}")
+            raise ValueError(f"{where}.{name} is '{value}', not one of {', '.join(words)}")
     return kind(**made)
 
 
-def _refuse_strangers(results: Results) -> None:
+def _refuse_unlisted(results: Results) -> None:
     """Raise ValueError for a row of a detector or group that the results do not list."""
     for table in _TABLES:
         for i, row in enumerate(getattr(results, table)):
@@ -214,19 +214,19 @@ def _value(kind: Any, value: Any, where: str) -> Any:
         return _value(kind, value, where)
     if origin is tuple:
         if not isinstance(value, list):
-            raise ValueError(f"{where} is no list")
+            raise ValueError(f"{where} is not a list")
         item_kind = get_args(kind)[0]
         return tuple(_value(item_kind, item, f"{where}[{i}]") for i, item in enumerate(value))
     if origin is not None:
         if not isinstance(value, dict):
-            raise ValueError(f"{where} is no object")
+            raise ValueError(f"{where} is not an object")
         return value
     if is_dataclass(kind):
         return build(kind, value, where)  # type: ignore[arg-type]
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if kind is not Any and (not isinstance(value, kind) or (kind is int and isinstance(value, bool))):
-        raise ValueError(f"{where} is {json.dumps(value, ensure_ascii=False)}, no {_PLAIN[kind]}")
+        raise ValueError(f"{where} is {json.dumps(value, ensure_ascii=False)}, not {_PLAIN[kind]}")
     return value
 
 
@@ -242,7 +242,7 @@ def _required(kind: Any) -> tuple[str, ...]:
 
 
 def _other_kind(path: Path, content: bytes) -> RecordingError | None:
-    """Return the error for a file that is known to be of another kind; a results file may begin as any JSON does."""
+    """Return the error for a file that is recognised as another kind; a results file may begin like any JSON file."""
     kind = kind_of(content)
     if not kind or kind in ("a results file", "JSON"):
         return None

@@ -214,7 +214,7 @@ def _named_ones(
 
 
 def _doubt(steps: Distribution, *, named: bool) -> Fact | None:
-    """Return the problem with the steps of a clock, or of a column that is `named` as one; None for no problem."""
+    """Return the problem with the steps of a clock, or None; `named`: a column with the name of a clock."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
         return StandingClock(steps.count + 1, named)

@@ -125,7 +125,7 @@ def test_the_words_of_the_onset_name_the_label_file():
 def test_another_version_is_named_with_a_hint(tmp_path):
     path = tmp_path / "results.json"
     path.write_text(to_json(RESULTS).replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
-    with pytest.raises(RecordingError, match=r"schema_version is 99, this cdtool knows 2") as fault:
+    with pytest.raises(RecordingError, match=r"schema_version is 99; this version of cdtool reads 2") as fault:
         read_results(path)
     assert "benchmark" in fault.value.hint
 
@@ -133,22 +133,22 @@ def test_another_version_is_named_with_a_hint(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"latency_ms": 10.0', '"latency_ms": "10"', r'results\.contacts\[0\]\.latency_ms is "10", no number$'),
-        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is true, no whole number$"),
-        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, no whole number$"),
+        ('"latency_ms": 10.0', '"latency_ms": "10"', r'results\.contacts\[0\]\.latency_ms is "10", not a number$'),
+        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is true, not a whole number$"),
+        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, not a whole number$"),
         ('"clipped": false', '"cliped": false', r"unknown field 'cliped'"),
         ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: onset_s missing$"),
-        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is null, no number$"),
-        ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is no list"),
+        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is null, not a number$"),
+        ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is not a list"),
         (
             '"outcome": "missed"',
             '"outcome": "mised"',
-            r"contacts\[3\]\.outcome is .mised., none of detected, missed, not_assessable, in_progress$",
+            r"contacts\[3\]\.outcome is .mised., not one of detected, missed, not_assessable, in_progress$",
         ),
         (
             '"outcome": "violated"',
             '"outcome": "brokn"',
-            r"limits\[0\]\.outcome is .brokn., none of met, violated",
+            r"limits\[0\]\.outcome is .brokn., not one of met, violated",
         ),
         (
             '"detector": "momentum"',

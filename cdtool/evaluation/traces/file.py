@@ -120,8 +120,8 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
         values = unpack_json(content)
         if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
             raise RecordingError(
-                f"{path}: schema_version is {values['schema_version']}, "
-                f"this cdtool knows {_SPACED_WORDS} and {SCHEMA_VERSION}",
+                f"{path}: schema_version is {values['schema_version']}; "
+                f"this version of cdtool reads {_SPACED_WORDS} and {SCHEMA_VERSION}",
                 "run cdtool benchmark again",
             )
         if results is not None and values["results_sha256"] != _digest(results):

@@ -1,6 +1,6 @@
-"""What is wrong with a log itself, whatever detector looks at it: one answer for every command.
+"""Findings about a log itself, independent of the detector and identical in every command.
 
-Two channels check each other: the accelerometer's sign and scale against the derivative of the speed.
+The sign and scale of the accelerometer are checked against the derivative of the speed.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from cdtool.findings.motion import (
 from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.workflows.log_checks.motion_check import motion_findings
 
-# Both sides are compared over windows of this length [s]: the speed's gain against the mean acceleration.
+# Length of the windows over which the change of speed and the mean acceleration are compared [s].
 _WINDOW = 0.2
-# Below this correlation the motion does not say enough about the sign, or about the scale.
-_TELLING, _TELLING_SCALE = 0.5, 0.8
-# Below this share of the fastest joint's range of speed a joint hardly moves: its drive's vibration is all that shows.
+# Least correlation at which the sign, or the scale, can be checked.
+_LEAST_FOR_SIGN, _LEAST_FOR_SCALE = 0.5, 0.8
+# Below this share of the fastest joint's speed range a joint hardly moves: the accelerometer shows only vibration.
 _HARDLY = 0.1
 _STANDARD_GRAVITY = 9.80665
 
@@ -36,20 +36,20 @@ _STANDARD_GRAVITY = 9.80665
 def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> tuple[Finding, ...]:
     """Return the findings of reading a log, and those about its motion, accelerometer and load cell, worst first.
 
-    `contacts` are those that the log shows by `rule`.
+    `contacts` are the log's contacts by `rule`.
     """
     found = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording, contacts)]
     return worst_first(dict.fromkeys([*found, *truth_findings(recording, contacts, rule)]))
 
 
 def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[RecordingFinding]:
-    """Return the warnings among the findings of a log, under its name; losses are reported by `runs.lost`."""
+    """Return the warnings among the findings of a log, with its name; `runs.lost` returns the losses."""
     found = log_findings(recording, contacts, rule)
     return [RecordingFinding.of(recording.name, item) for item in found if item.severity == "warning"]
 
 
 def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
-    """Slope of the measured acceleration over the speed's derivative before the first contact, joint by joint."""
+    """Return one finding per joint: the measured acceleration against the derivative of the speed before contact."""
     recording = _before_contact(recording, contacts)
     if "acceleration" not in recording or "speed" not in recording:
         return []
@@ -72,7 +72,7 @@ def _range(values: FloatArray) -> float:
 
 
 def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Recording:
-    """In a contact the elastic drive parts motor and load: only what lies before the first one can be compared."""
+    """Return the part before the first contact: during contact the elastic drive separates motor and load."""
     since = contacts[0].end if contacts and contacts[0].in_progress else -np.inf
     first = next((contact.start for contact in contacts if not contact.in_progress), np.inf)
     return recording.between(since, first) if contacts else recording
@@ -83,13 +83,13 @@ def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
         return AccelerometerUncheckable(joint, "speed hardly changes")
     correlation = float(np.corrcoef(expected, measured)[0, 1])
     slope = float(np.polyfit(expected, measured, 1)[0])
-    if abs(correlation) < _TELLING:
+    if abs(correlation) < _LEAST_FOR_SIGN:
         return AccelerometerUncheckable(joint, "correlation", correlation)
     if slope < 0.0:
         return AccelerometerTurned(joint, slope, correlation)
     if _fits(slope):
         return AccelerometerFit(joint, slope, correlation)
-    if correlation < _TELLING_SCALE:
+    if correlation < _LEAST_FOR_SCALE:
         return AccelerometerScaleUncheckable(joint, slope, correlation)
     if _fits(slope / _STANDARD_GRAVITY):
         return AccelerometerScaleWrong(joint, slope, correlation, "m/s2")
@@ -99,12 +99,12 @@ def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
 
 
 def _fits(slope: float) -> bool:
-    """Whether the accelerometer's scale is about right."""
+    """Whether the slope is that of a correct scale."""
     return 0.7 < slope < 1.4
 
 
 def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Over successive windows: the speed's gain / window, and the mean acceleration."""
+    """Return the change of speed per time and the mean acceleration in consecutive windows, (w,) each."""
     speed, acceleration = recording["speed"], recording["acceleration"]
     edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), _WINDOW)
     if len(edges) < 3:

@@ -1,4 +1,4 @@
-"""Does a recording move, do its speed and position agree, and how fast can the friction EKF be on it?"""
+"""Findings about the motion in a log: strokes, agreement of speed and position, bandwidth of the friction EKF."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from cdtool.motion import motion_class
 from cdtool.operations import operations_of
 from cdtool.recording import FloatArray, Recording, Series
 
-# Two joints whose positions correlate with the integrals of their own speeds less than the first of these, and of which
-# one correlates with the other's more than the second, have their columns mixed up.
+# The columns of two joints are exchanged if both positions correlate with the integral of their own speed by less than
+# the first value, and one with that of the other joint by more than the second.
 _OWN_FIT, _OTHER_FIT = 0.9, 0.99
-# Below this share of the largest movement a joint hardly moves: noise and offset of its speed, added up, say nothing.
+# Below this share of the largest movement a joint hardly moves: its integrated speed is noise and offset.
 _HARDLY = 0.01
 _PARTS, _ABOVE_NOISE = 50, 10.0
 _FACTORS = (
@@ -41,7 +41,7 @@ _FACTORS = (
 
 
 def motion_findings(recording: Recording) -> list[Finding]:
-    """How the machine moves and how many operations that makes; what does not fit together."""
+    """Return the number of strokes, speed and direction, and where speed and position disagree."""
     if "speed" not in recording:
         return [Finding(NoMotionMapped(), "speed", "note")]
     motion = motion_class(recording)
@@ -57,7 +57,7 @@ def motion_findings(recording: Recording) -> list[Finding]:
 
 
 def _consistency(recording: Recording) -> list[Finding]:
-    """Does the mapped speed fit the derivative of the mapped position?"""
+    """Return findings where the mapped speed does not match the derivative of the mapped position."""
     is_derived = any(isinstance(item.fact, DerivedSpeed | IntegratedPosition) for item in recording.findings)
     if is_derived or "position" not in recording:
         return []
@@ -71,22 +71,23 @@ def _consistency(recording: Recording) -> list[Finding]:
         integrated, travelled = _without_gaps(speed, position, j)
         if not len(travelled):
             continue
-        way, seen = float(np.ptp(integrated)), float(np.ptp(travelled))
-        if way <= 0.0 or seen <= 0.0:
+        expected, spanned = float(np.ptp(integrated)), float(np.ptp(travelled))
+        if expected <= 0.0 or spanned <= 0.0:
             continue
-        if not 0.8 < way / seen < 1.25:
-            between = _as_between(max(way / seen, seen / way))
-            found.append(Finding(SpeedUnitDoubtful(joint, way, seen, position.unit, speed.unit, between), "speed"))
-        elif abs(travelled[-1]) > 0.5 * seen and np.sign(travelled[-1]) != np.sign(integrated[-1]):
+        if not 0.8 < expected / spanned < 1.25:
+            between = _as_between(max(expected / spanned, spanned / expected))
+            fact = SpeedUnitDoubtful(joint, expected, spanned, position.unit, speed.unit, between)
+            found.append(Finding(fact, "speed"))
+        elif abs(travelled[-1]) > 0.5 * spanned and np.sign(travelled[-1]) != np.sign(integrated[-1]):
             found.append(Finding(SpeedSignOpposite(joint), "speed"))
     return [*found, *_swapped(recording)]
 
 
 def _moved(values: FloatArray) -> float:
-    """How far a joint's position (n,) moves beyond its noise and its encoder's steps; 0 where it rests.
+    """Return the range of a joint's position (n,) without noise and encoder steps; 0 at rest.
 
-    The medians of fifty parts of the log know neither noise nor single steps: their range counts where it is more than
-    ten times the noise of single samples and ten steps of the encoder.
+    It is the range of the medians of fifty parts of the log, if it exceeds ten times the noise of single samples and
+    ten steps of the encoder.
     """
     known = values[np.isfinite(values)]
     if len(known) < 3:
@@ -94,7 +95,7 @@ def _moved(values: FloatArray) -> float:
     steps = np.diff(known)
     noise = 1.48 * float(np.median(np.abs(steps - np.median(steps)))) / np.sqrt(2.0)
     changed = np.abs(steps[steps != 0.0])
-    # Rounding leaves traces far below a step of any encoder.
+    # Rounding errors are far smaller than a step of any encoder.
     changed = changed[changed > 1e-9 * max(float(np.abs(known).max()), 1e-300)]
     encoder = float(changed.min()) if len(changed) else 0.0
     parts = [float(np.median(part)) for part in np.array_split(known, min(_PARTS, len(known)))]
@@ -103,7 +104,7 @@ def _moved(values: FloatArray) -> float:
 
 
 def _as_between(ratio: float) -> str:
-    """Which units differ by a factor."""
+    """Return the units that differ by this factor; empty if it is none of theirs."""
     for factor, units in _FACTORS:
         if abs(ratio / factor - 1.0) < 0.05:
             return units
@@ -111,18 +112,18 @@ def _as_between(ratio: float) -> str:
 
 
 def _swapped(recording: Recording) -> list[Finding]:
-    """Joints whose position follows another joint's speed: columns in the wrong order."""
+    """Return joints whose position follows the speed of another joint: columns in the wrong order."""
     speed, position = recording["speed"], recording["position"]
     if speed.joint_count < 2 or len(speed) < 3 or len(position) < 3:
         return []
-    ways = previous_value(integrate(speed, position.unit), position.time)
-    known = np.isfinite(position.values).all(axis=1) & np.isfinite(ways).all(axis=1)
-    ways, places = ways[known], position.values[known]
-    if len(places) < 3:
+    integrals = previous_value(integrate(speed, position.unit), position.time)
+    known = np.isfinite(position.values).all(axis=1) & np.isfinite(integrals).all(axis=1)
+    integrals, positions = integrals[known], position.values[known]
+    if len(positions) < 3:
         return []
     joints = speed.joint_count
-    with np.errstate(invalid="ignore", divide="ignore"):  # a joint that stands still fits nothing
-        fit = np.nan_to_num(np.corrcoef(ways.T, places.T)[:joints, joints:])
+    with np.errstate(invalid="ignore", divide="ignore"):  # a joint at rest has no correlation
+        fit = np.nan_to_num(np.corrcoef(integrals.T, positions.T)[:joints, joints:])
     found = []
     for j, joint in enumerate(recording.joints):
         best = int(np.argmax(fit[:, j]))
@@ -132,27 +133,27 @@ def _swapped(recording: Recording) -> list[Finding]:
 
 
 def _without_gaps(speed: Series, position: Series, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return the integral of a joint's speed and its position, both from 0 and without what lies in gaps of a clock.
+    """Return the integral of a joint's speed and its position, both from 0 and without changes in gaps of a clock.
 
-    A gap has one speed before and one behind it: nothing that could be integrated.
+    The speed in a gap is unknown and cannot be integrated.
     """
-    path = previous_value(integrate(speed, position.unit), position.time)[:, joint]
-    place, time = position.values[:, joint], position.time
-    known = np.isfinite(place) & np.isfinite(path)
-    path, place, time = path[known], place[known], time[known]
+    integrated = previous_value(integrate(speed, position.unit), position.time)[:, joint]
+    travelled, time = position.values[:, joint], position.time
+    known = np.isfinite(travelled) & np.isfinite(integrated)
+    integrated, travelled, time = integrated[known], travelled[known], time[known]
     if len(time) < 2:
         return np.empty(0), np.empty(0)
     pauses = np.concatenate(([0], np.cumsum(np.diff(speed.time) > GAP_PERIODS * speed.period)))
     at = np.searchsorted(speed.time, time, side="right") - 1
-    behind = np.minimum(at + 1, len(speed.time) - 1)
+    after = np.minimum(at + 1, len(speed.time) - 1)
     logged = np.diff(time) <= GAP_PERIODS * position.period
-    logged &= pauses[behind[1:]] - pauses[at[:-1]] == 0
-    steps = (np.where(logged, np.diff(values), 0.0) for values in (path, place))
+    logged &= pauses[after[1:]] - pauses[at[:-1]] == 0
+    steps = (np.where(logged, np.diff(values), 0.0) for values in (integrated, travelled))
     return tuple(np.concatenate(([0.0], np.cumsum(step))) for step in steps)  # type: ignore[return-value]
 
 
 def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
-    """How fast the friction EKF can be on this log: its poles at the nominal speed of an axis."""
+    """Return the poles of the friction EKF at the nominal speed of an axis, or that this is below `minimum_speed`."""
     if machine_file.machine.coupled or not all(channel in recording for channel in ("torque", "speed", "acceleration")):
         return []
     motion = motion_class(recording)

@@ -22,7 +22,7 @@ _EXTRAS = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text
 
 
 def needs(*suffixes: str) -> None:
-    """Skip, by name, where a package of the extra is absent that reads a container of one of these suffixes."""
+    """Skip, by name, if a package is missing from the extra that reads containers with one of these suffixes."""
     formats = [FORMATS.load(name) for name in FORMATS.names()]
     for extra in {found.name for found in formats if not {*suffixes}.isdisjoint(found.suffixes)} & {*_EXTRAS}:
         for package in (re.split(r"[^\w-]", requirement)[0] for requirement in _EXTRAS[extra]):
