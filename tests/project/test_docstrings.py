@@ -41,13 +41,6 @@ WHOLE_MODULES = ("cdtool.detectors.base", "cdtool.detectors.filters", "cdtool.th
 STATISTICS = "cdtool.evaluation.statistics"
 CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
 
-# Names that have no sections yet; a test fails for one that has them.
-TO_DOCUMENT = (
-    "cdtool.evaluation.explanation.",
-    "cdtool.evaluation.force.curve.",
-    "cdtool.evaluation.force.verdict.judge",
-)
-
 _IMPORT = re.compile(rf"^ *from (cdtool\.(?:{'|'.join(ROOMS)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 _FUNCTION = re.compile(r"^def ([a-z]\w*)", re.MULTILINE)
 _HEADING = re.compile(r"^([A-Z][a-z]+)\n-{3,}\n", re.MULTILINE)
@@ -100,14 +93,6 @@ def rules() -> dict[str, type]:
     """The classes in the tables of the detectors and the thresholds."""
     loaded = [registry.load(name) for registry in (DETECTORS, THRESHOLDS) for name in registry.table]
     return {f"{item.__module__}.{item.__qualname__}": item for item in loaded}
-
-
-def is_to_document(name: str) -> bool:
-    return any(is_covered(name, entry) for entry in TO_DOCUMENT)
-
-
-def is_covered(name: str, entry: str) -> bool:
-    return name == entry or (entry.endswith(".") and name.startswith(entry))
 
 
 def sections(text: str) -> dict[str, str]:
@@ -200,7 +185,6 @@ def test_the_public_functions_of_detectors_thresholds_and_evaluation_have_their_
     faults = {
         name: faults_of_function(function, contract=function in CONTRACTS)
         for name, function in names_of_functions().items()
-        if not is_to_document(name)
     }
     assert not {name: found for name, found in faults.items() if found}
 
@@ -208,14 +192,6 @@ def test_the_public_functions_of_detectors_thresholds_and_evaluation_have_their_
 @pytest.mark.parametrize("name", sorted(rules()))
 def test_a_detector_or_threshold_describes_its_settings_with_units_its_equation_and_when_it_fails(name):
     assert not faults_of_class(rules()[name])
-
-
-def test_every_entry_still_to_document_is_needed():
-    for entry in TO_DOCUMENT:
-        names = [
-            name for name in names_of_functions() if name == entry or (entry[-1] == "." and name.startswith(entry))
-        ]
-        assert any(faults_of_function(names_of_functions()[name]) for name in names), f"remove {entry}"
 
 
 def test_a_missing_section_is_found():

@@ -102,8 +102,34 @@ def likely_cause(
 ) -> Cause:
     """Return the likely cause of an alarm.
 
-    `tracks` reach to `end` [s]. `leading` is the joint that leads the motion, `direction` its sign. Samples of channels
-    that the detector does not read may be lost without harm.
+    Parameters
+    ----------
+    recording : Recording
+        The recording on the load side, without ground truth.
+    tracks : sequence of Track
+        The channels compared with their normal band, up to `end`.
+    leading : str
+        The joint that leads the motion.
+    direction : int
+        The sign of its motion, 1 or -1.
+    event : Event
+        The alarm. Channels that its detector does not read can neither have caused it nor lost samples that matter.
+    end : float
+        End of the analysed time [s].
+
+    Returns
+    -------
+    Cause
+        The first cause in the order of this module's table whose condition holds, with its evidence.
+
+    Notes
+    -----
+    Fails for a contact that ends before the end of the analysed time: it leaves no permanent change, and may appear as
+    a transient of a sensor.
+
+    Examples
+    --------
+    `explain_operation` states the likely cause of each alarm.
     """
     left, alarm, read = event.left, event.alarm, event.inputs
     joints = list(dict.fromkeys(track.joint for track in tracks))

@@ -92,14 +92,14 @@ class Track:
             first = _first(np.abs(raw) > self.out[part])
             if first is None:
                 farthest = part.start + int(np.nanargmax(np.abs(raw)))
-                return self._told(math.nan, "", "within its usual range", farthest)
-            return self._told(math.nan, _side(raw[first]), "outside since before", part.start + first)
+                return self._movement_at(math.nan, "", "within its usual range", farthest)
+            return self._movement_at(math.nan, _side(raw[first]), "outside since before", part.start + first)
         k, upward, of_level = at
         sign = 1.0 if upward else -1.0
         start = part.start + _began(self.time[part][: k + 1], sign * shares[of_level][: k + 1])
         known = np.where(np.isfinite(samples), sign * samples, -np.inf)
         farthest = part.start + k + int(np.argmax(known[k:]))
-        return self._told(float(self.time[start]), "up" if upward else "down", "", farthest)
+        return self._movement_at(float(self.time[start]), "up" if upward else "down", "", farthest)
 
     def brief(self, begin: float, end: float) -> Transient | None:
         """Return a departure that began from `begin` to `end` [s] and soon ended, or None."""
@@ -121,7 +121,7 @@ class Track:
         end = float(self.time[last])
         return Transient(self.channel, self.joint, self.unit, moved.time, end, height, noises, area, rings)
 
-    def _told(self, time: float, direction: str, reason: str, k: int) -> Movement:
+    def _movement_at(self, time: float, direction: str, reason: str, k: int) -> Movement:
         return Movement(
             self.channel,
             self.joint,

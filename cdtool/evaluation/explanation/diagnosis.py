@@ -140,14 +140,16 @@ def in_order(moved: Sequence[Movement], joint: str) -> tuple[Movement, ...]:
 def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequence[Track]) -> list[Movement]:
     """Return the channels with that of the transient as moved at its beginning; it may be within the runs' spread."""
     others = [item for item in moved if (item.channel, item.joint) != (found.channel, found.joint)]
-    told = Movement(found.channel, found.joint, found.start, "up" if found.height > 0.0 else "down", unit=found.unit)
+    movement = Movement(
+        found.channel, found.joint, found.start, "up" if found.height > 0.0 else "down", unit=found.unit
+    )
     for track in tracks:
         if (track.channel, track.joint) == (found.channel, found.joint):
             part = track.between(found.start, found.end)
             k = part.start + int(abs(track.value[part] - track.mean[part]).argmax())
             value, mean, spread = (float(part[k]) for part in (track.value, track.mean, track.spread))
-            told = replace(told, value=value, mean=mean, spread=spread)
-    return [*others, replace(told, brief=True)]
+            movement = replace(movement, value=value, mean=mean, spread=spread)
+    return [*others, replace(movement, brief=True)]
 
 
 __all__ = ["Absence", "CauseKind", "Diagnosis", "NormalMotions", "diagnose_alarm", "diagnose_contact"]

@@ -108,9 +108,41 @@ def explain_operation(
     inputs: Sequence[str] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> tuple[Explanation, ...]:
-    """Return explanations of every alarm of an operation and every missed contact, in order of time.
+    """Explain every alarm of an operation and every missed contact.
 
-    `inputs` names the channels that the detector needs; `normals` is the normal motion of impact-free runs.
+    Parameters
+    ----------
+    detection : Detection
+        The result of a detector for the operation.
+    matching : Matching
+        The operation's contacts with their outcomes, and its false alarms.
+    activation : Activation
+        The activation that raised the alarms.
+    inputs : sequence of str
+        Channels that the detector needs: the explanation states which of them moved first.
+    normals : NormalMotions
+        The normal motion of impact-free runs. Without any, each channel is compared with its own past.
+
+    Returns
+    -------
+    tuple of AlarmExplanation or MissExplanation
+        In order of time: one per alarm and per contact without one. A contact in progress when the recording begins
+        has none of its own: without an onset it is not missed.
+
+    Notes
+    -----
+    A diagnosis after the event: it uses the recording before and after an alarm, and no result depends on it.
+
+    Examples
+    --------
+    The gate's stiff test without impact-free runs; the momentum observer with a limit of 400 N detects the contact.
+
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> (alarm,) = explain_operation(found.detections[0], found.matchings[0], found.activation)
+    >>> alarm.role, alarm.joint, alarm.debounce, alarm.absent.value
+    ('detection', 'leaf', 9, 'limits set by hand')
     """
     margins = joint_margins(detection)
     detecting = {item.alarm: item.contact for item in matching.matches if item.alarm}
@@ -136,10 +168,38 @@ def explain_alarm(
     margins: Sequence[JointMargin] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> AlarmExplanation:
-    """Explain an alarm of a detection; with the contact that it belongs to, if any, times count from its onset.
+    """Explain an alarm of a detection.
 
-    `activation` is the one that raised it. `margins` are the detection's `joint_margins`, if available. Raises
-    UsageError for an alarm of another detection.
+    Parameters
+    ----------
+    detection : Detection
+        The result of a detector for an operation.
+    alarm : Alarm
+        One of its alarms.
+    activation : Activation
+        The activation that raised it.
+    contact : Contact, optional
+        The contact that it belongs to; times count from its onset.
+    inputs : sequence of str
+        Channels that the detector needs.
+    margins : sequence of JointMargin
+        The `joint_margins` of the detection, if they are available; computed if empty.
+    normals : NormalMotions
+        The normal motion of impact-free runs.
+
+    Returns
+    -------
+    AlarmExplanation
+        Its role is "detection" with a contact, otherwise "alarm": only `explain_operation` knows whether it is false.
+
+    Raises
+    ------
+    UsageError
+        The alarm is of another detection.
+
+    Examples
+    --------
+    `explain_operation` explains every alarm of an operation.
     """
     margin = (margins or joint_margins(detection))[alarm.joint]
     at = int(np.searchsorted(margin.time, alarm.time))
@@ -190,9 +250,38 @@ def explain_miss(
     margins: Sequence[JointMargin] = (),
     normals: NormalMotions = NormalMotions(),  # noqa: B008
 ) -> MissExplanation:
-    """Explain how near a missed contact came to an alarm, while an alarm would have counted (`match.watched`).
+    """Explain how near a missed contact came to an alarm.
 
-    `activation` is the one that was used. `margins` are the detection's `joint_margins`, if available.
+    Parameters
+    ----------
+    detection : Detection
+        The result of a detector for an operation.
+    match : Match
+        The contact with its outcome; an alarm would have counted for `match.watched` [s] after its onset.
+    activation : Activation
+        The activation that was used: its debounce is what an alarm requires.
+    inputs : sequence of str
+        Channels that the detector needs.
+    margins : sequence of JointMargin
+        The `joint_margins` of the detection, if they are available; computed if empty.
+    normals : NormalMotions
+        The normal motion of impact-free runs.
+
+    Returns
+    -------
+    MissExplanation
+        The joints in order of their approach, the nearest first; none if no sample was assessable.
+
+    Examples
+    --------
+    With a limit of 4000 N the momentum observer misses the gate's stiff contact.
+
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0])
+    >>> miss = explain_miss(found.detections[0], found.matchings[0].matches[0], found.activation)
+    >>> miss.outcome, miss.watched, miss.approaches[0].longest
+    ('missed', 1.0, 0)
     """
     contact, statistic = match.contact, detection.statistic
     closes = contact.start + match.watched

@@ -121,7 +121,36 @@ class JointMargin:
 
 
 def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
-    """Return the margin of every column of a detection's statistic; without a threshold the shares are NaN."""
+    """Return the margin of every joint of a detection.
+
+    Parameters
+    ----------
+    detection : Detection
+        The result of a detector for an operation.
+
+    Returns
+    -------
+    tuple of JointMargin
+        One per column of the statistic: margin [signal's unit] and share of the limit, both (n,). The shares are NaN
+        if no threshold applies.
+
+    Notes
+    -----
+    margin = min(upper - statistic, statistic - lower), share = k* / k: k* is the safety factor at which the sample
+    would meet its limit (`exceedance` of the thresholds), k the set one. Both are NaN where the sample is not
+    assessable.
+
+    Examples
+    --------
+    The margin is smallest shortly after the contact, where the statistic is far outside its limit of 400 N.
+
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> (leaf,) = joint_margins(found.detections[0])
+    >>> leaf.name, bool(np.nanmin(leaf.margin) < 0.0), bool(np.nanmax(leaf.share) > 1.0)
+    ('leaf', True, True)
+    """
     statistic, band = detection.statistic, detection.band
     share = np.full(statistic.values.shape, np.nan)
     if detection.threshold is not None:

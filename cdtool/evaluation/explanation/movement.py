@@ -54,14 +54,53 @@ class Movement:
 def which_moved_first(
     recording: Recording, joint: str, around: float, *, before: float = 0.5, lead: float = 0.05, after: float = 0.5
 ) -> tuple[Movement, ...]:
-    """Return the measured and reference channels of a joint in the order in which they moved, unmoved ones last.
+    """Return the channels of a joint in the order in which they moved, compared with their own past.
 
-    A channel moves at the first of 3 consecutive samples more than 6 noises off the straight line through its `before`
-    seconds up to `around - lead`, traced back to 2 noises; the search ends at `around + after` [s]. The noise is the
-    usual deviation of the channel from such a line, extrapolated as far (at most 0.2 s), in those seconds: a median
-    absolute deviation, and at least the rounding of a quantised channel. `joint` may be the whole machine. Fails for a
-    channel that oscillates slowly, or if the motion changed within the second before; a filtered channel moves late.
-    Raises UsageError for an unknown joint.
+    Parameters
+    ----------
+    recording : Recording
+        The recording on the load side.
+    joint : str
+        A joint, or the whole machine (`WHOLE_MACHINE`): then the channels of every joint.
+    around : float
+        Time of the event [s].
+    before : float
+        Length of the past to which a channel's line is fitted [s].
+    lead : float
+        The past ends, and the search begins, this long before the event [s].
+    after : float
+        The search ends this long after the event [s].
+
+    Returns
+    -------
+    tuple of Movement
+        The measured and reference channels: those that moved in order of time, then the others with the reason.
+
+    Raises
+    ------
+    UsageError
+        The joint is unknown.
+
+    Notes
+    -----
+    A channel moves at the first of 3 consecutive samples with |x - line| > 6 s, traced back to 2 s. The line is the
+    least-squares line through the past, extrapolated. The noise s is the usual deviation of the channel's past from
+    such a line, extrapolated equally far (at most 0.2 s): 1.4826 times the median absolute deviation, and at least the
+    rounding error of a quantised channel, its step / sqrt(12).
+
+    Fails for a channel that oscillates slowly, or if the motion changed within the second before the event. A filtered
+    channel moves late.
+
+    Examples
+    --------
+    A leaf at constant speed is braked from 1 s; its torque stays constant.
+
+    >>> from cdtool.recording import Series
+    >>> time = np.arange(2000) * 1e-3
+    >>> speed = Series(time, np.where(time < 1.0, 0.5, 0.5 - 2.0 * (time - 1.0)), "m/s")
+    >>> run = Recording("run", "", ("leaf",), {"torque": Series(time, np.full(2000, 30.0), "N"), "speed": speed})
+    >>> [(item.channel, item.direction, round(item.time, 3)) for item in which_moved_first(run, "leaf", 1.0)]
+    [('speed', 'down', 1.001), ('torque', '', nan)]
     """
     names = recording.joints if (joint,) == WHOLE_MACHINE else (joint,)
     for name in names:

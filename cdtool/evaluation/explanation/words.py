@@ -52,7 +52,27 @@ _SENSOR = {
 
 
 def words(explanation: Explanation) -> list[str]:
-    """Return what happened, how the limit was crossed or not, and what moved first, in entries of short sentences."""
+    """Return an explanation in plain sentences.
+
+    Parameters
+    ----------
+    explanation : AlarmExplanation or MissExplanation
+        The explanation.
+
+    Returns
+    -------
+    list of str
+        First the headline: what happened and when. Then one entry per subject: how the limit was crossed or how near
+        the joints came to it, the likely cause of an alarm, and the channels in the order in which they moved.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> ((_, alarm),) = cdtool.explain(log, machine, detector="momentum", limit=[400.0]).events
+    >>> words(alarm)[0]
+    'alarm at ... s, ... ms after the contact (onset at ... s, load cell)'
+    """
     if isinstance(explanation, AlarmExplanation):
         return [_headline(explanation), *_crossing(explanation), *_cause_words(explanation), *_movement(explanation)]
     return [_miss(explanation), *_approaches(explanation), *_movement(explanation)]
@@ -81,7 +101,7 @@ def _unseen(contact: Contact) -> str:
 
 def _crossing(item: AlarmExplanation) -> list[str]:
     limit = "upper" if item.alarm.side == "above" else "lower"
-    values = f"{_figure(item.alarm.statistic)} against {_figure(item.alarm.limit)}{_unit(item.unit)}"
+    values = f"{_number(item.alarm.statistic)} against {_number(item.alarm.limit)}{_unit(item.unit)}"
     since = f"{_counted(item.left - item.contact.start, 'the onset')}, " if item.contact else ""
     waited = _counted(item.left - item.alarm.time, "the alarm")
     skipped = f", {item.skipped} missing samples skipped" if item.skipped else ""
@@ -118,7 +138,7 @@ def _approach(found: Approach, item: MissExplanation) -> str:
         )
     where = "from" if nearest.margin >= 0.0 else "beyond"
     text = f"{found.joint}: nearest {_counted(nearest.time - item.contact.start, 'the onset')}, "
-    text += f"{_figure(abs(nearest.margin))}{_unit(item.unit)} {where} its limit of {_figure(nearest.limit)}"
+    text += f"{_number(abs(nearest.margin))}{_unit(item.unit)} {where} its limit of {_number(nearest.limit)}"
     text += f" ({_percent(nearest.share)} of it)." if math.isfinite(nearest.share) else "."
     if found.longest:
         needed = f"{_consecutive(found.longest)} outside; {item.debounce} are required"
@@ -180,11 +200,11 @@ def _references(item: Explanation) -> list[str]:
 def _unmoved(shown: Sequence[Movement], item: Explanation) -> list[str]:
     moved = any(not math.isnan(found.time) for found in item.moved)
     lines = []
-    for reason, told in _REASONS:
+    for reason, label in _REASONS:
         those = [found for found in shown if found.reason == reason]
         if those and (moved or item.absent is None or reason == "too few samples"):
             names = [f"{_channel(found, item)}{_numbers(found)}" for found in those]
-            lines.append(f"{told}: {', '.join(names)}.")
+            lines.append(f"{label}: {', '.join(names)}.")
     return lines
 
 
@@ -192,18 +212,18 @@ def _numbers(found: Movement) -> str:
     """Return the largest deviation with the normal mean and spread there, if known."""
     if not math.isfinite(found.mean):
         return ""
-    normal = f"{_figure(found.mean)} +- {_figure(found.spread)}{_unit(found.unit)}"
-    return f" (farthest {_figure(found.value)} against {normal})"
+    normal = f"{_number(found.mean)} +- {_number(found.spread)}{_unit(found.unit)}"
+    return f" (farthest {_number(found.value)} against {normal})"
 
 
 def _in_order(moved: Sequence[Movement], item: Explanation) -> str:
     """Return the channels with the time of each, the first in full."""
 
-    def told(found: Movement, when: str) -> str:
+    def in_words(found: Movement, when: str) -> str:
         return f"{_channel(found, item)} {found.direction} {when}{_numbers(found)}"
 
-    first = told(moved[0], _after_zero(moved[0], item))
-    return ", ".join([first, *(told(found, _ms(found, item)) for found in moved[1:])])
+    first = in_words(moved[0], _after_zero(moved[0], item))
+    return ", ".join([first, *(in_words(found, _ms(found, item)) for found in moved[1:])])
 
 
 def _first_input(moved: Sequence[Movement], item: Explanation) -> list[str]:
@@ -243,7 +263,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %" if math.isfinite(share) else "not assessable for that long"
 
 
-def _figure(value: float) -> str:
+def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
 
 
@@ -253,10 +273,10 @@ def _unit(unit: str) -> str:
 
 def _cause_words(item: AlarmExplanation) -> list[str]:
     """Return the likely cause with its evidence in numbers."""
-    return [f"Likely cause: {_told(item.cause, item)}."]
+    return [f"Likely cause: {_cause(item.cause, item)}."]
 
 
-def _told(cause: Cause, item: AlarmExplanation) -> str:
+def _cause(cause: Cause, item: AlarmExplanation) -> str:
     if cause.transient is not None:
         what, why = _SENSOR[cause.kind]
         return f"{what}: {_transient(cause.transient, item)}, and {why}"

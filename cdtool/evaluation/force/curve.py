@@ -106,17 +106,53 @@ class ForceTimeCurve:
 def force_time_curve(
     recording: Recording, contact: Contact, mass_before_cell: float = 0.0, until: float = float("inf")
 ) -> ForceTimeCurve:
-    """Return F_contact = F_cell + m a: load cell minus its reading at rest, plus inertia (thesis figure 4.11).
+    """Return the force-time curve of a contact: the load cell minus its reading at rest, plus inertia.
 
-    `recording`: the whole recording in which the contact was found, on the load side, since the reading at rest is that
-    before the onset. `until`: start of the next contact [s on its clock], at which the curve ends. `mass_before_cell`
-    [kg]: mass that moves with the machine between load cell and contact; a [m/s2] is its acceleration in the direction
-    of the contact force on it, against the motion of the leading joint: F = F_cell - m sign(v) a_measured. The
-    acceleration is interpolated linearly to the cell's clock. A bias of the accelerometer appears multiplied by m.
+    Parameters
+    ----------
+    recording : Recording
+        The whole recording in which the contact was found, on the load side: the reading at rest is that before the
+        onset.
+    contact : Contact
+        The contact.
+    mass_before_cell : float
+        Mass that moves with the machine between load cell and contact [kg].
+    until : float
+        Start of the next contact [s on the recording's clock], at which the curve ends.
 
-    A sample is clipped if 5 consecutive readings, or 5 times as many as the cell usually repeats, equal the largest; a
-    coarse cell under a steady push looks the same. Raises UsageError for a negative mass; RecordingError without a
-    force sample after the onset, or, with a mass, without acceleration in m/s2, without speed, or at rest.
+    Returns
+    -------
+    ForceTimeCurve
+        Force (n,) [N], positive in the direction of the contact, at times (n,) [s after the onset].
+
+    Raises
+    ------
+    UsageError
+        The mass is negative or not finite.
+    RecordingError
+        There is no force sample after the onset; or, with a mass, acceleration in m/s2 or speed is missing, or the
+        leading joint is at rest.
+
+    Notes
+    -----
+    F_contact = F_cell + m a (thesis figure 4.11), with a [m/s2] in the direction of the contact force on the machine,
+    against the motion of the leading joint: F_contact = F_cell - m sign(v) a_measured. The acceleration is interpolated
+    linearly to the cell's clock.
+
+    A sample is clipped if 5 consecutive readings, or 5 times as many as the cell usually repeats, equal the largest.
+
+    Fails: a coarse cell under a steady push looks clipped; a bias of the accelerometer appears multiplied by m.
+
+    Examples
+    --------
+    A load cell that reads 3 N at rest shows half a sine of 150 N from 1.0 s to 1.5 s.
+
+    >>> time = np.arange(3000) * 1e-3
+    >>> pulse = np.where((time >= 1.0) & (time <= 1.5), 150.0 * np.sin(2.0 * np.pi * (time - 1.0)), 0.0)
+    >>> run = Recording("run", "", ("axis",), {"force": Series(time, 3.0 + pulse, "N")})
+    >>> curve = force_time_curve(run, Contact(start=1.0, end=1.5, uncertainty=0.001))
+    >>> round(curve.peak, 6), round(float(curve.time[curve.force.argmax()]), 6), curve.saturated
+    (150.0, 0.25, False)
     """
     if mass_before_cell < 0.0 or not np.isfinite(mass_before_cell):
         raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "give 0 or more")
@@ -154,7 +190,27 @@ def force_time_curve(
 
 
 def force_at(curve: ForceTimeCurve, time: float) -> float:
-    """Return the force [N] of the last sample at or before a time [s after the onset]; NaN without a sample there."""
+    """Return the force at a time.
+
+    Parameters
+    ----------
+    curve : ForceTimeCurve
+        The force-time curve of a contact.
+    time : float
+        The time [s after the onset].
+
+    Returns
+    -------
+    float
+        The force of the last sample at or before the time [N]; NaN if samples are missing there, or after the end.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) * 1e-3
+    >>> curve = ForceTimeCurve(time, 200.0 * time, np.zeros(1000, dtype=bool), end=1.0)
+    >>> round(force_at(curve, 0.5004), 6), force_at(curve, 2.0)
+    (100.0, nan)
+    """
     at = int(np.searchsorted(curve.time, time, side="right")) - 1
     if at < 0 or time - curve.time[at] > curve.longest_step:
         return float("nan")

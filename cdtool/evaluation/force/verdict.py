@@ -1,9 +1,9 @@
 """Force against its limits: pass, fail or not assessable, for a test and for the mean of several tests at one point.
 
-Conventions: a step that is exceeded fails, whatever else is missing. It passes only where the force was seen all along
-and never at the load cell's stop, whenever the contact may have begun; otherwise it is not assessable, with the reason.
-A step counts from the first sample of a contact that began where samples are missing: later it cannot. A verdict is
-evidence about recordings, not a certificate.
+Conventions: a step whose limit is exceeded fails, whatever else is missing. It passes only if the force was recorded
+without interruption and never at the load cell's stop, for every possible onset; otherwise it is not assessable, with
+the reason. If a contact began where samples are missing, its steps count from its first sample, the latest possible
+onset. A verdict is evidence about recordings, not a certificate.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Outcome = Literal["pass", "fail", "not_assessable"]
 class StepVerdict:
     """One step of a profile and one test.
 
-    `peak` [N] at `peak_at` [s after the onset]: the largest force while the step holds; both NaN without a sample.
-    `time_budget` [s after the onset]: when the force first exceeded the limit while it held, between samples by linear
-    interpolation; infinite if never. An alarm that was to keep the limit had to come, and to act, before that.
+    `peak` [N] at `peak_at` [s after the onset]: the largest force while the step applies; both NaN without a sample.
+    `time_budget` [s after the onset]: when the force first exceeded the limit while the step applied, between samples
+    by linear interpolation; infinite if never. An alarm that meets the limit must be raised, and take effect, earlier.
     """
 
     step: ForceStep
@@ -41,24 +41,24 @@ class StepVerdict:
 
 
 class _OfSteps:
-    """What follows from the verdicts on the steps of a profile."""
+    """The outcome of a profile, derived from those of its steps."""
 
     steps: tuple[StepVerdict, ...] | tuple[PointStep, ...]
 
     @property
     def outcome(self) -> Outcome:
-        """Fail where a step fails, else not assessable where one is not, else pass."""
+        """Return fail if a step fails, otherwise not assessable if one is not, otherwise pass."""
         return _worst([item.outcome for item in self.steps])
 
     @property
     def reason(self) -> str:
-        """Why it does not pass: the reason of the first step with that outcome."""
+        """Return why it does not pass: the reason of the first step with that outcome."""
         return _first_reason(self.steps, self.outcome)
 
 
 @dataclass(frozen=True)
 class ForceVerdict(_OfSteps):
-    """One test against a profile; `end`: how long after the onset the record goes on [s]."""
+    """One test against a profile; `end`: how long the record continues after the onset [s]."""
 
     profile: str
     steps: tuple[StepVerdict, ...]
@@ -66,12 +66,12 @@ class ForceVerdict(_OfSteps):
 
     @property
     def time_budget(self) -> float:
-        """When the first limit was exceeded [s after the onset]; infinite if none was."""
+        """Return when the first limit was exceeded [s after the onset]; infinite if none was."""
         return min(item.time_budget for item in self.steps)
 
     @property
     def utilisation(self) -> float:
-        """Largest share of a limit that the force reached; above 1 the test fails."""
+        """Return the largest share of a limit that the force reached; above 1 the test fails."""
         return max((item.peak / item.step.at_most_n for item in self.steps if math.isfinite(item.peak)), default=0.0)
 
 
@@ -79,8 +79,8 @@ class ForceVerdict(_OfSteps):
 class PointStep:
     """One step of a profile over the tests at a point.
 
-    `force` [N] is the mean of the tests' peaks, NaN where a test has none; where the profile averages no tests, their
-    highest peak. `above`: how many tests exceed the limit by themselves.
+    `force` [N] is the mean of the tests' peaks, NaN if a test has none; if the profile does not average, their highest
+    peak. `above`: the number of tests that exceed the limit on their own.
     """
 
     step: ForceStep
@@ -92,7 +92,7 @@ class PointStep:
 
 @dataclass(frozen=True)
 class PointVerdict(_OfSteps):
-    """The tests at one point against a profile; `note` says how many were averaged."""
+    """The tests at one point against a profile; `note` states how many were averaged."""
 
     profile: str
     tests: int
@@ -101,10 +101,38 @@ class PointVerdict(_OfSteps):
 
 
 def judge(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
-    """Compare a force curve with every step of a profile.
+    """Compare a force-time curve with every step of a profile.
 
-    A step is not assessable if the record ends before or inside it, if samples in it are missing, or if the load cell
-    saturated below the limit. The last step is assessed over the recorded part of it.
+    Parameters
+    ----------
+    curve : ForceTimeCurve
+        Force (n,) [N] over the time after the onset (n,) [s].
+    profile : ForceProfile
+        The limits.
+
+    Returns
+    -------
+    ForceVerdict
+        One verdict per step: fail if a sample is above the limit, whatever else is missing. Otherwise not assessable if
+        the record ends before or inside the step, if samples are missing in which the force may have been above the
+        limit, if the contact may have begun earlier and the force is then too high, or if the load cell saturated below
+        the limit. The last step is assessed up to the end of the record.
+
+    Notes
+    -----
+    The time budget [s after the onset] is the time at which the straight line between two samples crosses the limit.
+    A verdict is evidence about a recording, not a certificate.
+
+    Examples
+    --------
+    450 N in the first half second exceed the limit of 400 N at once; the 20 N after that are within all limits.
+
+    >>> from cdtool.evaluation.force.limits import read_force_limits
+    >>> time = np.arange(6000) * 1e-3
+    >>> curve = ForceTimeCurve(time, np.where(time < 0.5, 450.0, 20.0), np.zeros(6000, dtype=bool), end=6.0)
+    >>> verdict = judge(curve, read_force_limits()["en_12453_reducing_gap"])
+    >>> [(item.step.name, item.outcome) for item in verdict.steps], verdict.utilisation, verdict.time_budget
+    ([('dynamic', 'fail'), ('static', 'pass'), ('residual', 'pass')], 1.125, 0.0)
     """
     steps = tuple(_judge_step(curve, step, profile.ends(i)) for i, step in enumerate(profile.steps))
     return ForceVerdict(profile.name, steps, curve.end)
@@ -172,7 +200,7 @@ def _judge_step(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepVerd
 
 
 def _unseen(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
-    """What of a step the record does not show; empty where it shows all."""
+    """Return which part of a step is not recorded; empty if all of it is."""
     if curve.end < step.from_s:
         return f"the record ends {curve.end:.3g} s after the onset, before {step.from_s:g} s"
     if math.isfinite(ends) and ends - curve.end > curve.longest_step:
@@ -185,7 +213,7 @@ def _unseen(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
 
 
 def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
-    """What may have exceeded the limit unseen: between two samples, or before it held if the contact began earlier."""
+    """Return how the limit may have been exceeded between two samples, or if the contact began earlier; or empty."""
     most, hole = curve.could_reach(step.from_s, ends)
     if most > step.at_most_n:
         return (
@@ -199,9 +227,9 @@ def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
 
 
 def _crossing(curve: ForceTimeCurve, first: int, step: ForceStep) -> float:
-    """When the straight line to the first sample above the limit crosses it [s], not before the limit holds.
+    """Return when the straight line to the first sample above the limit crosses it [s], not before the step applies.
 
-    Where samples are missing before that sample, their beginning counts: the force may have risen at once.
+    If samples are missing before that sample, their beginning counts: the force may have risen at once.
     """
     time, force = float(curve.time[first]), float(curve.force[first])
     if first == 0:
@@ -227,18 +255,18 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
         word = "mean" if average_of > 1 else "highest"
         reason = f"{word} of {len(tests)} peaks {force:.4g} N where {step.at_most_n:g} N are allowed"
         return PointStep(step, "fail", force, above, reason)
-    blind = next((test for test in tests if test.outcome == "not_assessable"), None)
-    if blind:
-        return PointStep(step, "not_assessable", force, above, blind.reason)
+    unassessable = next((test for test in tests if test.outcome == "not_assessable"), None)
+    if unassessable:
+        return PointStep(step, "not_assessable", force, above, unassessable.reason)
     return PointStep(step, "pass", force, above)
 
 
 def _counted(tests: int, average_of: int) -> str:
-    given = counted(tests, "test")
+    present = counted(tests, "test")
     if average_of == 1:
-        return f"highest of {given}"
-    asked = "" if tests == average_of else f" where the profile averages {average_of}"
-    return f"mean of {given}{asked}"
+        return f"highest of {present}"
+    needed = "" if tests == average_of else f" where the profile averages {average_of}"
+    return f"mean of {present}{needed}"
 
 
 def _worst(outcomes: Sequence[Outcome]) -> Outcome:
