@@ -20,7 +20,7 @@ from arrays import PERIOD, Array, Run, awkward, clean, gate, stretch, viscous
 from timing import interleaved, main, ratio, table, verdict
 
 from cdtool.detectors import friction_ekf as detector_module
-from cdtool.detectors.friction_ekf import FrictionEkf, Motion
+from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
 from cdtool.dynamics import JointEquation
 from cdtool.machines.linear_axis import LinearAxis
 
@@ -90,7 +90,7 @@ def _against_filterpy(
 
 def _cdtool(detector: FrictionEkf, run: Run, machine: LinearAxis) -> Estimate:
     missing = np.isnan(run.speed).view(np.uint8)
-    motion = Motion(run.time, run.speed, run.speed, missing, run.acceleration_time, run.acceleration)
+    motion = JointMeasurements(run.time, run.speed, run.speed, missing, run.acceleration_time, run.acceleration)
     equation = JointEquation(machine.nominal_inertia, run.force, viscous(machine))
     return lambda: detector.estimate(motion, equation)
 

@@ -39,7 +39,7 @@ _LONGEST_UNSETTLED = 0.01
 
 
 @dataclass(frozen=True)
-class Motion:
+class JointMeasurements:
     """The measurements of one joint.
 
     `speed` and `position` (n,) are at `time` (n,) [s], NaN where there is no sample; `acceleration` (m,) is at its own
@@ -164,7 +164,7 @@ class FrictionEkf:
         friction = np.zeros(measured.shape)
         status = np.zeros(measured.shape, dtype=np.uint8)
         for j, equation in enumerate(equations):
-            motion = Motion(
+            motion = JointMeasurements(
                 drive.time,
                 np.ascontiguousarray(measured[:, j]),
                 np.where(drive.speed_missing[:, j], np.nan, drive.position[:, j]),
@@ -179,7 +179,7 @@ class FrictionEkf:
         status[behind & (status == Status.VALID)] = Status.GAP
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
-    def estimate(self, motion: Motion, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
+    def estimate(self, motion: JointMeasurements, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
         """Return friction and status (n,) of one joint; each accelerometer sample is used once, at its own time."""
         friction = np.zeros(len(motion.time))
         status = np.zeros(len(motion.time), dtype=np.uint8)

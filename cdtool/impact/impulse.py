@@ -119,7 +119,7 @@ def strike(
     mobility = axes @ (body_1.mobility_at(at) + body_2.mobility_at(at)) @ axes.T
     if not mobility[1, 1] > 0.0:
         raise UsageError("two obstacles cannot move", "one of the bodies needs a finite mass")
-    course = _Course(velocity, mobility, friction)
+    course = _GrowingImpulse(velocity, mobility, friction)
     used = hypothesis
     impulse = course.impulse(course.end(restitution, hypothesis))
     if course.work(impulse) > _ROUNDING * velocity[1] ** 2 / mobility[1, 1]:
@@ -147,7 +147,7 @@ def _axes(normal: tuple[float, float]) -> FloatArray:
     return np.array([[y, -x], [x, y]])
 
 
-class _Course:
+class _GrowingImpulse:
     """The growing impulse: until sliding stops, and after that."""
 
     def __init__(self, velocity: FloatArray, mobility: FloatArray, friction: float) -> None:

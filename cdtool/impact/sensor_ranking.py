@@ -19,7 +19,7 @@ from cdtool.impact.drives import SpeedController
 from cdtool.impact.rigidity import Rigidity, rigidity
 from cdtool.impact.sensors import QUANTITIES, Sensor
 from cdtool.impact.transmission import ElasticTransmission
-from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
+from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 _SAMPLES = 10_000
@@ -49,7 +49,7 @@ class ImpactCase:
                 f"the obstacle's exponent is {self.obstacle.exponent:g}", "a ranking takes a linear one: 1"
             )
 
-    def simulate(self) -> Motion:
+    def simulate(self) -> SimulatedMotion:
         """The impact, simulated from the touch on."""
         reference = self.speed / self.transmission.ratio
         controller = replace(self.controller, reference=reference)
@@ -128,14 +128,14 @@ def rank_sensors(case: ImpactCase, sensors: Sequence[Sensor], factor: float = 5.
     return Ranking(case, factor, tuple(order), motion.time, motion.force, _swing_duration(motion), rigid)
 
 
-def _swing_duration(motion: Motion) -> float:
+def _swing_duration(motion: SimulatedMotion) -> float:
     """The first contact [s], or twice the rise to its first peak where a drive that pushes on makes it last."""
     falls = np.flatnonzero(np.diff(motion.force) < 0.0)
     duration = motion.contacts[0].duration
     return duration if not len(falls) else min(duration, 2.0 * float(motion.time[falls[0]]))
 
 
-def deviations(case: ImpactCase, motion: Motion) -> dict[str, tuple[FloatArray, FloatArray]]:
+def deviations(case: ImpactCase, motion: SimulatedMotion) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Time (n,) and deviation (n,) from the steady motion, by quantity; on the load side."""
     transmission = case.transmission
     steady_drive = transmission.load_friction * case.speed
@@ -171,7 +171,7 @@ def _stronger_machines(case: ImpactCase) -> dict[tuple[str, str], ImpactCase]:
 def _response(
     sensor: Sensor,
     factor: float,
-    motion: Motion,
+    motion: SimulatedMotion,
     shown: Mapping[str, tuple[FloatArray, FloatArray]],
     stronger: Mapping[tuple[str, str], Mapping[str, tuple[FloatArray, FloatArray]]],
 ) -> SensorResponse:

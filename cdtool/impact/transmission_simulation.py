@@ -21,7 +21,7 @@ _SETTINGS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-13, "d
 
 
 @dataclass(frozen=True)
-class Contact:
+class SimulatedContact:
     """One contact: when it begins and how long it lasts [s], speeds [m/s], peaks [N, m], and the energy lost.
 
     `energy_loss` = 1 - (v_f/v_i)^2 of the load's speed; `contact_loss` is the work on the obstacle over the energy at
@@ -45,7 +45,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Motion:
+class SimulatedMotion:
     """Motion and force (n,) over strictly increasing `time` [s], and the contacts.
 
     `penetration` x_l - x_o [m] (negative before the touch), `load_speed` [m/s], `load_acceleration` [m/s2], `force` F_c
@@ -62,7 +62,7 @@ class Motion:
     motor_speed: FloatArray
     motor_torque: FloatArray
     drive_force: FloatArray
-    contacts: tuple[Contact, ...]
+    contacts: tuple[SimulatedContact, ...]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Start:
 
 def simulate_impact(
     transmission: Transmission, drive: Drive, law: ContactLaw, start: Start, *, duration: float, samples: int = 2000
-) -> Motion:
+) -> SimulatedMotion:
     """Solve 4.20, or 4.21 and 4.23 (corrected), from `start` on.
 
     There are at least `samples` samples over `duration` [s], and a thousand more per contact. Events find touch
@@ -159,10 +159,10 @@ def _forces(law: ContactLaw, states: FloatArray) -> FloatArray:
 
 def _contact(
     transmission: Transmission, law: ContactLaw, times: FloatArray, states: FloatArray, *, lasting: bool
-) -> Contact:
+) -> SimulatedContact:
     approach = float(states[1, 0])
     energy = 0.5 * transmission.moving_mass * approach**2
-    return Contact(
+    return SimulatedContact(
         start=float(times[0]),
         duration=float(times[-1] - times[0]),
         lasting=lasting,
@@ -179,8 +179,8 @@ def _motion(
     drive: Drive,
     law: ContactLaw,
     parts: list[tuple[FloatArray, FloatArray]],
-    contacts: tuple[Contact, ...],
-) -> Motion:
+    contacts: tuple[SimulatedContact, ...],
+) -> SimulatedMotion:
     # The first sample of a part is the last one of the part before.
     kept = [(times, states) if i == 0 else (times[1:], states[:, 1:]) for i, (times, states) in enumerate(parts)]
     time = np.concatenate([times for times, _ in kept])
@@ -188,7 +188,7 @@ def _motion(
     force = _forces(law, states)
     torque = np.broadcast_to(drive.torque_of(states[:-1]), time.shape).copy()
     position, speed = transmission.motor(states)
-    return Motion(
+    return SimulatedMotion(
         time=time,
         penetration=states[0],
         load_speed=states[1],

@@ -10,7 +10,7 @@ from scipy.linalg import solve_discrete_are
 
 from cdtool.detection import Status
 from cdtool.detectors.base import drive_on_speed_clock
-from cdtool.detectors.friction_ekf import FrictionEkf, Motion
+from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
 from cdtool.detectors.friction_ekf_arm_kernel import predict_covariance, update_covariance
 from cdtool.dynamics import JointEquation
 from cdtool.machines.coupled import CoupledMachine
@@ -110,12 +110,12 @@ def test_the_covariance_stays_positive_definite_over_a_long_alternating_motion()
     assert smallest > 1e-3
 
 
-def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[Motion, JointEquation, JointEquation]:
+def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[JointMeasurements, JointEquation, JointEquation]:
     """One joint's motion; its equation with its angle as a state, and with everything that is known as an input."""
     drive = drive_on_speed_clock(log, arm)
     acceleration = log["acceleration"]
     inputs = (drive.torque, drive.position, drive.speed, acceleration.values)
-    motion = Motion(
+    motion = JointMeasurements(
         drive.time,
         np.ascontiguousarray(drive.speed[:, joint]),
         np.ascontiguousarray(drive.position[:, joint]),
@@ -126,7 +126,7 @@ def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[Motion, JointE
     return motion, arm.joint_equations(*inputs)[joint], CoupledMachine.joint_equations(arm, *inputs)[joint]
 
 
-def plain_filter(motion: Motion, equation: JointEquation) -> FloatArray:
+def plain_filter(motion: JointMeasurements, equation: JointEquation) -> FloatArray:
     """Friction (n,) by matrices, the transition's Jacobian by numerical differentiation; all channels on one clock."""
     link, inertia = equation.pendulum, float(equation.inertia[0])
     assert link is not None

@@ -14,7 +14,7 @@ from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.impact import Collision
-from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
+from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 STIFFNESS = 9.8261e8
@@ -43,7 +43,7 @@ Stepper = Callable[[State, float], State]
 
 
 @pytest.fixture(scope="module")
-def motion() -> Motion:
+def motion() -> SimulatedMotion:
     return example.impact()
 
 

@@ -22,7 +22,7 @@ from cdtool.impact.linearised import (
 )
 from cdtool.impact.transfer import Transfer
 from cdtool.impact.transmission import Transmission
-from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
+from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
 from cdtool.recording import FloatArray
 
 DAMPED = replace(example.ELASTIC, damping=0.01, motor_friction=0.02, load_friction=5.0)
@@ -48,13 +48,13 @@ class Linear:
 
 def moved(
     transmission: Transmission, drive: Drive, law: ContactLaw, time: FloatArray, gap: float, speed: float = 0.0
-) -> Motion:
+) -> SimulatedMotion:
     return simulate_impact(
         transmission, drive, law, Start(gap=gap, load_speed=speed), duration=float(time[-1]), samples=4000
     )
 
 
-def at(time: FloatArray, motion: Motion, name: str) -> FloatArray:
+def at(time: FloatArray, motion: SimulatedMotion, name: str) -> FloatArray:
     return np.interp(time, motion.time, getattr(motion, name))
 
 

@@ -17,14 +17,14 @@ import numpy.typing as npt
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.recording import FloatArray
 
-# With fewer runs only the coarsest drift could be told from chance.
+# With fewer runs only a very large drift could be distinguished from chance.
 LEAST_RUNS = 10
-# What is shown has at most this chance where nothing changes, all comparisons together.
+# Largest probability that any of all comparisons shows a change if nothing changes.
 SIGNIFICANT = 0.01
 
 
 @dataclass(frozen=True)
-class Trend:
+class LinearTrend:
     """A steady change: `slope` per run in the unit of the values, `intercept` at run 0, and p of Mann and Kendall."""
 
     slope: Interval
@@ -47,31 +47,31 @@ class Step:
 
     @property
     def height(self) -> float:
-        """From before to after."""
+        """Return the change from before to after."""
         return self.after - self.before
 
 
 @dataclass(frozen=True)
-class Course:
-    """What a value did over `n` runs: "drift" or "step", whichever is shown and fits better, else "steady".
+class ChangeOverRuns:
+    """How a value changed over `n` runs: "drift" or "step", whichever is shown and fits better, otherwise "steady".
 
     `trend` and `step` are the estimates, shown or not; None below `LEAST_RUNS` runs with a value.
     """
 
     kind: Literal["steady", "drift", "step"]
     n: int
-    trend: Trend | None = None
+    trend: LinearTrend | None = None
     step: Step | None = None
 
     @property
     def change(self) -> float:
-        """The rise of the value over the runs, by what is shown; 0 if it is steady."""
+        """Return the increase of the value over the runs by the trend or step that is shown; 0 if it is steady."""
         if self.kind == "drift" and self.trend is not None:
             return self.trend.slope.value * (self.n - 1)
         return self.step.height if self.kind == "step" and self.step is not None else 0.0
 
 
-def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) -> Course:
+def change_over_runs(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) -> ChangeOverRuns:
     """Decide between drift, step and neither.
 
     Parameters
@@ -85,7 +85,7 @@ def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) 
 
     Returns
     -------
-    Course
+    ChangeOverRuns
         "steady", "drift" or "step", with the estimates.
 
     Notes
@@ -98,15 +98,15 @@ def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) 
     --------
     >>> import numpy as np
     >>> runs, noise = np.arange(40), np.tile([0.0, 0.1], 20)
-    >>> course_of(noise).kind, course_of(noise + runs).kind, course_of(noise + 5.0 * (runs >= 20)).kind
-    ('steady', 'drift', 'step')
+    >>> [change_over_runs(values).kind for values in (noise, noise + runs, noise + 5.0 * (runs >= 20))]
+    ['steady', 'drift', 'step']
     """
     given = np.asarray(values, dtype=np.float64)
     runs = np.flatnonzero(np.isfinite(given))
     present = given[runs]
     if len(runs) < LEAST_RUNS:
-        return Course("steady", len(runs))
-    trend, step = trend_of(present, runs, level), step_of(present, runs)
+        return ChangeOverRuns("steady", len(runs))
+    trend, step = linear_trend(present, runs, level), step_of(present, runs)
     allowed = SIGNIFICANT / (2 * comparisons)
     drifts, steps = trend.p <= allowed, step.p <= allowed
     if drifts and steps:
@@ -114,11 +114,11 @@ def course_of(values: npt.ArrayLike, comparisons: int = 1, level: float = 0.95) 
         stairs = np.where(runs < step.run, step.before, step.after)
         drifts = float(np.abs(present - line).sum()) <= float(np.abs(present - stairs).sum())
     kind: Literal["steady", "drift", "step"] = "drift" if drifts else "step" if steps else "steady"
-    return Course(kind, len(runs), trend, step)
+    return ChangeOverRuns(kind, len(runs), trend, step)
 
 
 def may_change(values: npt.ArrayLike, comparisons: int = 1) -> bool:
-    """Return whether `course_of` would show a change.
+    """Return whether `change_over_runs` would show a change.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def may_change(values: npt.ArrayLike, comparisons: int = 1) -> bool:
     return least <= SIGNIFICANT / (2 * comparisons)
 
 
-def trend_of(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95) -> Trend:
+def linear_trend(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95) -> LinearTrend:
     """Return Theil and Sen's slope with its interval, and p of Mann and Kendall's test.
 
     Parameters
@@ -160,7 +160,7 @@ def trend_of(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95
 
     Returns
     -------
-    Trend
+    LinearTrend
         The slope per run; 0 with p = 1 if all values are equal.
 
     Notes
@@ -171,17 +171,17 @@ def trend_of(values: FloatArray, runs: npt.NDArray[np.int_], level: float = 0.95
     Examples
     --------
     >>> import numpy as np
-    >>> trend = trend_of(2.0 * np.arange(10), np.arange(10))
+    >>> trend = linear_trend(2.0 * np.arange(10), np.arange(10))
     >>> trend.slope.value, trend.intercept
     (2.0, 0.0)
     """
     if np.all(values == values[0]):
-        return Trend(Interval(0.0, 0.0, 0.0, level), float(values[0]), 1.0)
+        return LinearTrend(Interval(0.0, 0.0, 0.0, level), float(values[0]), 1.0)
     from scipy import stats
 
     found = stats.theilslopes(values, runs, alpha=level)
     slope = Interval(float(found.slope), float(found.low_slope), float(found.high_slope), level)
-    return Trend(slope, float(np.median(values - slope.value * runs)), rank_p(values, runs))
+    return LinearTrend(slope, float(np.median(values - slope.value * runs)), rank_p(values, runs))
 
 
 def rank_p(values: FloatArray, runs: npt.NDArray[np.int_]) -> float:

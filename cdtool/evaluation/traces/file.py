@@ -20,7 +20,7 @@ import numpy.typing as npt
 from cdtool.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results_file import build
-from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
+from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 from cdtool.recording import Contact, FloatArray
 from cdtool.strict_json import finite, strict_json
 
@@ -257,11 +257,11 @@ def _panel(values: dict[str, Any]) -> Panel:
         detector=str(values["detector"]),
         unit=str(values["unit"]),
         joint=str(values["joint"]),
-        course=Course(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
+        course=StatisticCurve(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
         # A file of the version before has another spelling.
         verdict="not_assessable" if values["verdict"] == "not assessable" else str(values["verdict"]),
         reason=str(values["reason"]),
-        seen=tuple(build(Seen, _numbers(item), "seen") for item in values["seen"]),
+        seen=tuple(build(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),

@@ -1,4 +1,4 @@
-"""What a figure of one operation needs, decimated: kept at detection, so that reports draw without computing again."""
+"""The curves of one operation, decimated and stored at detection, so that reports draw without computing again."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHORTEST_VIEW, _LONGEST_VIEW = 0.3, 1.2
 
 
 @dataclass(frozen=True)
-class Course:
+class StatisticCurve:
     """A statistic of one joint with its limits and status, each (m,), on `time` (m,) [s]."""
 
     time: FloatArray
@@ -35,7 +35,7 @@ class Course:
 
     @classmethod
     def of(cls, detection: Detection, joint: int) -> Self:
-        """Every sample of one column of a detection."""
+        """Return every sample of one column of a detection."""
         statistic, band = detection.statistic, detection.band
         return cls(
             statistic.time,
@@ -45,17 +45,17 @@ class Course:
             statistic.status[:, joint],
         )
 
-    def at(self, kept: np.ndarray | slice) -> Course:
-        """The samples at these indices, of this mask or this slice (which copies nothing)."""
-        return Course(self.time[kept], self.value[kept], self.lower[kept], self.upper[kept], self.status[kept])
+    def at(self, kept: np.ndarray | slice) -> StatisticCurve:
+        """Return the samples at these indices, of this mask or of this slice (without a copy)."""
+        return StatisticCurve(self.time[kept], self.value[kept], self.lower[kept], self.upper[kept], self.status[kept])
 
-    def within(self, span: Span) -> Course:
-        """The samples from span[0] to span[1] [s]."""
+    def within(self, span: Span) -> StatisticCurve:
+        """Return the samples from span[0] to span[1] [s]."""
         first, last = np.searchsorted(self.time, span[0]), np.searchsorted(self.time, span[1], side="right")
         return self.at(slice(int(first), int(last)))
 
-    def decimated(self, view: Span | None) -> Course:
-        """What draws alike: of the whole coarsely, of the view finely."""
+    def decimated(self, view: Span | None) -> StatisticCurve:
+        """Return the samples that draw the same picture: coarse for the whole, fine in the view."""
         kept = kept_samples(self.time, self.value, _WHOLE)
         if view is not None:
             first, last = np.searchsorted(self.time, view[0]), np.searchsorted(self.time, view[1], side="right")
@@ -66,8 +66,8 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What became of one contact: `late` and `alarm` [s] are NaN unless it was detected."""
+class ContactOutcome:
+    """The outcome of one contact; its latency `late` and `alarm` [s] are NaN unless it was detected."""
 
     outcome: str
     late: float = math.nan
@@ -77,20 +77,19 @@ class Seen:
 
 @dataclass(frozen=True)
 class Panel:
-    """One detector over one operation: the course of the joint that alarmed, else of the leading one.
+    """One detector over one operation: the curve of the joint that raised the alarm, otherwise of the leading one.
 
-    `seen` has one entry a contact of the trace; `alarms` and `false_alarms` are times [s]; `why` explains the alarms
-    and misses in plain sentences. `rearmed`: when each alarm was armed again [s], infinite where it never was; empty
-    where that is not known.
+    `seen` has one entry per contact of the trace; `alarms` and `false_alarms` are times [s]; `why` explains the alarms
+    and misses in plain sentences. `rearmed`: when each alarm was re-armed [s], infinite if never; empty if unknown.
     """
 
     detector: str
     unit: str
     joint: str
-    course: Course
+    course: StatisticCurve
     verdict: str
     reason: str
-    seen: tuple[Seen, ...]
+    seen: tuple[ContactOutcome, ...]
     alarms: tuple[float, ...]
     false_alarms: tuple[float, ...]
     why: tuple[str, ...] = ()
@@ -98,7 +97,7 @@ class Panel:
 
     @property
     def blind(self) -> bool:
-        """Whether it could judge nothing."""
+        """Whether no sample was assessable."""
         return self.verdict == "not_assessable"
 
 
@@ -107,7 +106,7 @@ class Trace:
     """One operation with every detector's panel: `contact` is the number in `contacts` that is shown, -1 for none.
 
     `view` is the interval around it [s]; `force` (m,) [N] is the load cell on `force_time`, empty without one. `chosen`
-    says why the trace was kept; `joints` is how many the machine has.
+    states why the trace was stored; `joints` is the number of the machine's joints.
     """
 
     recording: str
@@ -125,7 +124,7 @@ class Trace:
 
     @property
     def shown(self) -> Contact | None:
-        """The contact that is shown."""
+        """Return the contact that is shown."""
         return self.contacts[self.contact] if self.contact >= 0 else None
 
 
@@ -203,11 +202,11 @@ def _panel(
         detector=detection.detector,
         unit=detection.statistic.unit,
         joint=detection.statistic.joints[joint],
-        course=Course.of(detection, joint).decimated(view),
+        course=StatisticCurve.of(detection, joint).decimated(view),
         verdict=detection.verdict.outcome,
         reason=detection.verdict.reason,
         seen=tuple(
-            Seen(item.outcome, item.latency, item.alarm.time if item.alarm else math.nan, item.reason)
+            ContactOutcome(item.outcome, item.latency, item.alarm.time if item.alarm else math.nan, item.reason)
             for item in matching.matches
         ),
         alarms=tuple(item.time for item in alarms),
@@ -239,5 +238,5 @@ def _force(operation: Operation, view: Span | None) -> tuple[FloatArray, FloatAr
     series = recording["force"]
     force = series.values[:, 0]
     nothing = np.zeros(len(force), dtype=np.uint8)
-    course = Course(series.time, force, force, force, nothing).decimated(view)
+    course = StatisticCurve(series.time, force, force, force, nothing).decimated(view)
     return course.time, course.value

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.trends import Course
+from cdtool.evaluation.statistics.trends import ChangeOverRuns
 from cdtool.evaluation.upkeep.deviation import Axis
 from cdtool.motion import MotionClass
 from cdtool.recording import FloatArray
@@ -40,7 +40,7 @@ class Shown:
     change continues; infinite if it does not approach the limit.
     """
 
-    course: Course
+    course: ChangeOverRuns
     place: float | None
     outward: bool
     runs_left: Interval
@@ -50,8 +50,8 @@ class Shown:
 class JointDrift:
     """One joint over the season: runs, deviation (runs, locations), and changes of the whole stroke and of a location.
 
-    `course` is that of the runs' `overall`; `overall` and `local` are None if no change is shown. `deviation` is in
-    spreads, at the `places` along `axis`, in its `unit`.
+    `course` is the change of the runs' `overall`; `overall` and `local` are None if no change is shown. `deviation` is
+    in spreads, at the `places` along `axis`, in its `unit`.
     """
 
     joint: str
@@ -61,7 +61,7 @@ class JointDrift:
     places: FloatArray
     runs: tuple[AuditedRun, ...]
     deviation: FloatArray
-    course: Course
+    course: ChangeOverRuns
     overall: Shown | None
     local: Shown | None
 

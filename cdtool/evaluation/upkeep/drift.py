@@ -12,7 +12,7 @@ from cdtool.activation import Activation
 from cdtool.detection import Signal
 from cdtool.errors import SignatureError
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.trends import Course, course_of, may_change
+from cdtool.evaluation.statistics.trends import ChangeOverRuns, change_over_runs, may_change
 from cdtool.evaluation.upkeep.audit import AuditedRun, DriftAudit, JointDrift, Shown
 from cdtool.evaluation.upkeep.deviation import Deviations, critical_of, deviations_of, near
 from cdtool.operations import Operation
@@ -52,11 +52,11 @@ def audit_drift(
 
     Notes
     -----
-    Drift: Mann-Kendall test with the Theil-Sen slope; step: Pettitt's test (see `course_of`). The whole stroke and its
-    locations are tested separately, each at 1 % for all joints (and locations) together: at most 2 % of steady seasons
-    show a change. A location is reported only if it changes by more than a quarter of the change of the whole stroke.
-    With one monitored side, a location that moves away from the limit is not reported. Runs are assumed independent: a
-    temperature that varies within a day looks like a drift.
+    Drift: Mann-Kendall test with the Theil-Sen slope; step: Pettitt's test (see `change_over_runs`). The whole stroke
+    and its locations are tested separately, each at 1 % for all joints (and locations) together: at most 2 % of steady
+    seasons show a change. A location is reported only if it changes by more than a quarter of the change of the whole
+    stroke. With one monitored side, a location that moves away from the limit is not reported. Runs are assumed
+    independent: a temperature that varies within a day looks like a drift.
 
     Examples
     --------
@@ -99,7 +99,7 @@ class _Joint:
     joint: int
 
     def drift(self) -> JointDrift:
-        course = course_of(self.found.overall[:, self.joint], len(self.signature.joints))
+        course = change_over_runs(self.found.overall[:, self.joint], len(self.signature.joints))
         return JointDrift(
             joint=self.signature.joints[self.joint],
             two_sided=not self.signature.watched,
@@ -130,22 +130,22 @@ class _Joint:
             alarm=any(alarm.joint == self.joint for alarm in detection.verdict.alarms),
         )
 
-    def _local(self, overall: Course) -> Shown | None:
+    def _local(self, overall: ChangeOverRuns) -> Shown | None:
         """Of the places whose change is shown and their own, the one with the largest change."""
         beyond = self.found.beyond[:, :, self.joint]
         comparisons = max(len(self.found.places), 1) * len(self.signature.joints)
-        best: tuple[float, float, Course] | None = None
+        best: tuple[float, float, ChangeOverRuns] | None = None
         for place, values in zip(self.found.places.tolist(), beyond.T, strict=True):
             if not may_change(values, comparisons):
                 continue
-            course = course_of(values, comparisons)
+            course = change_over_runs(values, comparisons)
             size = course.change if self.signature.watched else abs(course.change)
             own = size > _OWN_SHARE * abs(overall.change)
             if course.kind != "steady" and own and size > (best[0] if best else 0.0):
                 best = (size, place, course)
         return self._shown(best[2], best[1]) if best else None
 
-    def _shown(self, course: Course, place: float | None) -> Shown:
+    def _shown(self, course: ChangeOverRuns, place: float | None) -> Shown:
         outward = course.change > 0.0
         side = 0
         if not self.signature.watched:
@@ -162,7 +162,7 @@ class _Joint:
     def _index(self, place: float) -> int:
         return int(np.argmin(np.abs(self.found.places - place)))
 
-    def _runs_left(self, course: Course, place: float | None, side: int) -> Interval:
+    def _runs_left(self, course: ChangeOverRuns, place: float | None, side: int) -> Interval:
         """(k - c) / b: the critical factor c grows by the slope b a run, from where it is after the last one."""
         trend = course.trend
         if trend is None:

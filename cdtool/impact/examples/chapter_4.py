@@ -9,7 +9,7 @@ from cdtool.impact.drives import ConstantTorque, SpeedController
 from cdtool.impact.sensor_ranking import ImpactCase
 from cdtool.impact.sensors import Sensor
 from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
-from cdtool.impact.transmission_simulation import Motion, Start, simulate_impact
+from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
 
 TRANSMISSION = RigidTransmission(inertia=2.35e-4, friction=0.03, ratio=0.015)
 TORQUE = ConstantTorque(0.5)
@@ -45,6 +45,6 @@ SENSORS = (
 """Noise as the study command assumes it, of a drive rated for the torque of Table 4.1."""
 
 
-def impact(duration: float = 0.5) -> Motion:
+def impact(duration: float = 0.5) -> SimulatedMotion:
     """The impact of figure 4.3, from rest."""
     return simulate_impact(TRANSMISSION, TORQUE, CONTACT, Start(gap=GAP), duration=duration)

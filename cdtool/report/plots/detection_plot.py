@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.detection import Alarm
-from cdtool.evaluation.traces.trace import Course, Span
+from cdtool.evaluation.traces.trace import Span, StatisticCurve
 from cdtool.evaluation.truth.matching import Match
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
@@ -115,9 +115,9 @@ def _column(
     parts = [item for item in found.detections if _overlap(item, span)]
     colour = look_of(found.detections[0].detector).colour if found.detections else "0.35"
     for axes, joint in zip(rows, joints, strict=False):
-        frame_signal(axes, [Course.of(item, joint) for item in parts], span, headroom=2.0)
+        frame_signal(axes, [StatisticCurve.of(item, joint) for item in parts], span, headroom=2.0)
         for item in parts:
-            draw_signal(axes, Course.of(item, joint), item.detector, span, legend)
+            draw_signal(axes, StatisticCurve.of(item, joint), item.detector, span, legend)
             for alarm in item.verdict.alarms:
                 if alarm.joint == joint:
                     draw_alarm(axes, alarm, colour, legend)

@@ -14,7 +14,7 @@ from cdtool.evaluation.explanation.margin import joint_margins
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.words import words
 from cdtool.evaluation.traces.decimation import decimate
-from cdtool.evaluation.traces.trace import Course, Span
+from cdtool.evaluation.traces.trace import Span, StatisticCurve
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray, Recording
@@ -112,7 +112,7 @@ def _draw_channel(axes: Axes, recording: Recording, movement: Movement, item: Ex
 
 
 def _draw_statistic(axes: Axes, detection: Detection, item: Explanation, span: Span, legend: Legend) -> None:
-    course = Course.of(detection, detection.statistic.joints.index(item.joint))
+    course = StatisticCurve.of(detection, detection.statistic.joints.index(item.joint))
     frame_signal(axes, [course], span, headroom=1.0)
     draw_signal(axes, course, item.detector, span, legend)
     _name(axes, f"{label(item.detector, 20)}\n[{unit_label(item.unit)}]")

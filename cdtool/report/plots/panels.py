@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detection import REASONS, Alarm, Status
 from cdtool.evaluation.traces.decimation import decimate, kept_samples
-from cdtool.evaluation.traces.trace import Course, Span
+from cdtool.evaluation.traces.trace import Span, StatisticCurve
 from cdtool.pipeline import Detection
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, NOT_ASSESSED, ONSET_DASHES, look_of
@@ -60,7 +60,7 @@ class Legend:
         return [handle for kind, handle in known.items() if kind in self._seen]
 
 
-def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: Legend) -> None:
+def draw_signal(axes: Axes, course: StatisticCurve, detector: str, span: Span, legend: Legend) -> None:
     """Draw signal, limits and normal band of one joint within `span` [s], and where it is not assessable."""
     part = course.within(span)
     if not len(part.time):
@@ -74,7 +74,7 @@ def draw_signal(axes: Axes, course: Course, detector: str, span: Span, legend: L
     _draw_not_assessable(axes, part.time, part.status, span, legend)
 
 
-def frame_signal(axes: Axes, courses: Iterable[Course], span: Span, headroom: float) -> None:
+def frame_signal(axes: Axes, courses: Iterable[StatisticCurve], span: Span, headroom: float) -> None:
     """Set the vertical range: all limits and valid values within `span`, excursions up to `headroom` bands beyond."""
     inside: list[float] = []
     bounds: list[float] = []

@@ -19,7 +19,7 @@ from cdtool.impact.linearised import (
 from cdtool.impact.rigidity import rigidity
 from cdtool.impact.transfer import Transfer, second_order
 from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
-from cdtool.impact.transmission_simulation import Motion
+from cdtool.impact.transmission_simulation import SimulatedMotion
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, new_figure, save
@@ -33,7 +33,7 @@ _DASHES = ("-", (0, (6, 2)), (0, (3, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)))
 _BEFORE_MS = 4.0
 
 
-def plot_impact(motion: Motion, path: Path) -> None:
+def plot_impact(motion: SimulatedMotion, path: Path) -> None:
     """Draw figure 4.3: force, penetration and speed, the whole event at the left, its first contact at the right.
 
     Raises UsageError, CdtoolError (see `save`).

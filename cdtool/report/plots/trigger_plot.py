@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from cdtool.evaluation.traces.trace import Panel, Seen, Span, Trace
+from cdtool.evaluation.traces.trace import ContactOutcome, Panel, Span, Trace
 from cdtool.plain_text import counted
 from cdtool.report.model import AXES
 from cdtool.report.plots.figures import (
@@ -114,7 +114,7 @@ def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) 
     write(axes, detail, (1.0, 0.5), (_AWAY, -3), va="top", fontsize=_DETAIL_SIZE)
 
 
-def _seen(trace: Trace, row: Panel) -> Seen | None:
+def _seen(trace: Trace, row: Panel) -> ContactOutcome | None:
     return row.seen[trace.contact] if trace.contact >= 0 else None
 
 

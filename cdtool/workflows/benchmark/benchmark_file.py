@@ -31,7 +31,7 @@ HOLDOUT = "holdout"
 
 
 @dataclass(frozen=True)
-class Group:
+class ImpactGroup:
     """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
 
     logs: tuple[Path, ...]
@@ -63,7 +63,7 @@ class BenchmarkFile:
     synchronisation: float
     mass_before_cell: float
     learn: tuple[Path, ...]
-    impacts: Mapping[str, Group]
+    impacts: Mapping[str, ImpactGroup]
     campaigns: Mapping[Path, str]
     points: Mapping[Path, str]
     limits: tuple[LimitRule, ...]
@@ -202,7 +202,7 @@ def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
     return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
-def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, Group]:
+def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, ImpactGroup]:
     """Return the groups of impacts, then the hold-out."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
@@ -222,9 +222,9 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, G
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        groups[name] = Group(logs_of(table, base), own, limits)
+        groups[name] = ImpactGroup(logs_of(table, base), own, limits)
     if HOLDOUT in root:
-        groups[HOLDOUT] = Group(logs_of(root.table(HOLDOUT), base), window)
+        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base), window)
     if "limits" in force and not any(group.force for group in groups.values()):
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
@@ -258,7 +258,7 @@ def _mass_before_cell(force: Table) -> float:
     return mass
 
 
-def _scored(groups: Mapping[str, Group], *more: str) -> list[Path]:
+def _scored(groups: Mapping[str, ImpactGroup], *more: str) -> list[Path]:
     """Return the logs of all groups of impacts, and of the hold-out if it is among `more`."""
     return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
 

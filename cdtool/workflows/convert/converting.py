@@ -110,10 +110,10 @@ def convert(
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     _check_free([*names, *companions], parts, force)
     provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
-    course = _Course(log, sum(group.rows for group in rows.groups), progress)
+    row_progress = _RowProgress(log, sum(group.rows for group in rows.groups), progress)
     with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
-            written = writer(temporary[i], part, course.of(rows.parts(part)), provenance)
+            written = writer(temporary[i], part, row_progress.of(rows.parts(part)), provenance)
             if machine_file is not None:
                 text = converted_machine(machine_file, path, part, written, companions[i])
                 temporary[len(names) + i].write_text(text, encoding="utf-8")
@@ -123,8 +123,8 @@ def convert(
 
 
 @dataclass
-class _Course:
-    """The rows of a log on their way to the writer; `rows` counts them."""
+class _RowProgress:
+    """Passes the parts of a log to the writer and reports the progress; `rows` is the number of all its rows."""
 
     log: Path
     rows: int

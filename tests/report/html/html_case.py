@@ -23,7 +23,7 @@ from cdtool.evaluation.results import (
     Skipped,
     SweepResult,
 )
-from cdtool.evaluation.traces.trace import Course, Panel, Seen, Trace
+from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 from cdtool.recording import Contact
 
 Naming = Callable[[str], str]
@@ -88,8 +88,8 @@ def trace_of(named: Naming, group: str, log: str) -> Trace:
     """One contact: `quick` alarms after 30 ms, `slow` misses it."""
     contact = Contact(ONSET, 2.4, 5e-4, 900.0)
     panels = (
-        _panel(named, "quick", Seen("detected", 0.03, ONSET + 0.03), (ONSET + 0.03,)),
-        _panel(named, "slow", Seen("missed"), ()),
+        _panel(named, "quick", ContactOutcome("detected", 0.03, ONSET + 0.03), (ONSET + 0.03,)),
+        _panel(named, "slow", ContactOutcome("missed"), ()),
     )
     time = np.linspace(0.0, 4.0, 400)
     force = np.where((time > ONSET) & (time < 2.4), 900.0 * np.sin((time - ONSET) * np.pi / 0.4), 0.0)
@@ -106,14 +106,19 @@ def free_trace(named: Naming, group: str) -> Trace:
 
 
 def _panel(
-    named: Naming, detector: str, seen: Seen | None, alarms: tuple[float, ...], verdict: str = "alarm", reason: str = ""
+    named: Naming,
+    detector: str,
+    seen: ContactOutcome | None,
+    alarms: tuple[float, ...],
+    verdict: str = "alarm",
+    reason: str = "",
 ) -> Panel:
     time = np.linspace(0.0, 4.0, 300)
     value = np.sin(3.0 * time) + np.where(time > 2.02, 4.0 * (time - 2.02), 0.0)
     status = np.zeros(300, dtype=np.uint8)
     status[:30], status[200:210] = Status.START_UP, Status.GAP
     value[200:210] = np.nan
-    course = Course(time, value, np.full(300, -np.inf), np.where(time > 1.0, 1.5, 2.0), status)
+    course = StatisticCurve(time, value, np.full(300, -np.inf), np.where(time > 1.0, 1.5, 2.0), status)
     return Panel(
         detector=named(detector),
         unit="N",

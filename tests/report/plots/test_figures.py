@@ -17,7 +17,7 @@ from cdtool.detection import REASONS, Signal, Status, Verdict
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.traces.file import _trace as trace_from
 from cdtool.evaluation.traces.file import as_read, trace_values
-from cdtool.evaluation.traces.trace import Seen, Trace, make_trace
+from cdtool.evaluation.traces.trace import ContactOutcome, Trace, make_trace
 from cdtool.evaluation.truth.matching import Matching, match
 from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, judge
@@ -133,7 +133,9 @@ def test_only_the_joints_that_alarm_are_drawn_and_the_others_are_counted(six_joi
 def missed_by(trace: Trace, name: str) -> Trace:
     """The same with nothing noticed by one detector."""
     panels = tuple(
-        replace(panel, seen=(Seen("missed"),), alarms=(), verdict="no alarm") if panel.detector == name else panel
+        replace(panel, seen=(ContactOutcome("missed"),), alarms=(), verdict="no alarm")
+        if panel.detector == name
+        else panel
         for panel in trace.panels
     )
     return replace(trace, panels=panels)
@@ -154,7 +156,7 @@ def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(ben
 
 def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(bench: Bench, simulated, tmp_path):
     trace = bench.trace(simulated("stiff", 2), "stiff", ("momentum",))
-    blind = replace(trace.panels[0], seen=(Seen("not_assessable", nan, nan, "the axis stands still"),))
+    blind = replace(trace.panels[0], seen=(ContactOutcome("not_assessable", nan, nan, "the axis stands still"),))
     plot_triggers(replace(trace, panels=(blind,)), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert "not assessable" in shown and "the axis stands still" in shown
@@ -237,7 +239,7 @@ def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, six
     found = bench.detected(replace(recording, name="n" * 300, joints=("j" * 300,)), "friction_ekf")
     six = replace(six_joints, recording=replace(six_joints.recording, name="n" * 300))
     trace = bench.trace(recording, "g" * 300)
-    blind = Seen("not_assessable", nan, nan, "W" * 300)
+    blind = ContactOutcome("not_assessable", nan, nan, "W" * 300)
     wide = replace(trace.panels[0], detector="W" * 300, unit="W" * 300, joint="W" * 300, seen=(blind,))
     with drawing():
         figures = [
@@ -360,7 +362,7 @@ def test_a_contact_that_is_detected_during_an_earlier_alarm_begins_its_own_inter
     trace = make_trace("stiff", detection.operation, (), (detection,), (matching,))
     first, again = detection.verdict.alarms[0].time, detection.verdict.rearmed[0]
     hit = Contact(first + 0.2, first + 0.3, 100.0)
-    panel = replace(trace.panels[0], seen=(Seen("detected", 0.1, first + 0.3),))
+    panel = replace(trace.panels[0], seen=(ContactOutcome("detected", 0.1, first + 0.3),))
     trace = replace(trace, contacts=(hit,), contact=0, panels=(panel,), view=(first - 0.1, first + 2.0))
     spans = trigger_plot._triggers(trace, panel, trace.view)
     assert np.ravel(sorted(spans)[:2]) == pytest.approx([first, first + 0.3, first + 0.3, again])
