@@ -147,7 +147,7 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
     failing = not_met(results.limits)
     missed = missed_unasked(results, summaries)
     forbidden = force_missed(results, summaries)
-    blind = nothing_assessed(summaries)
+    unassessed = nothing_assessed(summaries)
     facts = set()
     if failing:
         facts.add(Fact.LIMIT_VIOLATED)
@@ -158,12 +158,12 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
     if results.losses:
         facts.add(Fact.LOST)
     scored = any(item.contacts or item.operations for item in summaries)
-    if blind or not scored or (checks and verdicts["not_assessable"] == len(checks)):
+    if unassessed or not scored or (checks and verdicts["not_assessable"] == len(checks)):
         facts.add(Fact.NOTHING_ASSESSABLE)
     elif verdicts["not_assessable"]:
         facts.add(Fact.INCOMPLETE)
     violated = bool(verdicts["fail"] or forbidden) or any(item.outcome == "violated" for item in failing)
-    unknown = bool(failing or blind or not scored or verdicts["not_assessable"])
+    unknown = bool(failing or unassessed or not scored or verdicts["not_assessable"])
     asked = bool(results.limits or checks)
     outcome = "violated" if violated else "not_assessable" if unknown else "met" if asked else "not_asked"
     nothing = [] if scored else ["nothing was scored"]
@@ -171,14 +171,14 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
         *nothing,
         *_force_words(verdicts, checks),
         *_missed_words(missed, forbidden),
-        *_blind_words(blind, summaries),
+        *_unassessed_words(unassessed, summaries),
     ]
     limits = limits_words(results)
     headline = [limits, *parts] if failing else [*parts, limits] if outcome != "met" else [limits, *parts]
     return ConclusionResult(
         outcome=outcome,
         headline="; ".join(headline),
-        reasons=tuple(_reasons(results, checks, missed, forbidden, blind)),
+        reasons=tuple(_reasons(results, checks, missed, forbidden, unassessed)),
         missed_without_limit=sum(item.missed for item in missed),
         facts=tuple(sorted(fact.name.lower() for fact in facts)),
         exit_status=int(status_of(facts)),
@@ -240,14 +240,14 @@ def _missed_words(missed: Sequence[Summary], forbidden: Sequence[Summary]) -> It
         yield f"{counted(count - violations, 'detection')} missed without a limit"
 
 
-def _blind_words(blind: Sequence[Summary], summaries: Sequence[Summary]) -> Iterator[str]:
-    if not blind:
+def _unassessed_words(unassessed: Sequence[Summary], summaries: Sequence[Summary]) -> Iterator[str]:
+    if not unassessed:
         return
-    if len(blind) == len([item for item in summaries if item.operations or item.contacts]):
+    if len(unassessed) == len([item for item in summaries if item.operations or item.contacts]):
         yield "nothing could be assessed"
     else:
-        pairs = "detector and group" if len(blind) == 1 else "detectors and groups"
-        yield f"nothing could be assessed in {len(blind)} of {len(summaries)} pairs of {pairs}"
+        pairs = "detector and group" if len(unassessed) == 1 else "detectors and groups"
+        yield f"nothing could be assessed in {len(unassessed)} of {len(summaries)} pairs of {pairs}"
 
 
 def _reasons(
@@ -255,7 +255,7 @@ def _reasons(
     checks: Sequence[ForceCheck],
     missed: Sequence[Summary],
     forbidden: Sequence[Summary],
-    blind: Sequence[Summary],
+    unassessed: Sequence[Summary],
 ) -> Iterator[str]:
     """What is not good about these results beside the limits, line by line, worst first."""
     parts: dict[Pair, list[ForceCheck]] = {}
@@ -273,11 +273,11 @@ def _reasons(
     for each in missed:
         why = "where a force profile is set" if each in forbidden else "and no limit on misses is set"
         yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
-    for each in blind:
-        yield plain(f"{each.detector}, {each.group}: {_why_blind(results, each)}")
+    for each in unassessed:
+        yield plain(f"{each.detector}, {each.group}: {_why_unassessed(results, each)}")
 
 
-def _why_blind(results: Results, item: Summary) -> str:
+def _why_unassessed(results: Results, item: Summary) -> str:
     own: list[ContactResult] = [
         row for row in results.contacts if (row.detector, row.group) == (item.detector, item.group)
     ]

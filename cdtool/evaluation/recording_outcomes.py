@@ -46,7 +46,7 @@ class RecordingOutcome:
     judged: bool
 
     @property
-    def blind(self) -> bool:
+    def is_not_assessable(self) -> bool:
         """Whether the detector could not assess it."""
         unseen = bool(self.contacts) and all(item.outcome == "not_assessable" for item in self.contacts)
         return not self.judged or (unseen and not self.false_alarms)

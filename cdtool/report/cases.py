@@ -91,7 +91,7 @@ def _recording(item: RecordingOutcome, silent: bool, forbidden: bool) -> Case:
     breaks = [*item.breaks, *(f"contact {number} is missed where a force profile is set" for number in missed)]
     if breaks:
         return Case(item.recording, "failure", "; ".join(breaks), tuple(lines))
-    if item.blind:
+    if item.is_not_assessable:
         why = "; ".join(dict.fromkeys(contact.reason or "" for contact in item.contacts))
         kind = "error" if silent else "skipped"
         return Case(item.recording, kind, f"not assessable: {why or 'the detector gave no result'}", tuple(lines))

@@ -131,10 +131,10 @@ def test_the_words_name_contact_figure_and_limit():
 
 def test_a_detector_without_results_differs_from_one_without_alarms():
     found = outcomes()
-    assert found["gm", "blind"].blind and not found["gm", "late"].blind
-    assert found["gm", "lost"].blind and not found["gm", "lost"].judged
-    assert not found["gm", "calm"].blind
-    assert found["pt", "calm"].blind, "it did not run in the hold-out"
+    assert found["gm", "blind"].is_not_assessable and not found["gm", "late"].is_not_assessable
+    assert found["gm", "lost"].is_not_assessable and not found["gm", "lost"].judged
+    assert not found["gm", "calm"].is_not_assessable
+    assert found["pt", "calm"].is_not_assessable, "it did not run in the hold-out"
 
 
 def test_a_log_whose_own_name_ends_like_an_operation_is_found_first():

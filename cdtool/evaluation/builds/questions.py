@@ -159,7 +159,7 @@ def ask_not_assessable(old: Sequence[ContactResult], new: Sequence[ContactResult
     return _ask_flags("not_assessable", *flags, paired)
 
 
-def ask_blind_operations(old: tuple[int, int], new: tuple[int, int], paired: bool) -> Asked:
+def ask_not_assessable_operations(old: tuple[int, int], new: tuple[int, int], paired: bool) -> Asked:
     """Compare operations that were nowhere assessable, in a group without contacts: (count, of) each; Fisher."""
     asked = _ask_counts("not_assessable", old, new)
     return replace(asked, same=paired and old == new and old[0] < old[1])

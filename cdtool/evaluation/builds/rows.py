@@ -15,11 +15,11 @@ from cdtool.evaluation.builds.questions import (
     Labels,
     Ranges,
     Watched,
-    ask_blind_operations,
     ask_false_alarms,
     ask_mean,
     ask_missed,
     ask_not_assessable,
+    ask_not_assessable_operations,
 )
 from cdtool.evaluation.results import ContactResult, ExposureResult, Results
 from cdtool.evaluation.statistics.interval import Interval
@@ -139,7 +139,7 @@ class Build:
         judged = watched.operations - watched.not_assessable
         return Watched(self._false_alarms.get((detector, group), 0), watched.hours, judged)
 
-    def blind_operations(self, detector: str, group: str) -> tuple[int, int]:
+    def not_assessable_operations(self, detector: str, group: str) -> tuple[int, int]:
         """Return how many were nowhere assessable, and of how many."""
         watched = self._watched(detector, group)
         return watched.not_assessable, watched.operations
@@ -169,9 +169,12 @@ def ask(
             ask_mean("force_at_alarm_n", before, after, labels, paired, level),
         ]
     else:
-        blind = builds[0].blind_operations(detector, group), builds[1].blind_operations(detector, group)
+        unassessed = (
+            builds[0].not_assessable_operations(detector, group),
+            builds[1].not_assessable_operations(detector, group),
+        )
         asked = [
-            ask_blind_operations(*blind, same_logs),
+            ask_not_assessable_operations(*unassessed, same_logs),
             ask_false_alarms(*watched, same_logs),
         ]
     apart = sum((a.outcome == "not_assessable") != (b.outcome == "not_assessable") for a, b in pairs)
@@ -213,7 +216,7 @@ def _answered(asked: Asked, corrected: float, significance: float, count: int, t
     left_open = asked.left_open(alpha)
     outcome: Literal["worse", "better", "no change shown", "inconclusive", "not_asked"]
     if not math.isnan(asked.complete_p) or corrected < significance:
-        # Latency, force, misses, blind contacts, false alarms: less is better of each.
+        # Latency, force, misses, contacts not assessable, false alarms: less is better of each.
         outcome = "worse" if asked.change.value > 0.0 else "better"
     elif left_open > tolerated:
         outcome = INCONCLUSIVE

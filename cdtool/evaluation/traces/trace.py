@@ -96,7 +96,7 @@ class Panel:
     rearmed: tuple[float, ...] = ()
 
     @property
-    def blind(self) -> bool:
+    def is_not_assessable(self) -> bool:
         """Whether no sample was assessable."""
         return self.verdict == "not_assessable"
 

@@ -139,7 +139,7 @@ def _triggers(trace: Trace, row: Panel, span: Span) -> list[Span]:
 
 def _blind(trace: Trace, row: Panel) -> bool:
     seen = _seen(trace, row)
-    return seen.outcome == "not_assessable" if seen else row.blind
+    return seen.outcome == "not_assessable" if seen else row.is_not_assessable
 
 
 def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
@@ -198,5 +198,9 @@ def most_informative(traces: Sequence[Trace]) -> Trace:
     """
     return max(
         traces,
-        key=lambda trace: (trace.shown is not None, len(trace.panels), sum(not panel.blind for panel in trace.panels)),
+        key=lambda trace: (
+            trace.shown is not None,
+            len(trace.panels),
+            sum(not panel.is_not_assessable for panel in trace.panels),
+        ),
     )

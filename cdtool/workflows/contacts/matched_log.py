@@ -184,12 +184,12 @@ def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_b
     if cut_by != "whole" or all(np.all(item.statistic.valid) for item in detections):
         return []
     strokes = _strokes(recording)
-    blind = [
+    unassessable = [
         number
         for number, stroke in enumerate(strokes[1:], 2)
         if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
     ]
-    return [Finding(LogNotCut(len(strokes), tuple(blind)))] if blind else []
+    return [Finding(LogNotCut(len(strokes), tuple(unassessable)))] if unassessable else []
 
 
 def _strokes(recording: Recording) -> list[Operation]:

@@ -64,7 +64,7 @@ def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_t
     path = tmp_path / "results.traces.json.gz"
     path.write_bytes(gzip.compress(json.dumps(values).encode(), mtime=0))
     (read,) = read_traces(path)
-    assert read.panels[0].verdict == "not_assessable" and read.panels[0].blind
+    assert read.panels[0].verdict == "not_assessable" and read.panels[0].is_not_assessable
     assert encode_traces([read]) == encode_traces([blind])
 
 
