@@ -3,12 +3,12 @@
 FILE ends in .html: messages, help pages, pages of the documentation and the report of the sample benchmark, in two
 columns; this runs both revisions. FILE ends in .md: a table of the messages only.
 
-A message is the text of an error, finding or line on screen, or the help of an option: the string arguments of a
-raised error, `fault`, `Finding`, `Remark`, `Skipped`, `echo`, `say`, what a `sentence` returns, and `help=`. It has two
-consecutive words. It has changed if its words are nowhere among the messages of the other revision. A changed message
-of the revision before is paired with the most similar one of the revision after, first within a hunk of `git diff -U0`,
-then in the whole package, where at least half of the words must be the same. All of these pairs are drawn from with
-equal chances; messages without a counterpart are counted and left out.
+A message is the text of an error, finding or line on screen, or the help of an option, with two consecutive words: the
+string arguments of a raised error, `fault`, `Finding`, `Remark`, `Skipped`, `echo` and `say`, the `words` of a fact or
+what its `sentence` returns, and `help=`. It has changed if its words are nowhere among the messages of the other
+revision. A changed message of the revision before is paired with the most similar one of the revision after, first
+within a hunk of `git diff -U0`, then in the whole package, where at least half of the words must be the same. All pairs
+are chosen with equal probability; messages without a counterpart are only counted.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ _TWO_WORDS = re.compile(r"[A-Za-z]{2,},? [A-Za-z]{2,}")
 # Least share of equal words in a pair from one hunk, and from anywhere.
 _LEAST_IN_HUNK, _LEAST = 0.3, 0.5
 _LONGEST_EXPRESSION = 40
+# A field of a template.
+_FIELD = re.compile(r"\{[\w.:!]*\}")
 _HUNK = re.compile(r"^@@ -(\d+)(?:,(\d+))? \+(\d+)(?:,(\d+))? @@")
 
 _LIST_COMMANDS = """
@@ -135,9 +137,8 @@ def messages_in(source: str, file: str) -> list[Message]:
             if any(_TWO_WORDS.search(text) for text in literals):
                 first, last = parts[0].lineno, parts[-1].end_lineno or parts[-1].lineno
                 text = " ".join(_joined([_shown(part) for part in parts]).split())
-                found[first, parts[0].col_offset] = Message(
-                    file, first, last, text, tuple(" ".join(literals).lower().split())
-                )
+                words = tuple(_FIELD.sub(" ", " ".join(literals)).lower().split())
+                found[first, parts[0].col_offset] = Message(file, first, last, text, words)
     return [found[place] for place in sorted(found)]
 
 
@@ -147,6 +148,9 @@ def _texts(node: ast.AST) -> Iterator[list[ast.expr]]:
         yield _arguments(node.exc)
     elif isinstance(node, ast.FunctionDef) and node.name == "sentence":
         yield from ([item.value] for item in ast.walk(node) if isinstance(item, ast.Return) and item.value)
+    elif isinstance(node, ast.ClassDef):
+        given = [item for item in node.body if isinstance(item, ast.Assign)]
+        yield from ([item.value] for item in given if ast.unparse(item.targets[0]) == "words")
     elif isinstance(node, ast.Call):
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         if name in _FIRST and node.args:

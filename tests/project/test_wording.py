@@ -27,6 +27,9 @@ BEFORE = {
     "cdtool/notes.py": """
         def note(count):
             return Finding(f"{count} rows come late: sorted by time", "time")
+
+        def other(count):
+            return Finding(f"{count} values are beyond all bounds", "time")
         """,
     "cdtool/gone.py": """
         def gone():
@@ -51,6 +54,9 @@ AFTER = {
         class Rows:
             def sentence(self):
                 return f"{self.count} rows are out of order: sorted by time"
+
+        class Values:
+            words = "{count:g} values are outside all bounds"
         """,
     "README.md": "Another page.\n",
 }
@@ -90,6 +96,7 @@ def pairs_of(script, root: Path):
 def test_changed_messages_are_paired_in_their_hunk_and_then_by_their_words(script, repository):
     assert [(pair.before.text, pair.after.text) for pair in pairs_of(script, repository)] == [
         ("{count} rows come late: sorted by time", "{self.count} rows are out of order: sorted by time"),
+        ("{count} values are beyond all bounds", "{count:g} values are outside all bounds"),
         (
             "{path}: holds no row at all (look into the file first)",
             "{path}: contains no row at all (check the file first)",
@@ -101,9 +108,9 @@ def test_changed_messages_are_paired_in_their_hunk_and_then_by_their_words(scrip
 def test_a_message_without_a_counterpart_is_counted(script, repository, tmp_path, capsys):
     target = tmp_path / "wording.md"
     assert script.main([str(target), "--before", "before", "--after", "after"], repository) == 0
-    assert capsys.readouterr().out == "4 of 5 messages changed, 3 with a counterpart among 4\n"
+    assert capsys.readouterr().out == "5 of 6 messages changed, 4 with a counterpart among 5\n"
     rows = target.read_text(encoding="utf-8").splitlines()
-    assert len(rows) == 2 + 3 and rows[2].startswith(
+    assert len(rows) == 2 + 4 and rows[2].startswith(
         "| 1 | cdtool/notes.py:2, now cdtool/facts.py:3 | {count} rows come"
     )
 
