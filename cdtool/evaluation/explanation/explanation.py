@@ -280,7 +280,7 @@ def explain_miss(
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
     >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0])
     >>> miss = explain_miss(found.detections[0], found.matchings[0].matches[0], found.activation)
-    >>> miss.outcome, miss.watched, miss.approaches[0].longest
+    >>> miss.outcome, round(miss.watched, 3), miss.approaches[0].longest
     ('missed', 1.0, 0)
     """
     contact, statistic = match.contact, detection.statistic
