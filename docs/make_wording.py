@@ -282,7 +282,12 @@ def _marked(old: str, new: str) -> tuple[str, str]:
         out, came = html.escape("".join(a[i:i_end])), html.escape("".join(b[j:j_end]))
         before += out if kind == "equal" or not out else f"<del>{out}</del>"
         after += came if kind == "equal" or not came else f"<ins>{came}</ins>"
-    return before, after
+    return _merged(before), _merged(after)
+
+
+def _merged(text: str) -> str:
+    """Return a text with marks joined if only blanks are between them."""
+    return re.sub(r"</(del|ins)>(\s+)<\1>", r"\2", text)
 
 
 def units_of(page: str) -> list[str]:
@@ -305,6 +310,10 @@ def units_of(page: str) -> list[str]:
     return units
 
 
+def _lines(text: str) -> list[str]:
+    return [line.rstrip() for line in text.splitlines()]
+
+
 def write_page(revisions: Sequence[Revision], pairs: Sequence[Pair], seed: int, changed: int) -> str:
     """Return the HTML page; runs both revisions for help pages and reports."""
     before, after = revisions
@@ -323,7 +332,7 @@ def write_page(revisions: Sequence[Revision], pairs: Sequence[Pair], seed: int, 
         common = sorted(set(commands[0]) & set(commands[1]))
         for name in (common[i] for i in chosen(common, HELP_PAGES, seed)):
             helps = [_run(folder, "-c", _RUN, *name.split(), "--help") for folder in folders]
-            parts.append(_section(f"cdtool {name} --help", helps, str.splitlines, "mono"))
+            parts.append(_section(f"cdtool {name} --help", helps, _lines, "mono"))
         common = sorted(set(before.pages()) & set(after.pages()))
         for name in (common[i] for i in chosen(common, PAGES, seed)):
             parts.append(_section(name, [revision.text(name) for revision in revisions], units_of))

@@ -129,10 +129,10 @@ def test_a_seed_chooses_the_same_texts_again_and_another_one_others(script):
 
 
 def test_words_that_differ_are_marked_and_escaped(script):
-    rows = script.side_by_side(["a < b", "is said"], ["a < b", "is reported"])
+    rows = script.side_by_side(["a < b", "is said"], ["a < b", "is reported here"])
     assert rows.splitlines() == [
         "<tr class=same><td>a &lt; b<td>a &lt; b",
-        "<tr><td>is <del>said</del><td>is <ins>reported</ins>",
+        "<tr><td>is <del>said</del><td>is <ins>reported here</ins>",
     ]
 
 
