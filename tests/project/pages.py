@@ -51,7 +51,7 @@ def check_detector_page(detector: Mapping[str, Any], text: str) -> None:
 
 
 def docs_script(name: str) -> ModuleType:
-    """A script of docs/ as a module; docs is no package."""
+    """A script of docs/ as a module; docs is not a package."""
     spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec and spec.loader
     sys.modules[name] = importlib.util.module_from_spec(spec)
