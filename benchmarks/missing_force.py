@@ -27,7 +27,7 @@ from timing import environment, table
 
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.recording import Contact, FloatArray, Recording, Series
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
@@ -181,7 +181,7 @@ def _compare(
 
 def _verdict(part: Recording, contacts: Sequence[Contact], number: int, profile: ForceProfile) -> str:
     until = contacts[number + 1].start if number + 1 < len(contacts) else float("inf")
-    return judge(force_time_curve(part, contacts[number], 0.0, until), profile).outcome
+    return assess_force(force_time_curve(part, contacts[number], 0.0, until), profile).outcome
 
 
 def main() -> int:

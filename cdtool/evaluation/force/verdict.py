@@ -100,7 +100,7 @@ class PointVerdict(_OfSteps):
     note: str
 
 
-def judge(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
+def assess_force(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
     """Compare a force-time curve with every step of a profile.
 
     Parameters
@@ -130,7 +130,7 @@ def judge(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
     >>> from cdtool.evaluation.force.limits import read_force_limits
     >>> time = np.arange(6000) * 1e-3
     >>> curve = ForceTimeCurve(time, np.where(time < 0.5, 450.0, 20.0), np.zeros(6000, dtype=bool), end=6.0)
-    >>> verdict = judge(curve, read_force_limits()["en_12453_reducing_gap"])
+    >>> verdict = assess_force(curve, read_force_limits()["en_12453_reducing_gap"])
     >>> [(item.step.name, item.outcome) for item in verdict.steps], verdict.utilisation, verdict.time_budget
     ([('dynamic', 'fail'), ('static', 'pass'), ('residual', 'pass')], 1.125, 0.0)
     """

@@ -10,7 +10,7 @@ from typing import Any
 
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.force.curve import ForceTimeCurve
-from cdtool.evaluation.force.verdict import ForceVerdict, judge
+from cdtool.evaluation.force.verdict import ForceVerdict, assess_force
 from cdtool.evaluation.results import (
     ContactResult,
     FalseAlarmResult,
@@ -152,7 +152,7 @@ def score_log(
     scored.matched, curves = matched, matched.curves
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
-        scored.verdicts = {number: judge(curve, profile) for number, curve in curves.items()}
+        scored.verdicts = {number: assess_force(curve, profile) for number, curve in curves.items()}
         scored.forces = force_rows(scored.recording, scored.verdicts, curves)
         scored.findings += _force_not_seen(recording, profile.name, scored.verdicts, curves)
         numbered = enumerate(contacts, 1)

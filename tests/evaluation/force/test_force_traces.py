@@ -11,7 +11,7 @@ import pytest
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.traced import force_profiles, traced_forces
-from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.results import ContactResult, RecordingResult, Results
 from cdtool.evaluation.traces.file import encode_traces, read_traces
 from cdtool.evaluation.traces.trace import Trace, make_trace
@@ -28,7 +28,7 @@ def scored(recording: Recording, contacts: list[Contact]) -> Results:
     """The rows of one log, every contact detected after 30 ms by one detector."""
     log = RecordingResult(recording.name, "stiff", "", 1.0, 1, len(contacts))
     curves = {i: force_time_curve(recording, contact) for i, contact in enumerate(contacts, 1)}
-    verdicts = {i: judge(curve, PROFILE) for i, curve in curves.items()}
+    verdicts = {i: assess_force(curve, PROFILE) for i, curve in curves.items()}
     late = [
         ContactResult(
             recording.name, "stiff", "direct", None, item.start, 0.0, None, 30.0, "detected", None, None, contact=i
@@ -62,7 +62,7 @@ def test_a_kept_curve_is_the_contacts_force_with_its_verdict_and_alarms(hit, con
     assert found.force.max() == pytest.approx(curve.peak, rel=0.01)
     assert np.interp(found.time, curve.time, curve.force) == pytest.approx(found.force, abs=2.0)
     assert found.alarms == {"direct": pytest.approx(0.03)}
-    verdict = judge(curve, PROFILE)
+    verdict = assess_force(curve, PROFILE)
     assert [step.outcome for step in found.verdict.steps] == [step.outcome for step in verdict.steps]
     assert found.verdict.time_budget == pytest.approx(verdict.time_budget)
     assert found.verdict.steps[0].peak_at == pytest.approx(verdict.steps[0].peak_at, abs=0.02)

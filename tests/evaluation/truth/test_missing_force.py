@@ -8,7 +8,7 @@ import pytest
 from cdtool.detection import Alarm, Signal, Status, Verdict
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.matching import match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
@@ -72,7 +72,7 @@ def test_without_a_hole_and_with_single_samples_lost_nothing_is_marked():
         one = Recording("a", "a.csv", ("x",), {"force": Series(TIME, force, "N")})
         (contact,) = find_contacts(one, RULE)
         assert contact.hole == 0.0 and contact.uncertainty < 5e-3
-        assert judge(force_time_curve(one, contact), LENIENT).outcome == "pass"
+        assert assess_force(force_time_curve(one, contact), LENIENT).outcome == "pass"
 
 
 def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the_limit():
@@ -86,9 +86,9 @@ def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the
     (contact,) = find_contacts(one, RULE)
     curve = force_time_curve(one, contact)
     assert contact.hole == 0.0
-    assert judge(curve, LENIENT).outcome == "pass"
+    assert assess_force(curve, LENIENT).outcome == "pass"
     near = ForceProfile("n", "n", "own", True, (ForceStep(0.0, curve.peak + 10.0, "dynamic"),))
-    verdict = judge(curve, near)
+    verdict = assess_force(curve, near)
     assert verdict.outcome == "not_assessable" and "may have reached" in verdict.reason
 
 
@@ -108,7 +108,7 @@ def test_an_unmeasured_force_never_passes(begin, end, own_clock):
     one = recording(bump(TIME), ONSET + begin, ONSET + end, own_clock)
     (contact,) = find_contacts(one, RULE)
     curve = force_time_curve(one, contact)
-    verdict = judge(curve, LENIENT)
+    verdict = assess_force(curve, LENIENT)
     assert verdict.outcome == "not_assessable"
     assert f"missing for {1e3 * (end - begin) + 1:.0f} ms" in verdict.reason
     assert curve.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
@@ -117,7 +117,7 @@ def test_an_unmeasured_force_never_passes(begin, end, own_clock):
 def test_a_measured_violation_counts():
     one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
     (contact,) = find_contacts(one, RULE)
-    verdict = judge(force_time_curve(one, contact), PROFILE)
+    verdict = assess_force(force_time_curve(one, contact), PROFILE)
     assert verdict.outcome == "fail"
     (failed,) = [item for item in verdict.steps if item.outcome == "fail"]
     assert "ms after it was first seen" in failed.reason and "after the onset" not in failed.reason
@@ -129,7 +129,7 @@ def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():
     one = recording(force, ONSET - 0.01, ONSET + 0.09, True)
     (contact,) = find_contacts(one, RULE)
     assert contact.start == pytest.approx(ONSET + 0.09, abs=2e-3)
-    verdict = judge(force_time_curve(one, contact), LENIENT)
+    verdict = assess_force(force_time_curve(one, contact), LENIENT)
     assert [item.outcome for item in verdict.steps] == ["not_assessable", "not_assessable"]
     assert "onset" in verdict.steps[1].reason
 
@@ -164,4 +164,4 @@ def test_a_cell_that_ends_during_the_contact_prevents_a_pass():
         one = Recording("a", "a.csv", ("x",), {"force": cell, "speed": Series(TIME, TIME * 0.0, "m/s")})
         (contact,) = find_contacts(one, RULE)
         single = ForceProfile("s", "s", "own", True, (ForceStep(0.0, 9000.0, "all"),))
-        assert judge(force_time_curve(one, contact), single).outcome == outcome
+        assert assess_force(force_time_curve(one, contact), single).outcome == outcome

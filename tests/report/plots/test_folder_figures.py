@@ -9,7 +9,7 @@ import pytest
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.results import RecordingResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.report.plots.folder_figures import write_figures
@@ -38,7 +38,7 @@ def with_forces(results: Results, bench: Bench, simulated, *names: str, profile:
     recording = simulated("stiff", 1)
     (hit,) = bench.trace(recording, "stiff", ("momentum",)).contacts
     curve = force_time_curve(recording, hit)
-    verdict = judge(curve, replace(PROFILE, name=profile))
+    verdict = assess_force(curve, replace(PROFILE, name=profile))
     rows = [
         row
         for name in names

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
-from cdtool.evaluation.force.verdict import judge
+from cdtool.evaluation.force.verdict import assess_force
 from cdtool.recording import FloatArray
 from cdtool.report.plots import force_plot
 from cdtool.report.plots.figures import SUFFIXES, drawing
@@ -38,7 +38,7 @@ def curve(
 ) -> ForceCurve:
     time, force = half_sine(peak, until=until)
     curve = ForceTimeCurve(time, force, np.zeros(len(time), dtype=bool), float(time[-1]))
-    return ForceCurve(name, time, force, judge(curve, profile), alarms)
+    return ForceCurve(name, time, force, assess_force(curve, profile), alarms)
 
 
 STIFF = ForcePanel("stiff", (curve("stiff/1", 900.0), curve("stiff/2", 3521.0), curve("stiff/3", 300.0)))
