@@ -8,6 +8,7 @@ import json
 import math
 import pkgutil
 from collections.abc import Iterator
+from dataclasses import fields
 
 import pytest
 
@@ -632,6 +633,15 @@ def test_every_kind_has_a_name_of_its_own():
     assert clocks.RepeatedStamps(1, 2, (0,), "line").kind == "repeated_stamps"
 
 
+def test_subject_and_variant_are_fields_of_the_kind():
+    named = {kind: {kind.subject_field, kind.variant_field} - {""} for kind in kinds()}
+    assert all(names <= {field.name for field in fields(kind)} for kind, names in named.items())
+    assert sum(map(len, named.values())) > 15
+    left_out = containers.ColumnLeftOut("mode", "text")
+    assert (left_out.subject, left_out.variant) == ("mode", "text")
+    assert (clocks.NoClock().subject, clocks.NoClock().variant) == ("", "")
+
+
 @pytest.mark.parametrize("fact", [fact for fact, _ in SENTENCES], ids=lambda fact: fact.kind)
 def test_a_finding_is_hashable_and_its_values_are_json(fact):
     finding = Finding(fact, "time", "loss", file="bag_0.mcap")
@@ -644,6 +654,18 @@ def test_a_finding_is_hashable_and_its_values_are_json(fact):
 def test_numbers_stand_apart_from_the_sentence():
     numbers = Finding(channels.MissingValues(2, 100), "speed").to_dict()["numbers"]
     assert numbers == {"count": 2, "values": 100}
+
+
+def test_a_fact_about_a_million_lines_holds_few_numbers():
+    finding = Finding(tables.BlankLines(range(2, 2_000_002, 2)))
+    assert finding.to_dict()["numbers"] == {"count": 1_000_000, "first": (2, 4, 6), "last": 2_000_000}
+    assert finding.message == "1000000 lines (2, 4, 6, ...) skipped: blank"
+    assert tables.BlankLines((3, 5, 7, 9)) == tables.BlankLines([3, 5, 7, 9]) != tables.BlankRows((3, 5, 7, 9))
+
+
+def test_a_finding_of_words_alone_says_what_to_write():
+    with pytest.raises(TypeError, match=r"Finding\(Remark\("):
+        Finding("the recorder lost its clock", "torque")  # type: ignore[arg-type]
 
 
 def test_a_finding_names_its_channel_and_the_part_of_its_log():
