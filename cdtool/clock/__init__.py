@@ -1,7 +1,7 @@
 """Causal alignment of channels to a detector's clock, and what is odd about time stamps.
 
 Nothing here looks at a later sample: a value at time t comes from samples at or before t. stamps.py makes a log's
-stamps strictly increase, coarse.py those of a clock that is coarser than the samples.
+stamps strictly increase, coarse_clock.py those of a clock that is coarser than the samples.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock.coarse_clock import recent_medians
 from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock.coarse import line_through
+from cdtool.clock.coarse_clock import line_through
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
@@ -76,7 +76,7 @@ def clean_time(
 
     `first_row` is the number of the first sample in the file, for messages; `counted` (n,) are the stamps as the file
     has them, in which a counter's wrap shows. A coarse clock (more than 20 % repeated stamps) is replaced by the
-    straight line through (index, stamp) fitted to the stamps so far, recursively: coarse.line_through. Without
+    straight line through (index, stamp) fitted to the stamps so far, recursively: coarse_clock.line_through. Without
     `sampled` the stamps are those of events, which lie on no line. Dropped rows are reported with their share: as a
     loss where they are more than strays. Raises RecordingError where no stamp is above the first.
     """

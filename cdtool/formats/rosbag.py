@@ -19,9 +19,9 @@ from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch
-from cdtool.messages.gathering import Gathering
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import wanted_columns, wanted_topics
+from cdtool.messages.topic_columns import Gathering
 from cdtool.messages.topic_survey import TopicSurvey
 
 _BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"

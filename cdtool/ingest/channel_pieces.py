@@ -26,7 +26,7 @@ from cdtool.ingest.channel_assembly import (
     masked_findings,
     stuck_findings,
 )
-from cdtool.ingest.log_figures import ClockFigures
+from cdtool.ingest.log_statistics import ClockFigures
 from cdtool.ingest.parts import ChannelSpan, PartSpan, check_parts, gaps_between, of_part
 from cdtool.ingest.reading import FoundParts
 from cdtool.machine_file import MachineFile

@@ -16,7 +16,7 @@ from cdtool.distribution import Distribution
 from cdtool.findings import Finding
 from cdtool.findings.clocks import AssumedClock, HeaderUnitImplausible
 from cdtool.formats.source import Source
-from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
+from cdtool.ingest.log_statistics import ClockFigures, ColumnFigures
 from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 

@@ -12,11 +12,11 @@ from cdtool.findings import Finding
 from cdtool.findings.messages import UndecodableMessages
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import Decoder, Gathered, UndecodableError, decoder_for
-from cdtool.messages.columns.gathered import DECODED
+from cdtool.messages.columns.decoded_batch import DECODED
+from cdtool.messages.fast_path import Recipe
 from cdtool.messages.fields import Field, FieldMissingError, missing
 from cdtool.messages.stamp_order import Stamps
 from cdtool.messages.stream import Stream
-from cdtool.messages.taken import Recipe
 
 
 class Decoders:

@@ -18,7 +18,7 @@ from cdtool.findings import Finding
 from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import Picked
-from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS
+from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import FieldMissingError, missing, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps

@@ -16,7 +16,7 @@ from cdtool.findings.clocks import HeaderDelay, HeaderUnset
 from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
+from cdtool.messages.columns.decoded_batch import ABSENT, Gathered, Picked, UndecodableError
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders

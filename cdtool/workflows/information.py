@@ -19,7 +19,7 @@ from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoCl
 from cdtool.findings.truth import InProgress
 from cdtool.formats.source import Source, in_words
 from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
-from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
+from cdtool.ingest.log_statistics import ClockFigures, ColumnFigures
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Recording, Series
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -28,7 +28,7 @@ from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
-    from cdtool.ingest.log_figures import LogFigures
+    from cdtool.ingest.log_statistics import LogFigures
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
 def _survey(log: Path) -> Info:
     from cdtool.ingest.clock_guess import find_clock
-    from cdtool.ingest.log_figures import LogFigures
+    from cdtool.ingest.log_statistics import LogFigures
     from cdtool.ingest.reading import in_time_order, log_pieces
 
     figures = LogFigures(partial(log_pieces, log), in_time_order(log))

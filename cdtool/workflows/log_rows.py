@@ -17,7 +17,7 @@ from cdtool.formats.pieces import Pieces, read_pieces
 from cdtool.formats.source import Format
 from cdtool.formats.time_order import by_time, values_of
 from cdtool.ingest.clock_guess import find_clock
-from cdtool.ingest.log_figures import ClockFigures, LogFigures
+from cdtool.ingest.log_statistics import ClockFigures, LogFigures
 from cdtool.ingest.reading import in_time_order, log_pieces
 from cdtool.recording import FloatArray
 

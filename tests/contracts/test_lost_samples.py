@@ -17,7 +17,7 @@ import pytest
 from scipy.stats import binomtest
 
 from cdtool.activation import Activation
-from cdtool.clock.lost import lost_samples
+from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.sweep import critical_factor

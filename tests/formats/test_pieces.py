@@ -20,7 +20,7 @@ from cdtool.formats.csv import text
 from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.ingest.log_figures import LogFigures
+from cdtool.ingest.log_statistics import LogFigures
 from cdtool.ingest.reading import choose_format
 from cdtool.workflows.convert.converting import convert
 from tests.formats.containers import two_clocks

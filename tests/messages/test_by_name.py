@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.messages.columns import decoder_for
-from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS, THERE
+from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS, THERE
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 from tests.messages import test_cdr, test_ros1
 from tests.messages.batches import assert_as_the_field_language, batch_of, fields_of, same

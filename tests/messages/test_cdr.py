@@ -13,7 +13,7 @@ from mcap_ros2._cdr import CdrWriter, EncapsulationKind
 from mcap_ros2._dynamic import _for_each_msgdef, _write_complex_type, generate_dynamic
 
 from cdtool.messages.columns import UndecodableError, decoder_for
-from cdtool.messages.columns.gathered import ABSENT
+from cdtool.messages.columns.decoded_batch import ABSENT
 from cdtool.messages.fields import FieldMissingError, header_stamp, numeric_fields
 from tests.data_folder import DATA, data, needs_data
 from tests.messages.batches import assert_as_the_field_language, batch_of, fields_of

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cdtool.messages.columns import decoder_for
-from cdtool.messages.columns.json_pattern import JsonPattern
+from cdtool.messages.columns.json_shape import JsonPattern
 from cdtool.messages.fields import header_stamp, numeric_fields
 from tests.messages.batches import assert_as_the_field_language, batch_of, fields_of, same
 

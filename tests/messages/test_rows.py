@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.messages.gathering import Rows
+from cdtool.messages.topic_columns import Rows
 
 
 def started(expected=10, first=2):

@@ -26,9 +26,9 @@ from cdtool.formats.pieces import Pieces, joined
 from cdtool.formats.source import Source
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.gathering import Gathering
-from cdtool.messages.taken import Bound
+from cdtool.messages.fast_path import Bound
 from cdtool.messages.topic import Taken, Topic, in_order, wanted_columns, wanted_topics
+from cdtool.messages.topic_columns import Gathering
 from cdtool.messages.topic_survey import TopicSurvey
 
 __all__ = ["Mcap"]

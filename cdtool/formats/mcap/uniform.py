@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.formats.mcap import uniform_kernel as kernel
-from cdtool.messages.columns.alike_kernel import WORD, words_of
-from cdtool.messages.columns.gathered import ByteArray, IntArray
-from cdtool.messages.taken import Alike, Bound, Destination, Knows, Part, Recipe, Taken, Words
+from cdtool.messages.columns.copy_kernel import WORD, words_of
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.fast_path import Alike, Bound, Destination, Knows, Part, Recipe, Taken, Words
 
 # Chunks that did not fit, beyond those that did, after which no more are tried.
 _MOST_IN_VAIN = 16
@@ -37,7 +37,7 @@ class _Tables:
 
 
 class UniformTaker:
-    """A Taker (taken.py); `publish`: of a record's two times the publish time is wanted, not the log time."""
+    """A Taker (fast_path.py); `publish`: of a record's two times the publish time is wanted, not the log time."""
 
     def __init__(self, publish: bool = False) -> None:
         self._time = kernel.PUBLISH_TIME if publish else kernel.LOG_TIME

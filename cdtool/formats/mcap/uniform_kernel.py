@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cdtool.instructions import store
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import IntArray
+from cdtool.messages.columns.decoded_batch import IntArray
 
 # Why it ended: at the chunk's end, before a definition, or before anything else that does not fit.
 DONE, DEFINITION, OTHER = range(3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdtool.messages.columns.gathered import Decoder, Gathered, Picked, UndecodableError
+from cdtool.messages.columns.decoded_batch import Decoder, Gathered, Picked, UndecodableError
 from cdtool.messages.layouts.layout import SchemaError
 
 __all__ = ["Decoder", "Gathered", "Picked", "UndecodableError", "decoder_for"]

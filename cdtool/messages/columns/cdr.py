@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.gathered import UndecodableError
-from cdtool.messages.columns.pattern import Pattern, pattern_of
-from cdtool.messages.columns.slots import Found, Place
-from cdtool.messages.columns.typed import TypedDecoder
+from cdtool.messages.columns.decoded_batch import UndecodableError
+from cdtool.messages.columns.member_locations import Found, Place
+from cdtool.messages.columns.schema_decoder import TypedDecoder
+from cdtool.messages.columns.sequential_walk import walk_all
+from cdtool.messages.columns.uniform_layout import Pattern, pattern_of
 from cdtool.messages.columns.walk_kernel import LONG, OTHER_KIND
 from cdtool.messages.columns.walk_program import Program, compile_program
-from cdtool.messages.columns.walked import walk_all
 from cdtool.messages.layouts.layout import Schema, Text
 
 _ENCAPSULATION = 4

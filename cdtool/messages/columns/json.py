@@ -1,6 +1,6 @@
 """JSON messages: whatever object Python's json reads (MCAP, "Well-known message encodings").
 
-A schema is not asked for. Messages of the same shape (json_pattern.py) are read together; those of a shape of their
+A schema is not asked for. Messages of the same shape (json_shape.py) are read together; those of a shape of their
 own, and numbers that need more care, are read by Python's json: the same values by construction.
 """
 
@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import json_kernel as kernel
-from cdtool.messages.columns.gathered import (
+from cdtool.messages.columns.decoded_batch import (
     ABSENT,
     DAMAGED,
     DECODED,
@@ -29,7 +29,7 @@ from cdtool.messages.columns.gathered import (
     IntArray,
     Picked,
 )
-from cdtool.messages.columns.json_pattern import JsonPattern, Resolved, pattern_of
+from cdtool.messages.columns.json_shape import JsonPattern, Resolved, pattern_of
 from cdtool.messages.fields import Field, FieldMissingError, header_stamp, numeric_fields
 from cdtool.recording import FloatArray
 
@@ -117,7 +117,7 @@ def json_decoder() -> JsonDecoder:
 
 @dataclass
 class JsonDecoder:
-    """A Decoder (gathered.py) for JSON; `_patterns` are the shapes seen, the last one that fitted first."""
+    """A Decoder (decoded_batch.py) for JSON; `_patterns` are the shapes seen, the last one that fitted first."""
 
     _patterns: list[JsonPattern] = field(default_factory=list)
     _fields: dict[str, None] = field(default_factory=dict)

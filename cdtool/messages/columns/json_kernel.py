@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from cdtool.decimal_kernel import UNDECIDED, float_bits
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 
 VALUE, TEXT, END = 0, 1, 2
 OTHER, FITS, UNCLEAR = 0, 1, 2  # what becomes of a message; UNCLEAR: it fits, but Python must convert a number

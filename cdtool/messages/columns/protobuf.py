@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import protobuf_kernel as kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray, UndecodableError
-from cdtool.messages.columns.slots import Found, Place
-from cdtool.messages.columns.typed import TypedDecoder
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray, UndecodableError
+from cdtool.messages.columns.member_locations import Found, Place
+from cdtool.messages.columns.schema_decoder import TypedDecoder
 from cdtool.messages.columns.walk_kernel import all_fit, fetch
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 from cdtool.recording import FloatArray

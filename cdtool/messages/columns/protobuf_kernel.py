@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 
 # A wanted tag, a row for each: its number, what it holds, slot, node of a nested message, its element (-1: any), oneof
 # (-1: none), and the slots and nodes of all that it nests: first, and the one after the last.

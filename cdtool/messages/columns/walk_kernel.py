@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 
 # A program has a row for each step: what to do, slot (-1: the selected one), elements (-1: in the message), a, b.
 ADVANCE = 0  # by a bytes

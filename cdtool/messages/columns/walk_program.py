@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.messages.columns import walk_kernel as steps
-from cdtool.messages.columns.gathered import IntArray, UndecodableError
-from cdtool.messages.columns.slots import Place
+from cdtool.messages.columns.decoded_batch import IntArray, UndecodableError
+from cdtool.messages.columns.member_locations import Place
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 
 _LONGEST_PROGRAM = 20_000

@@ -29,7 +29,7 @@ from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.taken import Taken, Taker
+from cdtool.messages.fast_path import Taken, Taker
 
 _LARGE_PAGE = 2 << 20
 _MOST_KEPT = 3

@@ -33,7 +33,7 @@ from cdtool.formats.mcap.container.skim import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
-from cdtool.messages.taken import Part, Taker
+from cdtool.messages.fast_path import Part, Taker
 
 _LONGEST_HEADER = 1 << 12
 

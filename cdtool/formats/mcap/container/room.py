@@ -13,7 +13,7 @@ from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.batch import Batch
-from cdtool.messages.taken import Taken
+from cdtool.messages.fast_path import Taken
 
 
 @dataclass(frozen=True)

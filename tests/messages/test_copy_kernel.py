@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns.alike_kernel import WORD, compared_words, take_alike, words_of
+from cdtool.messages.columns.copy_kernel import WORD, compared_words, take_alike, words_of
 
 
 @st.composite

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.messages.columns.gathered import ABSENT, OTHER_JOINTS, THERE, ByteArray, IntArray, Picked
-from cdtool.messages.columns.slots import Found, Place
+from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS, THERE, ByteArray, IntArray, Picked
+from cdtool.messages.columns.member_locations import Found, Place
 from cdtool.messages.fields import Field, FieldMissingError, is_element_number, order_of
 from cdtool.recording import FloatArray
 

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.gathered import ABSENT, THERE, ByteArray, Gathered, IntArray, Picked
-from cdtool.messages.columns.pattern import Pattern, recipe_of
-from cdtool.messages.columns.picking import WHOLE, Plan, elements_called, nowhere, pick
-from cdtool.messages.columns.slots import Found, Place
+from cdtool.messages.columns.decoded_batch import ABSENT, THERE, ByteArray, Gathered, IntArray, Picked
+from cdtool.messages.columns.field_values import WHOLE, Plan, elements_called, nowhere, pick
+from cdtool.messages.columns.member_locations import Found, Place
+from cdtool.messages.columns.uniform_layout import Pattern, recipe_of
+from cdtool.messages.fast_path import Recipe
 from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
-from cdtool.messages.taken import Recipe
 from cdtool.recording import FloatArray
 
 # One field of some of the messages, by their rows.
@@ -128,7 +128,7 @@ class Finder(Protocol):
 
 @dataclass
 class TypedDecoder:
-    """A Decoder (gathered.py) for messages whose schema tells every field."""
+    """A Decoder (decoded_batch.py) for messages whose schema tells every field."""
 
     schema: Schema
     finder: Finder

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from cdtool.decimal_kernel import powers_of_five
 from cdtool.messages.columns import json_kernel as kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.messages.fields import STAMPS, Field, FieldMissingError, numeric_fields
 
 _TOKEN = re.compile(rb'"((?:[^"\\]|\\.)*)"\s*(:)?|(-?\d[\d.eE+-]*|true|false)|[^"\d\-tf]+|.', re.DOTALL)

@@ -9,8 +9,8 @@ import numpy as np
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
-from cdtool.messages.columns.slots import Found
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.columns.member_locations import Found
 from cdtool.messages.columns.walk_program import Program
 from cdtool.messages.layouts.layout import Number
 from cdtool.recording import FloatArray

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
+from cdtool.messages.fast_path import Recipe
 from cdtool.messages.fields import Field, FieldMissingError
-from cdtool.messages.taken import Recipe
 from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.int64]

@@ -18,8 +18,8 @@ from cdtool.columns import Column
 from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
+from cdtool.messages.fast_path import Bound, Destination, Part
 from cdtool.messages.stream import Stream
-from cdtool.messages.taken import Bound, Destination, Part
 from cdtool.messages.topic import Topic, Values, in_order
 from cdtool.recording import FloatArray
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.recording import FloatArray
 
 # A member of a message: names of members, each followed by an element's number where it is one of an array of messages.

@@ -6,9 +6,9 @@ import numpy as np
 
 from cdtool.instructions import prefetch
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.messages.columns.walk_kernel import PLACES
-from cdtool.messages.taken import Words
+from cdtool.messages.fast_path import Words
 
 WORD = 8  # bytes
 _LINE = 64  # bytes of the cache's lines
@@ -35,7 +35,7 @@ def take_alike(
     step: IntArray,
     taken: Words,
 ) -> bool:
-    """Copy a message's words to `taken`; False where one is not alike (Alike; taken.py).
+    """Copy a message's words to `taken`; False where one is not alike (Alike; fast_path.py).
 
     `words[p]` are the 8 bytes from byte p on. The word at `copied[k]` of message i, moved down by `shift[k]` bits,
     becomes `taken[first[k] + i step[k]]`.

@@ -16,14 +16,14 @@ import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
-from cdtool.messages.columns.alike_kernel import WORD, compared_words, take_alike, words_of
-from cdtool.messages.columns.gathered import IntArray
-from cdtool.messages.columns.picking import Plan, elements_of
-from cdtool.messages.columns.slots import FixedNames, Found, Place, Slot
+from cdtool.messages.columns.copy_kernel import WORD, compared_words, take_alike, words_of
+from cdtool.messages.columns.decoded_batch import IntArray
+from cdtool.messages.columns.field_values import Plan, elements_of
+from cdtool.messages.columns.member_locations import FixedNames, Found, Place, Slot
+from cdtool.messages.columns.sequential_walk import Walked, WalkedSlot
 from cdtool.messages.columns.walk_program import Program
-from cdtool.messages.columns.walked import Walked, WalkedSlot
+from cdtool.messages.fast_path import Alike, Numbers, Recipe, Stamp, Words
 from cdtool.messages.layouts.layout import Number
-from cdtool.messages.taken import Alike, Numbers, Recipe, Stamp, Words
 from cdtool.recording import FloatArray
 
 _MOST_LENGTHS = 256  # of a message that others are compared with

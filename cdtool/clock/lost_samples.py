@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.clock.coarse import RECENT_STEPS, recent_medians
+from cdtool.clock.coarse_clock import RECENT_STEPS, recent_medians
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A channel is late where its newest sample is older than this many of its longest usual steps.
