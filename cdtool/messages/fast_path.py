@@ -1,4 +1,7 @@
-"""What travels when the messages of a chunk are laid out as ones before them: rows that stand in columns already."""
+"""The fast path of reading: chunks whose messages all match a known layout are written straight into the columns.
+
+These types pass between the container, which reads chunks, the decoders, which know the layouts, and the columns.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,16 @@ import numpy.typing as npt
 from cdtool.recording import FloatArray
 
 Words = npt.NDArray[np.uint64]
-# Whether a definition (opcode, content) is one that was read before.
-Knows = Callable[[int, bytes], bool]
+# Whether a definition (opcode, content) has been read before.
+IsKnownDefinition = Callable[[int, bytes], bool]
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
-    """Messages of which what was found in one holds.
+class MessageTemplate:
+    """What messages must share with a decoded one so that its byte offsets apply to them.
 
-    They have from `shortest` to `longest` bytes and, in the words at the bytes `compared` (m,), the bits of `mask` as
-    in `pattern`. All words begin at least 8 bytes before `shortest`.
+    Their length is from `shortest` to `longest` bytes. In the words at the byte offsets `compared` (m,), the bits set
+    in `mask` are as in `pattern`. All words begin at least 8 bytes before `shortest`.
     """
 
     shortest: int
@@ -32,10 +35,11 @@ class Alike:
 
 
 @dataclass(frozen=True)
-class Numbers:
-    """The numbers of one field: the bytes of a message where they begin, in the column's order, and their type.
+class FieldOffsets:
+    """The numbers of one field: their byte offsets in a message, in the order of the column, and their type.
 
-    `dtype` is numpy's code without byte order, `?` one byte that is not 0; `single`: the field is one number.
+    `dtype` is numpy's code without byte order; `?` is one byte that is not 0. `single`: the field is one number, not an
+    array.
     """
 
     at: tuple[int, ...]
@@ -44,27 +48,27 @@ class Numbers:
 
 
 @dataclass(frozen=True)
-class Stamp:
-    """A header's stamp: the byte where its seconds begin, nanoseconds (uint32) behind them; both have 4 bytes."""
+class StampOffset:
+    """A header's time stamp: the byte offset of its seconds, followed by nanoseconds (uint32); both have 4 bytes."""
 
     at: int
     signed: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
-    """How alike messages become rows: the wanted fields in their order; `stamp` where the header's time is wanted."""
+class RowLayout:
+    """How matching messages become rows: the wanted fields in order, and the `stamp` if the header's time is wanted."""
 
-    alike: Alike
-    fields: tuple[Numbers, ...]
-    stamp: Stamp | None
+    template: MessageTemplate
+    fields: tuple[FieldOffsets, ...]
+    stamp: StampOffset | None
 
 
 @dataclass(frozen=True, eq=False)
 class Destination:
-    """The columns of a topic: `tables` (n,) or (n, k), one a field, and `stamps` (n,) in ns; n need not be the same.
+    """The columns of a topic: `tables` (n,) or (n, k), one per field, and `stamps` (n,) in ns; n may differ.
 
-    Rows before `first` hold messages.
+    Rows before `first` already contain messages.
     """
 
     tables: tuple[FloatArray, ...]
@@ -73,17 +77,20 @@ class Destination:
 
     @property
     def free(self) -> range:
-        """The rows that may be written: those which all columns have."""
+        """The rows that may be written: those that all columns have."""
         return range(self.first, min(len(table) for table in (*self.tables, self.stamps)))
 
 
-# None: of such a channel messages are counted only, or there is no recipe.
-Bound = tuple[Recipe, Destination] | None
+# The layout and the columns of a channel. None: its messages are only counted, or it has no layout.
+Binding = tuple[RowLayout, Destination] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Rows of a destination that hold the messages of one channel in one chunk; `ascending`: their stamps are so."""
+class WrittenRows:
+    """The rows of a destination that contain one channel's messages of one chunk.
+
+    `ascending`: their time stamps are in ascending order.
+    """
 
     destination: Destination
     rows: slice
@@ -91,40 +98,45 @@ class Part:
 
     @property
     def count(self) -> int:
-        """Messages."""
+        """The number of messages."""
         return int(self.rows.stop - self.rows.start)
 
-    def before(self, other: Part) -> Part | None:
-        """Both as one; None where the other one's rows are not the next ones."""
+    def joined(self, other: WrittenRows) -> WrittenRows | None:
+        """Return these rows and the `other` ones as one; None if the others do not follow directly."""
         if other.destination is not self.destination or other.rows.start != self.rows.stop:
             return None
         stamps, border = self.destination.stamps, self.rows.stop
         ascending = self.ascending and other.ascending and bool(stamps[border - 1] <= stamps[border])
-        return Part(self.destination, slice(self.rows.start, other.rows.stop), ascending)
+        return WrittenRows(self.destination, slice(self.rows.start, other.rows.stop), ascending)
 
 
 @dataclass(frozen=True)
-class Taken:
-    """A chunk: messages by channel's id, `parts` of those that are wanted, span and first of the log times [ns]."""
+class ChunkRows:
+    """A chunk read on the fast path: message counts and written rows by channel id, and log times [ns].
+
+    `times` are the earliest and the latest log time, `first_time` is that of the first message.
+    """
 
     counts: Mapping[int, int]
-    parts: Mapping[int, Part]
+    parts: Mapping[int, WrittenRows]
     times: tuple[int, int]
     first_time: int
 
 
-class Taker(Protocol):
-    """Takes what is wanted out of a chunk's content; called by several threads at once."""
+class ChunkReader(Protocol):
+    """Reads chunks on the fast path; called by several threads at once."""
 
     @property
     def ready(self) -> bool:
-        """There is something to go by."""
+        """True if layouts are known."""
         ...
 
-    def take(self, content: npt.NDArray[np.uint8], rows: Mapping[int, range], knows: Knows) -> Taken | None:
-        """All messages of the chunk; None where one of them is not as expected, or a definition is not known.
+    def take(
+        self, content: npt.NDArray[np.uint8], rows: Mapping[int, range], knows: IsKnownDefinition
+    ) -> ChunkRows | None:
+        """Return all messages of a chunk; None if one does not match its layout, or a definition is not known.
 
-        `rows` are, by channel's id, the numbers that its messages in this chunk have among all of the channel, as the
-        summary foretells them.
+        `rows` are, by channel id, the expected row numbers of the chunk's messages among all messages of the channel,
+        as computed from the counts in the file's summary.
         """
         ...

@@ -1,4 +1,4 @@
-"""What decoding a batch gives: numbers, and for each message and field why there is none."""
+"""The result of decoding a batch: numbers, and for each message and field why a number is missing."""
 
 from __future__ import annotations
 
@@ -10,49 +10,49 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.fast_path import Recipe
+from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 ByteArray = npt.NDArray[np.uint8]
 
-# `Gathered.status` of a message.
+# `DecodedBatch.status` of a message.
 DECODED, DAMAGED = 0, 1
-# `Picked.state` of a field in a message.
-THERE, OTHER_JOINTS, ABSENT = 0, 1, 2
+# `FieldValues.state` of a field in a message.
+PRESENT, OTHER_JOINTS, ABSENT = 0, 1, 2
 
 
 class UndecodableError(Exception):
-    """There is no decoder for a channel; says why."""
+    """A channel has no decoder; the message is the reason."""
 
 
 @dataclass(frozen=True)
-class Picked:
+class FieldValues:
     """One wanted field over a batch of n messages.
 
-    `values` (n,) or, for a whole array, (n, k): NaN where there is none; k is the width of the first row that is not
-    empty, and rows of another width are NaN. `count` (n,) are the widths of a whole array's rows (0: empty, -1: not
-    there), None for a field that is one number. `state` (n,): THERE, OTHER_JOINTS or ABSENT; `fault` says why the first
-    ABSENT one is. `alike`: all are THERE, and no row has another width.
+    `values` are (n,) or, for a whole array, (n, k), with NaN for missing numbers; k is the width of the first row that
+    is not empty, and rows of another width are NaN. `count` (n,) are the widths of a whole array's rows (0: empty, -1:
+    absent); None for a field that is one number. `state` (n,) is PRESENT, OTHER_JOINTS or ABSENT; `fault` is the reason
+    of the first ABSENT one. `uniform`: all are PRESENT, and all rows have the same width.
     """
 
     values: FloatArray
     count: IntArray | None
     state: ByteArray
     fault: FieldMissingError | None = None
-    alike: bool = False
+    uniform: bool = False
 
 
 @dataclass(frozen=True)
-class Gathered:
-    """The wanted fields of a batch, `picked` in their order.
+class DecodedBatch:
+    """The wanted fields of a batch, in their order.
 
-    `status` (n,) is DECODED or DAMAGED: such a message has no value in any field; `reason` is that of the first.
-    `stamps` (n,) are the header's in ns, valid where `has_stamp`; both None where they were not asked for.
+    `status` (n,) is DECODED or DAMAGED; a damaged message has no value in any field, and `reason` is that of the first
+    one. `stamps` (n,) are header stamps in ns, valid where `has_stamp`; both are None if they were not requested.
     """
 
-    picked: tuple[Picked, ...]
+    fields: tuple[FieldValues, ...]
     status: ByteArray
     reason: str = ""
     stamps: IntArray | None = None
@@ -60,26 +60,26 @@ class Gathered:
 
 
 class Decoder(Protocol):
-    """Messages of one schema -> columns; it may be used for one batch after another, but not by two threads at once."""
+    """Decodes messages of one schema, batch after batch; two threads must not use it at once."""
 
     def fields(self, batch: Batch) -> list[str]:
-        """Every numeric field but the header's stamp, as `wrench.force.z`, `position[:]`."""
+        """Return every numeric field except the header's time stamp, as `wrench.force.z`, `position[:]`."""
         ...
 
-    def gather(
+    def decode(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
-    ) -> Gathered:
-        """The wanted fields of all messages; whole arrays whose elements are named come in the order of `joints`."""
+    ) -> DecodedBatch:
+        """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`."""
         ...
 
-    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> Recipe | None:
-        """How more messages like the last ones become the same fields; None where they do not at once."""
+    def row_layout(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> RowLayout | None:
+        """Return the row layout of further messages like the last ones; None if they must be decoded in full."""
         ...
 
     def names(self, batch: Batch, field: Field) -> list[str]:
-        """The names that the first messages give to the elements of a field's array, sorted."""
+        """Return the element names of a field's array in the first messages, sorted."""
         ...
 
     def element_names(self, batch: Batch) -> tuple[str, ...]:
-        """The array of texts `name` of the first message, in its order; empty where there is none."""
+        """Return the string array `name` of the first message, in its order; empty if it has no such array."""
         ...

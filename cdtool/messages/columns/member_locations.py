@@ -1,4 +1,4 @@
-"""Where a member lies in each message of a batch: what the encodings hand to the picking of fields."""
+"""Where the members of a batch's messages are: what the encodings pass to the reading of field values."""
 
 from __future__ import annotations
 
@@ -12,89 +12,89 @@ import numpy as np
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.recording import FloatArray
 
-# A member of a message: names of members, each followed by an element's number where it is one of an array of messages.
-Place = tuple[str | int, ...]
-# Names and the messages that have them.
-Group = tuple[tuple[str, ...], IntArray]
+# The path to a member of a message: names of members; after an array of messages the number of its element.
+MemberPath = tuple[str | int, ...]
+# Element names, and the rows of the messages that have them.
+NameGroup = tuple[tuple[str, ...], IntArray]
 
 
 class Slot(Protocol):
-    """One place in n messages; `count` (n,) is how many numbers or elements are there, -1: the place is not there."""
+    """One member in n messages; `count` (n,) is its number of elements (1 for a number), -1 where it is absent."""
 
     @property
     def count(self) -> IntArray:
-        """(n,)."""
+        """The number of elements (n,)."""
         ...
 
     @property
     def uniform(self) -> int | None:
-        """The count, where it is known to be the same in all messages."""
+        """The count, if it is known to be the same in all messages."""
         ...
 
     def numbers(self, rows: IntArray | None, first: int, width: int) -> FloatArray:
-        """(rows, width): the elements from `first` on of these messages (None: of all), which must have them."""
+        """Return `width` elements from `first` on (rows, width) of these messages (None: of all); they must exist."""
         ...
 
 
-class Names(Protocol):
-    """The array of texts beside an array: what its elements are called."""
+class ElementNames(Protocol):
+    """The string array that names the elements of the arrays next to it."""
 
-    def alike(self, rows: IntArray) -> bool:
-        """True if these messages all have the same names."""
+    def are_equal(self, rows: IntArray) -> bool:
+        """Return True if these messages all have the same names."""
         ...
 
     def of(self, row: int) -> tuple[str, ...]:
-        """The names of one message; empty where there are none."""
+        """Return the names of one message; empty if it has none."""
         ...
 
 
 @dataclass(frozen=True)
-class Found:
-    """The places of a batch: `status` (n,), the reason of the first message that is damaged, slots, names by place.
+class MemberLocations:
+    """The located members of a batch: a slot or names by path.
 
-    `whole`: no message is damaged.
+    `status` (n,) is 0 or the kind of damage, `reason` that of the first damaged message; `intact`: none is damaged.
     """
 
     status: ByteArray
     reason: str
-    slots: Mapping[Place, Slot]
-    names: Mapping[Place, Names]
-    whole: bool = False
-    _groups: dict[Place, list[Group]] = field(default_factory=dict)
+    slots: Mapping[MemberPath, Slot]
+    names: Mapping[MemberPath, ElementNames]
+    intact: bool = False
+    _groups: dict[MemberPath, list[NameGroup]] = field(default_factory=dict)
 
     @cached_property
     def rows(self) -> IntArray:
-        """The messages that are whole."""
-        return np.arange(len(self.status)) if self.whole else np.flatnonzero(self.status == 0)
+        """The messages that are not damaged."""
+        return np.arange(len(self.status)) if self.intact else np.flatnonzero(self.status == 0)
 
-    def groups(self, place: Place, rows: IntArray) -> list[Group]:
-        """Messages by the names at `place`, in order of first appearance; nearly always one group."""
+    def groups(self, path: MemberPath, rows: IntArray) -> list[NameGroup]:
+        """Return messages grouped by the names at `path`, in order of first appearance; nearly always one group."""
         if rows is not self.rows:
-            return _grouped(self.names[place], rows)
-        if place not in self._groups:
-            self._groups[place] = _grouped(self.names[place], rows)
-        return self._groups[place]
+            return _group_by_names(self.names[path], rows)
+        if path not in self._groups:
+            self._groups[path] = _group_by_names(self.names[path], rows)
+        return self._groups[path]
 
 
 @dataclass(frozen=True)
-class FixedNames:
+class FixedElementNames:
     """The same names in all messages."""
 
     names: tuple[str, ...]
 
-    def alike(self, rows: IntArray) -> bool:  # noqa: ARG002
-        """True."""
+    def are_equal(self, rows: IntArray) -> bool:  # noqa: ARG002
+        """Return True."""
         return True
 
     def of(self, row: int) -> tuple[str, ...]:  # noqa: ARG002
-        """The names."""
+        """Return the names."""
         return self.names
 
 
-def _grouped(names: Names, rows: IntArray) -> list[Group]:
+def _group_by_names(names: ElementNames, rows: IntArray) -> list[NameGroup]:
     if not len(rows):
         return []
-    if names.alike(rows):
+    if names.are_equal(rows):
         return [(names.of(int(rows[0])), rows)]
     groups: dict[tuple[str, ...], list[int]] = {}
     for row in rows.tolist():

@@ -1,214 +1,215 @@
-"""Messages with a schema: fields resolved against it once, then found and picked batch by batch."""
+"""Messages with a schema: fields are resolved against it once, then located and read batch by batch."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.decoded_batch import ABSENT, THERE, ByteArray, Gathered, IntArray, Picked
-from cdtool.messages.columns.field_values import WHOLE, Plan, elements_called, nowhere, pick
-from cdtool.messages.columns.member_locations import Found, Place
-from cdtool.messages.columns.uniform_layout import Pattern, recipe_of
-from cdtool.messages.fast_path import Recipe
+from cdtool.messages.columns.decoded_batch import ABSENT, PRESENT, ByteArray, DecodedBatch, FieldValues, IntArray
+from cdtool.messages.columns.field_values import WHOLE, FieldPlan, absent_field, find_named_elements, read_field
+from cdtool.messages.columns.member_locations import MemberLocations, MemberPath
+from cdtool.messages.columns.uniform_layout import UniformLayout, row_layout_of
+from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 from cdtool.recording import FloatArray
 
-# One field of some of the messages, by their rows.
-Gather = Callable[[IntArray, Field], Gathered]
+# Decodes one field of the messages with these row numbers.
+DecodeRows = Callable[[IntArray, Field], DecodedBatch]
 _MOST_FIELDS = 4096
-_LATEST = 9_223_372_035  # s: an int64 of ns holds no more
-_NO_MEMBERS = Layout("", ())  # of a number or text
+_LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
+_NO_MEMBERS = Layout("", ())  # of a number or string
 
 
 @dataclass(frozen=True)
-class NamedPlan:
-    """A field whose step number `step` takes an element by its name; `array` is the plan of that step alone.
+class NamedElementPlan:
+    """A field whose step number `step` selects an element by name; `array` is the plan of that step only.
 
     An example is `pose[robot].position.x` in Gazebo's ModelStates. The element may differ from message to message;
-    messages in which it is the same are read together, as if the field gave its number.
+    messages in which it is the same are decoded together, as if the field stated its number.
     """
 
-    array: Plan
+    array: FieldPlan
     step: int
 
     @property
-    def places(self) -> tuple[Place, ...]:
-        """All that it needs to know before the element's number is known."""
-        return self.array.places
+    def paths(self) -> tuple[MemberPath, ...]:
+        """The paths to all members needed to find the element's number."""
+        return self.array.paths
 
     @property
-    def names(self) -> Place | None:
-        """The place of the texts that name the elements."""
+    def names(self) -> MemberPath | None:
+        """The path to the strings that name the elements."""
         return self.array.names
 
 
+AnyPlan = FieldPlan | NamedElementPlan
+
+
 @dataclass(frozen=True)
-class _Part:
-    """The messages `rows`, in all of which the name is that of the same element, and their `field` by its number."""
+class _SameElement:
+    """The messages `rows` in which the name belongs to the same element, and the `field` with its number."""
 
     rows: IntArray
     field: Field
-    gathered: Gathered
+    decoded: DecodedBatch
 
     @property
-    def picked(self) -> Picked:
-        return self.gathered.picked[0]
+    def field_values(self) -> FieldValues:
+        return self.decoded.fields[0]
 
 
-def numbered(field: Field, step: int, element: int) -> Field:
-    """A field with an element's number in one of its steps."""
+def with_element(field: Field, step: int, element: int) -> Field:
+    """Return the field with an element's number in place of the name in one of its steps."""
     name, _ = field.steps[step]
     return Field(field.text, (*field.steps[:step], (name, str(element)), *field.steps[step + 1 :]))
 
 
-def gather_by_name(plan: NamedPlan, found: Found, gather: Gather) -> Gathered:
-    """The field of all messages; `found` are the plan's places, `gather` reads what the element's number leads to.
+def decode_by_name(plan: NamedElementPlan, locations: MemberLocations, decode: DecodeRows) -> DecodedBatch:
+    """Return a field with a named element of all messages; `locations` are those of the plan's paths.
 
-    As for an array of numbers: NaN where the array is shorter than its names, OTHER_JOINTS where no name is that one.
+    As for an array of numbers, the value is NaN if the array has fewer elements than names, and the state is
+    OTHER_JOINTS if no element has the name.
     """
-    called = elements_called(plan.array, found)
+    named = find_named_elements(plan.array, locations)
     parts = []
-    for element in np.unique(called.element[called.element >= 0]).tolist():
-        rows, field = np.flatnonzero(called.element == element), numbered(plan.array.field, plan.step, element)
-        parts.append(_Part(rows, field, gather(rows, field)))
-    if len(parts) == 1 and len(parts[0].rows) == len(found.status):
-        return parts[0].gathered
-    state, status, fault = called.state, found.status.copy(), called.fault
-    reasons = {int(np.flatnonzero(status)[0]): found.reason} if status.any() else {}
+    for element in np.unique(named.element[named.element >= 0]).tolist():
+        rows, field = np.flatnonzero(named.element == element), with_element(plan.array.field, plan.step, element)
+        parts.append(_SameElement(rows, field, decode(rows, field)))
+    if len(parts) == 1 and len(parts[0].rows) == len(locations.status):
+        return parts[0].decoded
+    state, status, fault = named.state, locations.status.copy(), named.fault
+    reasons = {int(np.flatnonzero(status)[0]): locations.reason} if status.any() else {}
     for part in parts:
-        state[part.rows], status[part.rows] = part.picked.state, part.gathered.status
-        absent = part.rows[part.picked.state == ABSENT]
-        if part.picked.fault is not None and len(absent) and (fault is None or int(absent[0]) < fault[0]):
-            fault = int(absent[0]), part.picked.fault
-        if part.gathered.status.any():
-            reasons[int(part.rows[np.flatnonzero(part.gathered.status)[0]])] = part.gathered.reason
+        state[part.rows], status[part.rows] = part.field_values.state, part.decoded.status
+        absent = part.rows[part.field_values.state == ABSENT]
+        if part.field_values.fault is not None and len(absent) and (fault is None or int(absent[0]) < fault[0]):
+            fault = int(absent[0]), part.field_values.fault
+        if part.decoded.status.any():
+            reasons[int(part.rows[np.flatnonzero(part.decoded.status)[0]])] = part.decoded.reason
     if plan.array.field.whole:
-        count = np.where((state == THERE) & (status == 0), np.int64(0), np.int64(-1))
-        values = _table(parts, count, gather)
+        count = np.where((state == PRESENT) & (status == 0), np.int64(0), np.int64(-1))
+        values = _read_arrays(parts, count, decode)
     else:
         count, values = None, np.full(len(state), math.nan)
         for part in parts:
-            values[part.rows] = part.picked.values
-    picked = Picked(values, count, state, fault[1] if fault else None)
-    return Gathered((picked,), status, reasons[min(reasons)] if reasons else "")
+            values[part.rows] = part.field_values.values
+    field_values = FieldValues(values, count, state, fault[1] if fault else None)
+    return DecodedBatch((field_values,), status, reasons[min(reasons)] if reasons else "")
 
 
-def _table(parts: list[_Part], count: IntArray, gather: Gather) -> FloatArray:
-    """A whole array's rows, as wide as the first that is not empty; the widths of all go into `count`."""
+def _read_arrays(parts: list[_SameElement], count: IntArray, decode: DecodeRows) -> FloatArray:
+    """Return the rows of a whole array, as wide as the first that is not empty; write all widths to `count`."""
     for part in parts:
-        if part.picked.count is not None:
-            count[part.rows] = part.picked.count
+        if part.field_values.count is not None:
+            count[part.rows] = part.field_values.count
     wide = np.flatnonzero(count > 0)
     table = np.full((len(count), int(count[wide[0]]) if len(wide) else 1), math.nan)
     for part in parts:
         rows = part.rows[count[part.rows] == table.shape[1]]
-        if len(rows):  # the part's first one may be of another width
-            table[rows] = gather(rows, part.field).picked[0].values
+        if len(rows):  # decoded again, as the first array of the part may have another width
+            table[rows] = decode(rows, part.field).fields[0].values
     return table
 
 
-class Finder(Protocol):
-    """One encoding: where the places of a batch's messages are."""
+class Locator(Protocol):
+    """Locates members in the messages of one encoding."""
 
-    def find(self, batch: Batch, places: tuple[Place, ...]) -> Found:
-        """The places, each asked for once."""
+    def locate(self, batch: Batch, paths: tuple[MemberPath, ...]) -> MemberLocations:
+        """Return the members at `paths`, which are all different."""
         ...
 
-    def pattern(self, places: tuple[Place, ...]) -> Pattern | None:
-        """What the last messages had in common; None where they had nothing."""
+    def layout(self, paths: tuple[MemberPath, ...]) -> UniformLayout | None:
+        """Return the layout that the last messages had in common; None if they differed."""
         ...
 
 
 @dataclass
-class TypedDecoder:
-    """A Decoder (decoded_batch.py) for messages whose schema tells every field."""
+class SchemaDecoder:
+    """A Decoder (decoded_batch.py) for messages whose schema defines every field."""
 
     schema: Schema
-    finder: Finder
-    _plans: dict[Field, Plan | NamedPlan | FieldMissingError] = field(default_factory=dict)
+    locator: Locator
+    _plans: dict[Field, AnyPlan | FieldMissingError] = field(default_factory=dict)
 
-    def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema tells them, whatever the messages are)
-        """Every numeric field but the header's stamp, in the order of the schema; of arrays those that may be short."""
-        found = []
-        for name in _numeric_names(self.schema, self.schema.root, "", ()):
-            found.append(name)
-            if len(found) >= _MOST_FIELDS:
-                break
-        return found
+    def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema defines them, not the messages)
+        """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
+        return list(islice(_numeric_names(self.schema, self.schema.root, "", ()), _MOST_FIELDS))
 
-    def gather(
+    def decode(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
-    ) -> Gathered:
-        """The wanted fields of all messages; one that the schema does not have is absent in all, with its fault."""
+    ) -> DecodedBatch:
+        """Decode the wanted fields of all messages; one that the schema does not have is absent in all."""
         plans = [self.plan(each) for each in wanted]
-        stamp = self.stamp_places() if stamps else ()
-        found = self.finder.find(batch, _places(plans, stamp))
-        parts = [self._gathered(plan, found, batch, joints) for plan in plans]
-        picked = tuple(part.picked[0] for part in parts)
-        status, reason = _damaged(found, parts)
+        stamp = self.stamp_paths() if stamps else ()
+        locations = self.locator.locate(batch, _all_paths(plans, stamp))
+        parts = [self._decode_field(plan, locations, batch, joints) for plan in plans]
+        field_values = tuple(part.fields[0] for part in parts)
+        status, reason = _damage(locations, parts)
         if not stamps:
-            return Gathered(picked, status, reason)
-        times, there = stamp_times(found, stamp)
-        return Gathered(picked, status, reason, times, there)
+            return DecodedBatch(field_values, status, reason)
+        times, has_stamp = header_times(locations, stamp)
+        return DecodedBatch(field_values, status, reason, times, has_stamp)
 
-    def recipe(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> Recipe | None:
-        """How more messages like the last ones become the same fields; None where they do not at once."""
-        plans = [plan for plan in (self.plan(each) for each in wanted) if isinstance(plan, Plan)]
-        stamp = self.stamp_places() if stamps else ()
+    def row_layout(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> RowLayout | None:
+        """Return the row layout of further messages like the last ones; None if they must be decoded in full."""
+        plans = [plan for plan in (self.plan(each) for each in wanted) if isinstance(plan, FieldPlan)]
+        stamp = self.stamp_paths() if stamps else ()
         if len(plans) < len(wanted) or (stamps and not stamp):
             return None
-        pattern = self.finder.pattern(_places(plans, stamp))
-        return None if pattern is None else recipe_of(pattern, plans, joints, stamp)
+        layout = self.locator.layout(_all_paths(plans, stamp))
+        return None if layout is None else row_layout_of(layout, plans, joints, stamp)
 
-    def _gathered(
-        self, plan: Plan | NamedPlan | FieldMissingError, found: Found, batch: Batch, joints: Sequence[str]
-    ) -> Gathered:
-        """One field of all messages, and those that are damaged where only this field shows it."""
+    def _decode_field(
+        self, plan: AnyPlan | FieldMissingError, locations: MemberLocations, batch: Batch, joints: Sequence[str]
+    ) -> DecodedBatch:
+        """Return one field of all messages, with the damage that only this field reveals."""
         if isinstance(plan, FieldMissingError):
-            return Gathered((nowhere(len(batch), plan),), found.status, found.reason)
-        if isinstance(plan, Plan):
-            return Gathered((pick(plan, found, joints),), found.status, found.reason)
+            return DecodedBatch((absent_field(len(batch), plan),), locations.status, locations.reason)
+        if isinstance(plan, FieldPlan):
+            return DecodedBatch((read_field(plan, locations, joints),), locations.status, locations.reason)
 
-        def gather(rows: IntArray, field: Field) -> Gathered:
-            return self.gather(_some(batch, rows), [field], joints)
+        def decode(rows: IntArray, field: Field) -> DecodedBatch:
+            return self.decode(_select(batch, rows), [field], joints)
 
-        return gather_by_name(plan, found, gather)
+        return decode_by_name(plan, locations, decode)
 
     def names(self, batch: Batch, field: Field) -> list[str]:
-        """What the first ten messages call the elements of the field's array, sorted."""
+        """Return the element names of the field's array in the first ten messages, sorted."""
         plan = self.plan(field)
-        place = None if isinstance(plan, FieldMissingError) else plan.names
-        if place is None:
+        path = None if isinstance(plan, FieldMissingError) else plan.names
+        if path is None:
             return []
-        found = self.finder.find(batch, (place,))
-        return sorted({name for row in np.flatnonzero(found.status == 0)[:10] for name in found.names[place].of(row)})
+        locations = self.locator.locate(batch, (path,))
+        rows = np.flatnonzero(locations.status == 0)[:10]
+        return sorted({name for row in rows for name in locations.names[path].of(row)})
 
     def element_names(self, batch: Batch) -> tuple[str, ...]:
-        """The array of texts `name` of the first message, in its order; empty where there is none."""
-        place = names_place(self.schema.root, ())
-        if place is None:
+        """Return the string array `name` of the first message, in its order; empty if it has no such array."""
+        path = names_path(self.schema.root, ())
+        if path is None:
             return ()
-        found = self.finder.find(batch.first(1), (place,))
-        return found.names[place].of(0) if len(found.rows) else ()
+        locations = self.locator.locate(batch.first(1), (path,))
+        return locations.names[path].of(0) if len(locations.rows) else ()
 
-    def plan(self, field: Field) -> Plan | NamedPlan | FieldMissingError:
-        """The field's place, or why the schema has none."""
+    def plan(self, field: Field) -> AnyPlan | FieldMissingError:
+        """Return the plan of a field, or the reason why the schema does not have it."""
         if field not in self._plans:
             try:
-                self._plans[field] = resolve(field, self.schema)
+                self._plans[field] = resolve_field(field, self.schema)
             except FieldMissingError as fault:
                 self._plans[field] = fault
         return self._plans[field]
 
-    def stamp_places(self) -> tuple[Place, ...]:
-        """Seconds and nanoseconds of the header's stamp; empty where the schema has none."""
+    def stamp_paths(self) -> tuple[MemberPath, ...]:
+        """Return the paths to seconds and nanoseconds of the header's stamp; empty if the schema has no such stamp."""
         header = self.schema.root.member("header")
         stamp = self._inner(header, "stamp")
         for names in STAMPS:
@@ -223,22 +224,22 @@ class TypedDecoder:
         return self.schema.nested(member.kind).member(name)
 
 
-def _places(plans: Sequence[Plan | NamedPlan | FieldMissingError], stamp: tuple[Place, ...]) -> tuple[Place, ...]:
-    """All that plans and stamp need, each once."""
-    needed = (place for plan in plans if not isinstance(plan, FieldMissingError) for place in plan.places)
+def _all_paths(plans: Sequence[AnyPlan | FieldMissingError], stamp: tuple[MemberPath, ...]) -> tuple[MemberPath, ...]:
+    """Return the paths that plans and stamp need, without repetition."""
+    needed = (path for plan in plans if not isinstance(plan, FieldMissingError) for path in plan.paths)
     return tuple(dict.fromkeys((*needed, *stamp)))
 
 
-def _some(batch: Batch, rows: IntArray) -> Batch:
-    """The messages `rows` of a batch."""
+def _select(batch: Batch, rows: IntArray) -> Batch:
+    """Return the messages `rows` of a batch."""
     if len(rows) == len(batch):
         return batch
     return Batch(batch.data, batch.start[rows], batch.length[rows], batch.log_time[rows])
 
 
-def _damaged(found: Found, parts: Sequence[Gathered]) -> tuple[ByteArray, str]:
-    """Which messages are damaged, also where only one field shows it, and why the first of them is."""
-    status, reason = found.status, found.reason
+def _damage(locations: MemberLocations, parts: Sequence[DecodedBatch]) -> tuple[ByteArray, str]:
+    """Return which messages are damaged, including damage that only one field reveals, and the first one's reason."""
+    status, reason = locations.status, locations.reason
     for part in parts:
         more = (part.status != 0) & (status == 0)
         if more.any():
@@ -248,7 +249,7 @@ def _damaged(found: Found, parts: Sequence[Gathered]) -> tuple[ByteArray, str]:
 
 
 def _numeric_names(schema: Schema, layout: Layout, prefix: str, above: tuple[str, ...]) -> Iterator[str]:
-    if layout.name in above:  # protobuf's messages may hold themselves
+    if layout.name in above:  # protobuf messages may contain themselves
         return
     for member in layout.members:
         full = f"{prefix}{member.name}"
@@ -263,45 +264,48 @@ def _numeric_names(schema: Schema, layout: Layout, prefix: str, above: tuple[str
             yield from _numeric_names(schema, schema.nested(member.kind), f"{full}.", (*above, layout.name))
 
 
-def stamp_times(found: Found, places: tuple[Place, ...]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
-    """(n,) ns of seconds and nanoseconds at `places`, and where both are there; exact, as seconds below 2^53 are."""
-    n = len(found.status)
+def header_times(locations: MemberLocations, paths: tuple[MemberPath, ...]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
+    """Return the times (n,) in ns of seconds and nanoseconds at `paths`, and which messages have both.
+
+    The times are exact, as float64 represents all integers below 2^53.
+    """
+    n = len(locations.status)
     times = np.zeros(n, dtype=np.int64)
-    if not places:
+    if not paths:
         return times, np.zeros(n, dtype=np.bool_)
-    seconds, nanoseconds = (found.slots[place] for place in places)
-    if found.whole and seconds.uniform == nanoseconds.uniform == 1:
+    seconds, nanoseconds = (locations.slots[path] for path in paths)
+    if locations.intact and seconds.uniform == nanoseconds.uniform == 1:
         rows = None
     else:
-        rows = np.flatnonzero((found.status == 0) & (seconds.count == 1) & (nanoseconds.count == 1))
+        rows = np.flatnonzero((locations.status == 0) & (seconds.count == 1) & (nanoseconds.count == 1))
     whole, rest = (slot.numbers(rows, 0, 1)[:, 0] for slot in (seconds, nanoseconds))
     usable = (np.abs(whole) <= _LATEST) & (np.abs(rest) <= 2**53)
     if rows is None and usable.all():
         return whole.astype(np.int64) * 10**9 + rest.astype(np.int64), usable
     rows = (np.arange(n) if rows is None else rows)[usable]
-    there = np.zeros(n, dtype=np.bool_)
-    there[rows] = True
+    has_stamp = np.zeros(n, dtype=np.bool_)
+    has_stamp[rows] = True
     times[rows] = whole[usable].astype(np.int64) * 10**9 + rest[usable].astype(np.int64)
-    return times, there
+    return times, has_stamp
 
 
-def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
-    """A field's place in the messages of a schema; raises FieldMissingError with the members that there are."""
+def resolve_field(field: Field, schema: Schema) -> AnyPlan:
+    """Return a field's plan for the messages of a schema; raises FieldMissingError with the members that exist."""
     layout = schema.root
-    place: Place = ()
-    arrays: list[tuple[Place, int]] = []
+    path: MemberPath = ()
+    arrays: list[tuple[MemberPath, int]] = []
     last = len(field.steps) - 1
     for i, (name, index) in enumerate(field.steps):
         member = layout.member(name)
         if member is None:
             raise FieldMissingError(f"there is no '{name}'", layout.names)
-        parent, place = place, (*place, name)
+        parent, path = path, (*path, name)
         if index is not None and member.array is None:
             raise FieldMissingError(f"'{name}' is not an array", [name])
         if index == WHOLE or (i == last and index is not None):
-            names = _names_of(index or "", layout, parent)
+            names = _names_for_index(index or "", layout, parent)
             _require_number(field, member)
-            return Plan(field, place, index, tuple(arrays), names)
+            return FieldPlan(field, path, index, tuple(arrays), names)
         if member.array is not None and index is None:
             raise FieldMissingError(
                 f"'{field.text}' is an array" if i == last else f"there is no '{field.steps[i + 1][0]}'",
@@ -310,46 +314,47 @@ def resolve(field: Field, schema: Schema) -> Plan | NamedPlan:
         if index is not None:
             if isinstance(member.kind, Message) and schema.nested(member.kind).entry:
                 raise FieldMissingError(
-                    f"'{name}' is a map, whose entries have no order", advice="log the value in a field of its own"
+                    f"'{name}' is a map, whose entries have no order", advice="log the value in a separate field"
                 )
             if not is_element_number(index):
-                plan = NamedPlan(Plan(field, place, index, tuple(arrays), _named_place(layout, parent)), i)
-                resolve(numbered(field, i, 0), schema)  # whichever element it is, what follows it must be there
-                return plan
-            arrays.append((place, int(index)))
-            place = (*place, int(index))
+                names = _required_names_path(layout, parent)
+                # Whichever element has the name, the rest of the path must exist.
+                resolve_field(with_element(field, i, 0), schema)
+                return NamedElementPlan(FieldPlan(field, path, index, tuple(arrays), names), i)
+            arrays.append((path, int(index)))
+            path = (*path, int(index))
         if i == last:
             _require_number(field, member)
-            return Plan(field, place, None, tuple(arrays))
+            return FieldPlan(field, path, None, tuple(arrays))
         layout = schema.nested(member.kind) if isinstance(member.kind, Message) else _NO_MEMBERS
-    raise FieldMissingError(f"'{field.text}' names nothing")
+    raise FieldMissingError(f"'{field.text}' does not name a field")
 
 
 def _require_number(field: Field, member: Member) -> None:
     if isinstance(member.kind, Text):
-        raise FieldMissingError(f"'{field.text}' holds a text, not a number")
+        raise FieldMissingError(f"'{field.text}' is a string, not a number")
     if isinstance(member.kind, Message):
-        raise FieldMissingError(f"'{field.text}' holds a {member.kind.name}, not a number")
+        raise FieldMissingError(f"'{field.text}' is a {member.kind.name}, not a number")
 
 
-def _names_of(index: str, layout: Layout, parent: Place) -> Place | None:
-    """Return the place of the texts that name an array's elements; None where its index needs none."""
+def _names_for_index(index: str, layout: Layout, parent: MemberPath) -> MemberPath | None:
+    """Return the path to the strings that name an array's elements; None if its index needs no names."""
     if index == WHOLE:
-        return names_place(layout, parent)
-    return None if is_element_number(index) else _named_place(layout, parent)
+        return names_path(layout, parent)
+    return None if is_element_number(index) else _required_names_path(layout, parent)
 
 
-def _named_place(layout: Layout, parent: Place) -> Place:
-    """The place of the texts that must be there; raises FieldMissingError."""
-    place = names_place(layout, parent)
-    if place is None:
+def _required_names_path(layout: Layout, parent: MemberPath) -> MemberPath:
+    """Return the path to the strings that name an array's elements; raises FieldMissingError if it is missing."""
+    path = names_path(layout, parent)
+    if path is None:
         problem = "'name' is not an array" if layout.member("name") else "there is no 'name'"
         raise FieldMissingError(problem, layout.names)
-    return place
+    return path
 
 
-def names_place(layout: Layout, parent: Place) -> Place | None:
-    """The place of the texts `name` beside an array; None where it is missing."""
+def names_path(layout: Layout, parent: MemberPath) -> MemberPath | None:
+    """Return the path to the string array `name` next to an array; None if it is missing."""
     member = layout.member("name")
     if member is None or member.array is None or not isinstance(member.kind, Text):
         return None

@@ -29,7 +29,7 @@ from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.fast_path import Taken, Taker
+from cdtool.messages.fast_path import ChunkReader, ChunkRows
 
 _LARGE_PAGE = 2 << 20
 _MOST_KEPT = 3
@@ -89,7 +89,7 @@ class _Filled:
 
     header: ChunkHeader
     address: int = 0
-    taken: Taken | None = None
+    taken: ChunkRows | None = None
 
 
 class _Reader:
@@ -122,7 +122,7 @@ class ChunksAhead:
     """
 
     def __init__(
-        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: Taker | None
+        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: ChunkReader | None
     ) -> None:
         self._path, self._definitions, self._taker = path, definitions, taker
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
@@ -176,7 +176,7 @@ class ChunksAhead:
         filled = self._there.get(header)
         return filled is not None and filled.address == content.ctypes.data
 
-    def taken(self, header: ChunkHeader) -> Taken | None:
+    def taken(self, header: ChunkHeader) -> ChunkRows | None:
         """The messages of the chunk with this header; None where they have to be looked at."""
         filled = self._there.get(header)
         return None if filled is None or self._definitions.ambiguous else filled.taken

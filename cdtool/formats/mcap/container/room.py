@@ -13,7 +13,7 @@ from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.batch import Batch
-from cdtool.messages.fast_path import Taken
+from cdtool.messages.fast_path import ChunkRows
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Piece:
     batches: tuple[tuple[int, Batch], ...]
     covered: bool
     cuts: Mapping[int, int]
-    taken: tuple[Taken, ...] = ()
+    taken: tuple[ChunkRows, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Room:
         self._used = 0
         self._covered = False
         self._cuts: dict[int, int] = {}
-        self._taken: list[Taken] = []
+        self._taken: list[ChunkRows] = []
 
     def fits(self, size: int, covered: bool) -> bool:
         """`size` more bytes can lie beside what is there, and a CRC covers both or neither."""
@@ -66,7 +66,7 @@ class Room:
         """Start again with `memory`, once what is there was handed out."""
         self._data, self._covered = memory, covered
 
-    def pass_over(self, size: int, taken: Taken) -> Iterator[Piece]:
+    def pass_over(self, size: int, taken: ChunkRows) -> Iterator[Piece]:
         """The next `size` bytes are a chunk whose messages are columns already."""
         if self._table.count:
             yield from self._hand_out()
