@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.channels import ChannelSource
-from cdtool.clock.stamps import CleanPieces, Gaps, missing_findings
+from cdtool.clock.stamps import ClockCleaner, GapStatistics, missing_findings
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
@@ -41,8 +41,8 @@ class LoggedChannel:
 
     def __init__(self, path: Path, item: ChannelSource, names: Sequence[str], period: float | None = None) -> None:
         self._path, self.item, self.joints, self._names = path, item, len(item.factor), names
-        self.clean, self.clock = CleanPieces(), ClockFigures()
-        self._gaps = None if period is None else Gaps(period, item.channel)
+        self.clean, self.clock = ClockCleaner(), ClockFigures()
+        self._gaps = None if period is None else GapStatistics(period, item.channel)
         self._masked, self._known = np.zeros((3, self.joints), np.int64), np.zeros(self.joints, np.int64)
         self._least, self._most = np.full(self.joints, np.inf), np.full(self.joints, -np.inf)
 

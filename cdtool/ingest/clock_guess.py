@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
-from cdtool.clock.stamps import EDGE_ROWS, CleanPieces, gaps_in, leading_wild
+from cdtool.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, gaps_in
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.findings import Finding
@@ -55,9 +55,9 @@ class TableClock:
 
     def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
         """The stamps' pieces as times [s] that strictly increase; the last rows of a piece come with the next one."""
-        return self.cleaned(CleanPieces(), stamps)
+        return self.cleaned(ClockCleaner(), stamps)
 
-    def cleaned(self, clean: CleanPieces, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    def cleaned(self, clean: ClockCleaner, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
         """The same through a given cleaner, which then says what was dropped."""
         for piece in stamps:
             yield clean.times((piece - self.origin) * self.factor, piece)
@@ -151,7 +151,7 @@ def _described(column: Column, first_row: int, step: float, stamps: Callable[[],
 def _start(stamps: Iterable[FloatArray]) -> float:
     """The first stamp that is not wild; the first of an epoch where one that is of none stands before it."""
     known = next(found for piece in stamps if len(found := piece[np.isfinite(piece)]))
-    rows = leading_wild(known, np.inf)
+    rows = count_leading_strays(known, np.inf)
     if not rows and not unit_since_1970(known[0]):
         rows = next((i for i, stamp in enumerate(known[: EDGE_ROWS + 1]) if unit_since_1970(stamp)), 0)
     return float(known[rows])
@@ -159,7 +159,7 @@ def _start(stamps: Iterable[FloatArray]) -> float:
 
 def _checked(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     """The clock with its figures and all that is odd about it."""
-    clean = CleanPieces()
+    clean = ClockCleaner()
     for times in clock.cleaned(clean, stamps()):
         clock.figures.add(times, len(times))
     gaps = gaps_in(clock.times(stamps()), clock.figures.steps.median, clock.column)
