@@ -20,7 +20,7 @@ from cdtool.formats.csv import text
 from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.ingest.log_statistics import LogFigures
+from cdtool.ingest.log_statistics import LogStatistics
 from cdtool.ingest.reading import choose_format
 from cdtool.workflows.convert.converting import convert
 from tests.formats.containers import two_clocks
@@ -127,7 +127,7 @@ def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(ti
     assert all(one[-1] < other[0] for one, other in pairwise(ends))
 
 
-def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
+def test_the_memory_for_statistics_does_not_grow_with_the_log():
     def read(count: int) -> Pieces:
         def pieces() -> Iterator[Piece]:
             for k in range(count):
@@ -140,7 +140,7 @@ def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
     peaks = {}
     for count in (20, 200):
         tracemalloc.start()
-        figures = LogFigures(lambda _, n=count: read(n), in_order=True)
+        figures = LogStatistics(lambda _, n=count: read(n), in_order=True)
         peaks[count] = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert figures.rows("/a data") == 20_000 * count
