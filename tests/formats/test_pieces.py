@@ -127,7 +127,7 @@ def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(ti
     assert all(one[-1] < other[0] for one, other in pairwise(ends))
 
 
-def test_the_memory_for_statistics_does_not_grow_with_the_log():
+def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
     def read(count: int) -> Pieces:
         def pieces() -> Iterator[Piece]:
             for k in range(count):

@@ -1,1 +1,1 @@
-"""What many tests are made from: machines, motions, logs, results of builds. No tests."""
+"""Synthetic machines, motions, logs and results of builds that many tests use. No tests."""
