@@ -14,8 +14,8 @@ import cdtool as api
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from tests.command import cdtool
-from tests.made_up.builds import MISSED, NOT_ASSESSABLE, build_results
 from tests.report.hostile import HOSTILE
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 LATENCIES = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
 OLD = {("momentum", "stiff"): LATENCIES, ("pure_torque", "stiff"): LATENCIES}

@@ -16,7 +16,7 @@ from cdtool.exit_status import STATUSES_OF
 from tests.command import Outcome, cdtool
 from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
-from tests.made_up.builds import MISSED, build_results
+from tests.synthetic.builds import MISSED, build_results
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"

@@ -14,7 +14,7 @@ from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.summary import summarise
 from tests.cli.changed_logs import SAMPLES, changed, folder_of
 from tests.command import cdtool
-from tests.made_up.builds import build_results
+from tests.synthetic.builds import build_results
 
 BEGUN = "a contact is in progress when it begins, until 0.599 s: its onset is not recorded, it is not scored"
 

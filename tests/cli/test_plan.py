@@ -20,7 +20,7 @@ from cdtool.evaluation.statistics.sample_size import (
 )
 from cdtool.workflows.planning import measured_std
 from tests.command import cdtool
-from tests.made_up.builds import MISSED, NOT_ASSESSABLE, Outcome, build_results
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, Outcome, build_results
 
 FIRST = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
 SECOND = [x + y for x, y in zip(FIRST, np.random.default_rng(2).normal(20.0, 2.0, 30), strict=True)]

@@ -14,9 +14,9 @@ from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
 from cdtool.report.plots.style import look_of
-from tests.made_up.motions import moving_recording
-from tests.made_up.robots import JOINTS as ROBOT_JOINTS
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import JOINTS as ROBOT_JOINTS
+from tests.synthetic.robots import six_joint_robot
 
 NAMES = DETECTORS.names(plugins=True)
 
@@ -224,7 +224,7 @@ def test_wrong_gains_are_refused_by_name(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(name, simulated):
-    from tests.made_up.machines import GATE, machine_of
+    from tests.synthetic.machines import GATE, machine_of
 
     a, b = simulated("stiff", 5), simulated("soft", 6)
     n = min(len(a["speed"]), len(b["speed"]))

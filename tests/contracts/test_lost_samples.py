@@ -30,9 +30,9 @@ from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from cdtool.thresholds import THRESHOLDS
-from tests.made_up.machines import ARM, GATE, arm_of, machine_of
-from tests.made_up.motions import moving_recording
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from damaged_logs import KINDS, Fault, damaged, filled, random_faults

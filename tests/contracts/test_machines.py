@@ -18,10 +18,10 @@ from cdtool.simulation.arm_model import simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters
 from cdtool.simulation.arm_recordings import as_recording
 from cdtool.tables import Table
-from tests.made_up.machines import ARM, GATE, arm_of, machine_of
-from tests.made_up.motions import moving_recording
-from tests.made_up.robots import six_joint_robot
 from tests.project.pages import machine_files
+from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 
 @pytest.fixture(scope="module", params=MACHINES.names())

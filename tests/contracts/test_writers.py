@@ -13,9 +13,9 @@ from cdtool.foreign_files import refuse_other_kind
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
 from cdtool.report.writers.base import Report, Subject
-from tests.made_up.builds import build_results
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
+from tests.synthetic.builds import build_results
 
 NAMES = WRITERS.names(plugins=True)
 SUFFIXES = [(name, suffix) for name in NAMES for suffix in WRITERS.load(name).suffixes]

@@ -16,8 +16,8 @@ from cdtool.dynamics import JointEquation
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording
-from tests.made_up.motions import PERIOD, moving_recording
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.motions import PERIOD, moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 EKF = FrictionEkf(
     sigma_acceleration=0.4,

@@ -17,8 +17,8 @@ from cdtool.machine_file import fingerprint, read_machine_file
 from cdtool.signature_file import FactorOrigin, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.signature import Signature
-from tests.made_up.machines import GATE, machine_of
-from tests.made_up.motions import moving_recording
+from tests.synthetic.machines import GATE, machine_of
+from tests.synthetic.motions import moving_recording
 
 NAMES = [name for name in DETECTORS.names() if fields(DETECTORS.load(name))]
 

@@ -26,9 +26,9 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import FloatArray
 from cdtool.thresholds.limit import Limit
-from tests.made_up.machines import ARM, arm_of, machine_of
-from tests.made_up.motions import PERIOD, moving_recording, resting_recording
-from tests.made_up.robots import six_joint_robot, urdf_robot
+from tests.synthetic.machines import ARM, arm_of, machine_of
+from tests.synthetic.motions import PERIOD, moving_recording, resting_recording
+from tests.synthetic.robots import six_joint_robot, urdf_robot
 
 BANDWIDTH = 30.0  # [rad/s], of all of them
 OBSERVERS: dict[str, Any] = {

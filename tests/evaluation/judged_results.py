@@ -10,7 +10,7 @@ from cdtool.evaluation.results import (
     ForceStepResult,
     Results,
 )
-from tests.made_up.builds import build_results
+from tests.synthetic.builds import build_results
 
 GATE = "en_12453_reducing_gap"
 PROFILE = asdict(read_force_limits()[GATE])

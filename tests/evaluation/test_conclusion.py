@@ -28,7 +28,7 @@ from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from tests.command import cdtool
 from tests.evaluation.judged_results import GATE, results
-from tests.made_up.builds import MISSED, NOT_ASSESSABLE, build_results
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 MET = LimitRule("*.false_alarms", "*", "*", "false_alarms", largest=0)
 

@@ -32,7 +32,7 @@ TO_REWRITE = (
     "tests/clock",
     "tests/formats",
     "tests/ingest",
-    "tests/made_up",
+    "tests/synthetic",
     "tests/messages",
 )
 

@@ -11,8 +11,8 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import ARM, arm_of
-from tests.made_up.motions import moving_recording
+from tests.synthetic.machines import ARM, arm_of
+from tests.synthetic.motions import moving_recording
 
 RNG = np.random.default_rng(6)
 POSITION, SPEED, ACCELERATION = RNG.uniform(-3.0, 3.0, (3, 200, 2))

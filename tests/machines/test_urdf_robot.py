@@ -13,8 +13,8 @@ from cdtool.detectors.momentum import Momentum
 from cdtool.errors import ConfigurationError
 from cdtool.machine_file import fingerprint, read_machine_file
 from cdtool.recording import Recording, Series
-from tests.made_up.motions import moving_recording
-from tests.made_up.robots import JOINTS, six_joint_robot, six_joint_urdf, urdf_robot
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import JOINTS, six_joint_robot, six_joint_urdf, urdf_robot
 
 pytest.importorskip("pinocchio")
 

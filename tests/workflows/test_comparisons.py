@@ -16,7 +16,7 @@ from cdtool import benchmark, compare, simulate_gate
 from cdtool.activation import Activation
 from cdtool.evaluation.results import Results
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
-from tests.made_up.builds import MISSED, Outcome, build_results
+from tests.synthetic.builds import MISSED, Outcome, build_results
 
 KEYS = [(name, group) for name in ("momentum", "pure_torque") for group in ("stiff", "soft")]
 

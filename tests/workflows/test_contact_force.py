@@ -19,7 +19,7 @@ from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.contact_force import ContactPoint, contact_force, summarise_force
 from tests.command import cdtool
-from tests.made_up.motions import moving_recording
+from tests.synthetic.motions import moving_recording
 
 POINT = ContactPoint("forearm", (0.2, 0.0, 0.0))
 

@@ -7,7 +7,7 @@ import numpy as np
 from cdtool.evaluation.builds.comparison import BuildComparison
 from cdtool.evaluation.builds.rows import BuildRow, Question
 from cdtool.evaluation.results import Results
-from tests.made_up.builds import build_results
+from tests.synthetic.builds import build_results
 
 KEY = ("momentum", "stiff")
 

@@ -17,8 +17,8 @@ from cdtool.evaluation.statistics.rates import poisson_difference_p
 from cdtool.evaluation.statistics.sample_size import detectable_difference, impacts_for_unpaired
 from cdtool.report.writers.comparison_json import to_json
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
-from tests.made_up.builds import MISSED, NOT_ASSESSABLE, ONSET, RULES, UNCERTAINTY, build_results
 from tests.report.hostile import HOSTILE
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, ONSET, RULES, UNCERTAINTY, build_results
 
 
 def test_a_shift_of_every_latency_is_shown_with_its_size_in_both_directions():

@@ -17,7 +17,7 @@ from cdtool.evaluation.statistics.rates import (
 )
 from cdtool.exit_status import Fact, status_of
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
-from tests.made_up.builds import MISSED, NOT_ASSESSABLE, build_results
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 OTHERS = {"bytes_of": "other", "names": "x"}
 
