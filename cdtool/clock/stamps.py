@@ -49,7 +49,7 @@ STRAY_ROWS, EDGE_ROWS = 50, 3
 EPOCH = 1e8
 # A jump is longer than this many usual steps; the usual step is taken from this many rows before it.
 _JUMP, _STEPS_BEFORE = 2.5, 9
-# The start of a log is stray if this many time stamps in order follow it; shorter logs than 8 rows are not checked.
+# The start of a log can be stray if this many time stamps in order follow it; logs below 8 rows are not checked.
 _IN_ORDER, _SHORTEST = 3, 8
 _AHEAD, _BEHIND = 2 * STRAY_ROWS, 4 * STRAY_ROWS
 
@@ -315,7 +315,7 @@ class _DroppedStampCounts:
 
 
 class _RestartDetector:
-    """Finds out why many time stamps run backward: a counter wraps, or the clock restarts."""
+    """Determines why many time stamps run backward: a counter wraps, or the clock restarts."""
 
     def __init__(self) -> None:
         self._last = np.empty(0)
@@ -366,8 +366,8 @@ class StrayStampMarker:
 
     Stray rows are up to 50 rows between a time stamp g and the next one n >= g if all of them are above n by more than
     2.5 usual steps, and at least as many rows with time stamps below them follow: dropping n and its successors instead
-    would lose more rows. Stray are also up to 3 rows at the start of a log that are above the next ones, and up to 3
-    rows at either edge that are 3 years off.
+    would lose more rows. Up to 3 rows at the start of a log are stray if they are above the next ones, and up to 3 rows
+    at either edge if they are 3 years off.
     """
 
     def __init__(self) -> None:

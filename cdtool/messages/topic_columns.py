@@ -150,10 +150,10 @@ class TopicColumns(Topic):
         for rows, numbers in zip(self._rows.values(), row_layout.fields, strict=True):
             tables.append(rows.rows.share(() if numbers.single else (len(numbers.at),)))
             rows.exact = numbers.dtype not in ("i8", "u8")
-        there = tuple(table for table in tables if table is not None)
-        if stamps is None or len(there) < len(tables) or any(each.elsewhere for each in self.fields.values()):
+        shared = tuple(table for table in tables if table is not None)
+        if stamps is None or len(shared) < len(tables) or any(each.elsewhere for each in self.fields.values()):
             return None
-        return row_layout, Destination(there, stamps, self._stamps.count)
+        return row_layout, Destination(shared, stamps, self._stamps.count)
 
     def confirm(self, stream: Stream, parts: Sequence[WrittenRows]) -> None:
         """Add messages that the fast path wrote into rows, using the result of `binding`."""
@@ -173,8 +173,8 @@ class TopicColumns(Topic):
         values = rows.rows.values
         rounded = 0 if rows.exact else rounded_integers(values)
         if rows.elsewhere is not None:
-            there = ~rows.elsewhere.values
-            values, (time, order) = values[there], sort_times(self._stamps.values[there], self.origin)
+            present = ~rows.elsewhere.values
+            values, (time, order) = values[present], sort_times(self._stamps.values[present], self.origin)
         else:
             if self._clock is None:
                 self._clock = sort_times(self._stamps.values, self.origin)

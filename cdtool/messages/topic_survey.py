@@ -93,17 +93,17 @@ class TopicSurvey:
 
     def _column(self, name: str, field_values: FieldValues, whole: npt.NDArray[np.bool_]) -> FloatArray | None:
         """Return the field's values, NaN where a message does not have it; None if no message so far has it."""
-        values, count, there = field_values.values, field_values.count, field_values.state != ABSENT
+        values, count, present = field_values.values, field_values.count, field_values.state != ABSENT
         if not whole.all():
-            values, there, count = values[whole], there[whole], None if count is None else count[whole]
+            values, present, count = values[whole], present[whole], None if count is None else count[whole]
         widths = self._widths[name]
         if count is not None:
-            there &= (count >= 0) & (count <= _LONGEST_ARRAY)
-            filled = count_values(count[there & (count > 0)])
+            present &= (count >= 0) & (count <= _LONGEST_ARRAY)
+            filled = count_values(count[present & (count > 0)])
             if filled:
                 self._shapes.setdefault(name, (next(iter(filled)),))
             widths.update(filled)
-        elif there.any():
+        elif present.any():
             self._shapes.setdefault(name, ())
             widths[1] += 1
         if name not in self._shapes:
@@ -111,8 +111,8 @@ class TopicSurvey:
         if values.shape[1:] != self._shapes[name]:
             return np.full((len(values), *self._shapes[name]), np.nan)
         self._rounded[name] += rounded_integers(values)
-        if not there.all():
-            values = np.where(there.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
+        if not present.all():
+            values = np.where(present.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
         return values
 
     def columns_and_findings(self) -> tuple[dict[str, Column], list[Finding]]:

@@ -7,7 +7,7 @@ import numpy as np
 from cdtool.instructions import prefetch
 from cdtool.kernels import kernel
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
-from cdtool.messages.columns.walk_kernel import PLACES
+from cdtool.messages.columns.walk_kernel import POSITIONS
 from cdtool.messages.fast_path import Words
 
 WORD = 8  # bytes
@@ -17,7 +17,7 @@ _PREFETCHED_BYTES = 1024  # of one message, at most
 
 
 @kernel(
-    f"b1(Array(uint64, 1, 'A', readonly=True, aligned=False), {PLACES}, {PLACES}, int64, int64, "
+    f"b1(Array(uint64, 1, 'A', readonly=True, aligned=False), {POSITIONS}, {POSITIONS}, int64, int64, "
     "uint64[::1], uint64[::1], uint64[::1], uint64[::1], uint64[::1], int64[::1], int64[::1], uint64[::1])"
 )
 def copy_uniform(

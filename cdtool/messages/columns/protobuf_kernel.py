@@ -29,7 +29,7 @@ SCRATCH = DEEPEST + 1
 WHOLE, CUT, WRONG = 0, 1, 2  # status of a message; WRONG: a field is written as another type
 
 _BYTES = "Array(uint8, 1, 'C', readonly=True)"
-_PLACES = "Array(int64, 1, 'A', readonly=True)"
+_POSITIONS = "Array(int64, 1, 'A', readonly=True)"
 
 
 @kernel(f"Tuple((uint64, int64))({_BYTES}, int64, int64)")
@@ -47,7 +47,7 @@ def varint(data: ByteArray, p: int, end: int) -> tuple[np.uint64, int]:
 
 
 @kernel(
-    f"int64({_BYTES}, {_PLACES}, {_PLACES}, int64[:,::1], int64[:,::1], int64, int64[:,::1], int64[:,::1], "
+    f"int64({_BYTES}, {_POSITIONS}, {_POSITIONS}, int64[:,::1], int64[:,::1], int64, int64[:,::1], int64[:,::1], "
     "uint8[:,::1], uint64[::1], uint8[::1], int64[:,::1])"
 )
 def read_tags(

@@ -32,11 +32,11 @@ PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a
 
 BYTES = "Array(uint8, 1, 'C', readonly=True)"
 QUADS = "Array(uint32, 1, 'A', readonly=True, aligned=False)"
-PLACES = "Array(int64, 1, 'A', readonly=True)"
+POSITIONS = "Array(int64, 1, 'A', readonly=True)"
 
 
 @kernel(
-    f"void({BYTES}, {QUADS}, {PLACES}, {PLACES}, int64[:,::1], int64, int64[:,::1], int64[:,::1], "
+    f"void({BYTES}, {QUADS}, {POSITIONS}, {POSITIONS}, int64[:,::1], int64, int64[:,::1], int64[:,::1], "
     "int64[::1], uint8[::1], uint8[::1], int64[:,::1])"
 )
 def walk(
@@ -78,7 +78,7 @@ def walk(
         body = p
         level = -1
         selected = -1
-        holds = True
+        applies = True
         step = 0
         while step < program.shape[0]:
             what, slot, number, a, b = (
@@ -96,12 +96,12 @@ def walk(
                 p += (body - p) & (a - 1)
                 continue
             if what == GUARD:
-                holds = holds and loops[0, a] == b
+                applies = applies and loops[0, a] == b
                 continue
             if what == SELECT:
-                if holds:
+                if applies:
                     selected = slot
-                holds = True
+                applies = True
                 continue
             if what == END:
                 if p > end:
@@ -166,7 +166,7 @@ def walk(
             status[i] = LONG
 
 
-@kernel(f"b1({BYTES}, {PLACES}, {PLACES}, int64, uint8[::1], uint8[::1])")
+@kernel(f"b1({BYTES}, {POSITIONS}, {POSITIONS}, int64, uint8[::1], uint8[::1])")
 def all_match(
     data: ByteArray, start: IntArray, length: IntArray, shortest: int, mask: ByteArray, pattern: ByteArray
 ) -> bool:
@@ -187,7 +187,7 @@ def all_match(
     return True
 
 
-@kernel(f"void({BYTES}, {PLACES}, int64, uint8[:,::1])")
+@kernel(f"void({BYTES}, {POSITIONS}, int64, uint8[:,::1])")
 def fetch(data: ByteArray, at: IntArray, offset: int, out: ByteArray) -> None:
     """Fill `out` (n, k) with the k bytes of `data` from `at[i] + offset` on, all of which must exist."""
     for i in range(at.size):
